@@ -69,11 +69,19 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
 
     def command(**said: Any) -> None:
         with _guard():
+            if name == "compare":
+                from mechdesign.cli.compare import compare
+
+                raise typer.Exit(compare(**said))
             study, options = said.pop("study"), Options(**said)
             if name in COMMANDS:
                 from mechdesign.cli.execution import ask
 
                 raise typer.Exit(ask(name, study, options))
+            if options.verify is not None:
+                from mechdesign.cli.compare import verify
+
+                raise typer.Exit(verify(study, options))
             from mechdesign.cli import batch
 
             raise typer.Exit((batch.check if name == "check" else batch.run)(study, options))
@@ -89,7 +97,7 @@ _add(
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME,
+        given.RESUME, given.VERIFY,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
@@ -109,6 +117,17 @@ _add(
     "Validate only: joints, mobility, plan of solution.",
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
 )
+_add(
+    "compare",
+    (
+        given.OLD, given.NEW, given.RTOL, given.ATOL, given.TOLERANCES, given.OUT_DIFFERENCES, given.JUNIT, given.JSON,
+        given.QUIET,
+    ),
+    "Say what moved between two folders of results.",
+    "Say what moved between two folders of results, of one command, a study or many: rows are matched by their poses "
+    "and keys, folders by their paths. Exit codes: 0 equal within the tolerance, 1 something moved, is missing or is "
+    "new, 2 there is nothing to compare.",
+)  # fmt: skip
 
 
 @app.command("new")

@@ -43,6 +43,8 @@ from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
 
 if TYPE_CHECKING:
+    from junitparser import JUnitXml
+
     from mechdesign.report.page.page import Entry
 
 SUMMARY = "summary.csv"  # of several studies, beside their folders
@@ -313,6 +315,11 @@ def _junit(answers: Sequence[Outcome]) -> str:
                     case.result = [Failure(printable(str(verdict)), type_="requirement")]
                 suite.add_testcase(case)
         report.add_testsuite(suite)
+    return junit_text(report)
+
+
+def junit_text(report: JUnitXml) -> str:
+    """The text of a JUnit report, with its counts."""
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
     body = text.decode() if isinstance(text, bytes) else str(text)

@@ -17,6 +17,8 @@ from mechdesign.files import formats_of
 BUILT_IN = "two_link_arm"
 # Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
+# Relative tolerance of `compare`: more than machines differ by, less than anything that matters.
+RELATIVE = 1e-9
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
@@ -104,6 +106,46 @@ RESUME = _flag(
 RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
+VERIFY = _text(
+    "verify",
+    Path,
+    "--verify",
+    "PATH",
+    "Instead of studies: repeat what a manifest.json, or those in a folder, say was computed, and compare the bytes of "
+    "the tables; 1 where they are others. Files that a study names are looked for in the working directory.",
+)
+
+
+def _folder(name: str, meaning: str) -> Parameter:
+    return _parameter(name, Path, Parameter.empty, typer.Argument(metavar=name.upper(), help=meaning))
+
+
+OLD = _folder("old", "Folder of the results that are the baseline.")
+NEW = _folder("new", "Folder of the results that are compared with it.")
+RTOL = _parameter(
+    "rtol",
+    float,
+    RELATIVE,
+    typer.Option("--rtol", metavar="R", min=0, help="Relative tolerance: a share of the old number."),
+)
+ATOL = _text(
+    "atol",
+    float,
+    "--atol",
+    "A",
+    "Absolute tolerance, which is added. Default: what rounding leaves, 1e-12 of the largest number of the same unit "
+    "in the table.",
+    min=0,
+)
+TOLERANCES = _text(
+    "tolerances",
+    Path,
+    "--tolerances",
+    "FILE",
+    "YAML with tolerances of columns by command.table.column, e.g. reliability.*.sigma: {rtol: 0.05}; the last pattern "
+    "that fits counts, --rtol and --atol where none does.",
+)
+OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
@@ -135,6 +177,7 @@ class Options:
     junit: Path | None = None
     fail_fast: bool = False
     resume: bool = False
+    verify: Path | None = None
     allow_files: bool = False
 
     def __post_init__(self) -> None:

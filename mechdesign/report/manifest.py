@@ -117,10 +117,11 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
     files = recorded_files(content)
     if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None
-    return content if all(_digest(directory / name) == digest for name, digest in files.items()) else None
+    return content if all(digest(directory / name) == known for name, known in files.items()) else None
 
 
-def _digest(path: Path) -> str:
+def digest(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError:

@@ -1,0 +1,187 @@
+"""Baselines: `compare` says what moved between two folders of results, `run --verify` whether they come out again."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import mechdesign
+from mechdesign.cli import terminal
+from mechdesign.cli.batch import junit_text
+from mechdesign.cli.options import Options
+from mechdesign.errors import StudyError, counted
+from mechdesign.parallel import one_thread
+from mechdesign.report import compare as comparing
+from mechdesign.report import manifest, requirements, writer
+from mechdesign.report.compare import Comparison, Difference, Tolerance, Tolerances
+from mechdesign.report.manifest import Extras
+from mechdesign.report.tables import to_csv
+
+# Files in the folder of differences.
+_TABLE = "differences.csv"
+_PICTURE = "differences.png"
+# Of `Difference.change`: a file whose bytes are others.
+_BYTES = "bytes"
+_SHOWN = 12  # digits of a hash
+_EXACTLY = Tolerances(Tolerance(0.0, 0.0))
+
+
+def compare(
+    old: Path,
+    new: Path,
+    rtol: float,
+    atol: float | None,
+    tolerances: Path | None,
+    out: Path | None,
+    junit: Path | None,
+    *,
+    json: bool,
+    quiet: bool,
+) -> int:
+    """Compare two folders of results; returns 1 where something moved beyond its tolerance, is missing or new, else 0.
+
+    Raises
+    ------
+    StudyError
+        If there is nothing to compare, or the tolerances are none.
+    OutputError
+        If a file cannot be written.
+    """
+    if not (math.isfinite(rtol) and math.isfinite(atol or 0)):
+        raise StudyError("--rtol and --atol take numbers from 0 on")
+    default = Tolerance(rtol, atol)
+    chosen = Tolerances(default) if tolerances is None else comparing.tolerances_from(tolerances, default)
+    if out is not None:
+        writer.check_writable(out)
+    found = comparing.compare(old, new, chosen)
+    if out is not None:
+        _write(out, found)
+    return _tell(found, "compare", junit, as_json=json, quiet=quiet)
+
+
+@one_thread()
+def verify(studies: Sequence[Path] | None, options: Options) -> int:
+    """Repeat what manifests say was computed and compare the tables; returns 1 where one is another, else 0.
+
+    Raises
+    ------
+    StudyError
+        If there is no manifest, its study cannot be read or its run was interrupted; or options stand beside it that
+        would change what is repeated.
+    """
+    assert options.verify is not None
+    path = options.verify
+    beside = {name: getattr(options, name) for name in ("jobs", "json", "quiet", "junit", "allow_files")}
+    alone = Options(verify=path, **beside)
+    if studies or dataclasses.replace(options, overrides=options.overrides or ()) != alone:
+        raise StudyError(
+            "--verify repeats what a manifest says; beside it stand no studies, and no options but --jobs, --junit, "
+            "--json, --quiet and --allow-files"
+        )
+    root = path.parent if path.name == manifest.NAME else path
+    recorded = comparing.results(root)
+    if path != root:
+        recorded = {folder: content for folder, content in recorded.items() if folder == "."}
+    if not recorded:
+        raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
+    total = Comparison()
+    for folder, content in recorded.items():
+        with tempfile.TemporaryDirectory() as there:
+            terminal.say(f"{root / folder}: {content.get('command')} again", quiet=options.quiet)
+            _repeat(Path(there), root / folder / manifest.NAME, content, options)
+            found = _verified(folder, root / folder, content, Path(there))
+        total.differences += found.differences
+        total.notes += found.notes
+        total.cases += found.cases
+        total.compared += found.compared
+    return _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet)
+
+
+def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
+    """Compute again what a manifest describes and write its tables."""
+    command = content.get("command")
+    if command not in mechdesign.commands.COMMANDS:
+        raise StudyError(f"{where}: of no command that there is: {command!r}")
+    if content.get("interrupted"):
+        raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
+    try:
+        study = mechdesign.load(content["study"]["resolved"], seed=content["seed"], allow_files=options.allow_files)
+    except (KeyError, TypeError):
+        raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
+    except StudyError as error:
+        raise StudyError(f"{where}: its study cannot be read here:\n{error}") from None
+    more = {"all_modes": True} if content.get("all_modes") else {}
+    with terminal.Bar(quiet=options.quiet) as bar:
+        result = getattr(mechdesign, command)(study, jobs=options.jobs, progress=bar, **more)
+    tables = Extras(plots=False, all_modes=bool(more))
+    writer.write(there, study, result, requirements.requirements(study, result), tables)
+
+
+def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> Comparison:
+    """Differences of the kept tables and those that were computed again, and of their bytes."""
+    # The study that is repeated has its overrides in it.
+    before, after = content | {"overrides": []}, comparing.results(there)["."]
+    found = Comparison(notes=[f"{folder}: {note}" for note in comparing.notes(before, after)])
+    comparing.compare_results(found, folder, (kept, before), (there, after), _EXACTLY)
+    recorded = manifest.recorded_files(content)
+    told = {each.table for each in found.differences}
+    for name, digest in manifest.recorded_files(after).items():
+        table = name.removesuffix(".csv")
+        known = {"in the manifest": recorded.get(name, ""), "of the file": manifest.digest(kept / name)}
+        wrong = [f"SHA-256 {told[:_SHOWN] or 'none'} {where}" for where, told in known.items() if told != digest]
+        if wrong and table not in told:
+            found.differences.append(Difference(folder, table, "", _BYTES, old=", ".join(wrong), new=digest[:_SHOWN]))
+    return found
+
+
+def _write(out: Path, found: Comparison) -> None:
+    writer.write_file(out / _TABLE, to_csv(found.table).encode())
+    if not found.moved:
+        # None of an older comparison stays.
+        (out / _PICTURE).unlink(missing_ok=True)
+        return
+    from mechdesign.report.figures import style
+    from mechdesign.report.figures.differences import differences_figure
+
+    with style.context():
+        writer.write_file(out / _PICTURE, style.encoded(differences_figure(found.moved), "png"))
+
+
+def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
+    """Show what was found and return the exit code."""
+    for note in found.notes:
+        terminal.say(f"{command}: note: {note}", quiet=quiet)
+    for difference in found.differences:
+        if difference.change in (comparing.VERDICT, comparing.OUTCOME):
+            terminal.say(f"{command}: {difference}")
+    tables, columns = found.compared["tables"], found.compared["columns"]
+    compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
+    terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
+    terminal.show(found.table, as_json=as_json)
+    if junit is not None:
+        writer.write_file(junit, _junit(found, command).encode())
+    return 1 if found.differences else 0
+
+
+def _junit(found: Comparison, command: str) -> str:
+    """JUnit XML: a suite a folder, a case a table, and a case for what is otherwise besides tables."""
+    from junitparser import Failure, JUnitXml, TestCase, TestSuite
+
+    report = JUnitXml("mechdesign")
+    cases = dict.fromkeys([*found.cases, *((each.folder, each.table) for each in found.differences)])
+    for folder in dict.fromkeys(folder for folder, _ in cases):
+        suite = TestSuite(folder)
+        for table in [name for where, name in cases if where == folder]:
+            case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
+            wrong = [each for each in found.differences if (each.folder, each.table) == (folder, table)]
+            if wrong:
+                failure = Failure(str(wrong[0]), type_="difference")
+                failure.text = "\n".join(map(str, wrong))
+                case.result = [failure]
+            suite.add_testcase(case)
+        report.add_testsuite(suite)
+    return junit_text(report)

@@ -1,0 +1,54 @@
+"""Columns that moved between two results: old and new over the pose, or new against old."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mechdesign.report.compare import Moved
+from mechdesign.report.figures import style
+from mechdesign.report.figures.panels import MAX_PANELS
+
+# Inches.
+_HEIGHT = 2.2
+_COLUMNS = 2
+_MARGINS = {"left": 0.95, "right": 0.25, "top": 0.85, "bottom": 0.6}
+_ACROSS = 0.95
+_DOWN = 0.95
+_TITLE_SIZE = 9.0
+
+
+def differences_figure(moved: Sequence[Moved]) -> Figure:
+    """A panel a column, of those that moved most for the size of their old values; use inside `style.context`."""
+    shown = moved[:MAX_PANELS]
+    columns = 1 if style.narrow() else min(_COLUMNS, len(shown))
+    figure, panels = style.page(len(shown), columns, _HEIGHT, across=_ACROSS, down=_DOWN, **_MARGINS)
+    room = panels[0].get_position().width * style.width()
+    for axes, each in zip(panels, shown, strict=True):
+        unit = f" [{style.printed(each.unit)}]" if each.unit else ""
+        if each.along is None:
+            axes.plot(each.old, each.new, "o", color=style.VERMILION, markersize=4, linestyle="none")
+            both = np.concatenate([each.old, each.new])
+            ends = [both[np.isfinite(both)].min(initial=np.inf), both[np.isfinite(both)].max(initial=-np.inf)]
+            if ends[0] < ends[1]:
+                axes.plot(ends, ends, color=style.FAINT, linewidth=1.0, zorder=1)
+            axes.set_xlabel(f"old{unit}")
+            axes.set_ylabel(f"new{unit}")
+        else:
+            order = np.argsort(each.along.values, kind="stable")
+            for values, name, color, dashes in (
+                (each.old, "old", style.BLUE, style.DASHES[0]),
+                (each.new, "new", style.VERMILION, style.DASHES[1]),
+            ):
+                axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
+            along = f" [{style.printed(each.along.unit)}]" if each.along.unit else ""
+            axes.set_xlabel(f"{each.along.name}{along}")
+            axes.set_ylabel(unit.strip())
+            axes.legend(loc="best")
+        axes.set_title(style.folded(each.name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
+    left = len(moved) - len(shown)
+    more = f"; {left} more in differences.csv" if left else ""
+    figure.text(0.01, 1 - 0.1 / figure.get_figheight(), f"what moved most{more}", va="top", fontsize=11)
+    return figure

@@ -1,0 +1,254 @@
+"""Baselines: `compare` of two folders of results, and `run --verify` of what a manifest says."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from junitparser import JUnitXml
+
+from mechdesign.report.compare import Tolerance, compare_tables
+from mechdesign.results import Column, Table
+
+from .conftest import SLIDER, answer
+
+ARM = Path(__file__).parents[2] / "configs" / "two_link_arm.yaml"
+GIVEN = "requirements: [{result: kinematics.B.x, where: {theta: 0}, at_most: 0.5}]\n"
+
+
+def motion(theta=(0.0, 45.0, 90.0), x=(1 / 3, np.nan, 3.0), **more):
+    """A result of `kinematics` with these positions; further columns by their names."""
+    columns = [Column("theta", np.array(theta), "deg", "drive"), Column("B.x", np.array(x), "mm", "position")]
+    columns += [Column(name, np.array(values)) for name, values in more.items()]
+    return answer(tables={"motion": Table("motion", tuple(columns))})
+
+
+@pytest.fixture
+def results(folder, analysis, invoke):
+    """Write the results of an analysis of the test's making into a folder of the working directory."""
+    (folder / "slider.yaml").write_text(SLIDER + GIVEN)
+
+    def write(name, result, *options):
+        analysis(lambda study, **ignored: result)
+        done = invoke("kinematics", "slider.yaml", "--no-plots", "--quiet", "--out", name, *options)
+        assert done.exit_code in (0, 1), done.stderr
+
+    return write
+
+
+@pytest.fixture
+def compared(invoke):
+    """Compare folders `old` and `new`: the exit code and the differences by what they are about."""
+
+    def compare(*options):
+        done = invoke("compare", "old", "new", *options)
+        return done, list(csv.DictReader(io.StringIO(done.stdout)))
+
+    return compare
+
+
+def short(differences):
+    return {(each["table"], each["column"], each["change"]) for each in differences}
+
+
+def test_the_same_results_are_equal_in_any_order_of_rows(results, compared):
+    same = motion(x=(np.inf, np.nan, 3.0))
+    results("old", same)
+    results("new", motion((90.0, 0.0, 45.0), (3.0, np.inf, np.nan)))
+    done, differences = compared()
+    assert (done.exit_code, differences) == (0, [])
+    assert "0 differences in 1 table with 2 columns" in done.stderr
+
+
+def test_what_moved_by_how_much_and_where(results, compared):
+    results("old", motion())
+    results("new", motion((90.0, 45.0, 0.0), (3.25, np.nan, 0.375)))
+    done, [moved] = compared()
+    assert done.exit_code == 1
+    assert short([moved]) == {("motion", "B.x", "moved")}
+    assert (moved["rows"], moved["row"], moved["old"], moved["new"], moved["unit"]) == (
+        "2",
+        "theta 90",
+        "3",
+        "3.25",
+        "mm",
+    )
+    assert (float(moved["largest"]), float(moved["relative"])) == pytest.approx((0.25, 0.125))
+
+
+def test_nan_and_a_number_are_infinitely_apart(results, compared):
+    results("old", motion())
+    results("new", motion(x=(1 / 3, 2.0, 3.0)))
+    done, [moved] = compared("--rtol", "1000", "--atol", "1000")
+    assert (done.exit_code, moved["largest"], moved["old"], moved["new"]) == (1, "inf", "nan", "2")
+
+
+def test_what_rounding_leaves_of_zero_is_no_difference(results, compared):
+    results("old", motion(x=(0.0, np.nan, 3.0)))
+    results("new", motion(x=(2e-16, np.nan, 3.0)))
+    assert compared()[0].exit_code == 0
+    assert compared("--atol", "0")[0].exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (("--rtol", "1e-5"), 0),
+        (("--rtol", "1e-7"), 1),
+        (("--atol", "1e-5"), 0),
+        (("--tolerances", "wide.yaml"), 0),
+        (("--tolerances", "narrow.yaml", "--rtol", "1e-5"), 1),
+    ],
+)
+def test_tolerances(folder, results, compared, options, code):
+    results("old", motion())
+    results("new", motion(x=(1 / 3 + 1e-6, np.nan, 3.0)))
+    (folder / "wide.yaml").write_text(
+        "kinematics.*: {rtol: 0}\nkinematics.motion.B.x: {rtol: 1e-5}\nstiffness.K: {rtol: 1}\n"
+    )
+    (folder / "narrow.yaml").write_text("'*.B.x': {rtol: 1e-7}\n")
+    done, _ = compared(*options)
+    assert done.exit_code == code
+    assert ("'stiffness.K' fits no column" in done.stderr) == ("wide.yaml" in options)
+
+
+def test_a_wrong_tolerance_is_told_with_its_place(folder, results, compared):
+    results("old", motion())
+    results("new", motion())
+    (folder / "wrong.yaml").write_text("kinematics.*: {rtol: 0}\nkinematics.motion.B.x: {rtl: 1e-5}\n")
+    done, _ = compared("--tolerances", "wrong.yaml")
+    assert done.exit_code == 2
+    assert "wrong.yaml:2:24: kinematics.motion.B.x: a tolerance is {rtol: 0.05}" in done.stderr
+
+
+def test_missing_and_new_tables_columns_and_rows(folder, results, compared):
+    results("old", motion(gone=(1, 2, 3)))
+    (folder / "slider.yaml").write_text(SLIDER.replace("to: 90, step: 45", "to: 90, step: 30"))
+    more = motion((0.0, 30.0, 60.0, 90.0), (1 / 3, 1.0, 2.0, 3.0), made=(1, 2, 3, 4))
+    table = more.tables["motion"]
+    results("new", answer(tables={"motion": table, "limits": Table("limits", table.columns)}))
+    done, differences = compared()
+    assert done.exit_code == 1
+    assert short(differences) == {
+        ("limits", "", "new"),
+        ("motion", "gone", "missing"),
+        ("motion", "made", "new"),
+        ("motion", "", "missing"),
+        ("motion", "", "new"),
+        ("", "kinematics.B.x (theta 0) at most 0.5", "verdict"),
+    }
+    rows = {each["change"]: (each["rows"], each["row"]) for each in differences if each["row"]}
+    assert rows == {"missing": ("1", "theta 45"), "new": ("2", "theta 30")}
+
+
+def test_a_verdict_that_changed(results, compared):
+    results("old", motion())
+    results("new", motion(x=(0.75, np.nan, 3.0)), "--set", "mechanism.parameters.r=41", "--seed", "7")
+    done, differences = compared("--rtol", "10")
+    assert done.exit_code == 1
+    assert [(each["change"], each["old"], each["new"]) for each in differences] == [
+        ("verdict", "met, worst 0.333333", "not met, worst 0.75")
+    ]
+    assert "note: study: mechanism.parameters.r 40 -> 41" in done.stderr
+    assert "note: seed: 0 -> 7" in done.stderr
+
+
+def test_words_that_changed_are_told(results, compared):
+    results("old", motion(state=("open", "shut", "open")))
+    results("new", motion(state=("open", "shut", "shut")))
+    _, [moved] = compared()
+    assert (moved["column"], moved["row"], moved["old"], moved["new"]) == ("state", "theta 90", "open", "shut")
+
+
+def limits(*rows):
+    theta, kind = zip(*rows, strict=True)
+    return Table("limits", (Column("theta", np.array(theta), "deg"), Column("kind", np.array(kind), "")))
+
+
+def test_a_limit_that_moved_is_no_other_limit():
+    tolerances = dict.fromkeys(("theta", "kind"), Tolerance(1e-9))
+    old, new = limits((10.0, "stop"), (80.0, "dead point")), limits((10.5, "stop"), (80.0, "dead point"))
+    [(told, _)] = compare_tables(old, new, tolerances)
+    assert (told["column"], told["change"], told["largest"], told["row"]) == ("theta", "moved", 0.5, "theta 10")
+    # Of studies with other poses nobody knows which rows are meant.
+    changes = [told["change"] for told, _ in compare_tables(old, new, tolerances, same_poses=False)]
+    assert changes == ["missing", "new"]
+
+
+def test_keys_within_their_tolerance_are_the_same_whatever_the_order():
+    old, new = limits((10.0, "stop"), (80.0, "stop")), limits((80.1, "stop"), (10.01, "stop"))
+    tolerances = dict.fromkeys(("theta", "kind"), Tolerance(0.01))
+    assert list(compare_tables(old, new, tolerances, same_poses=False)) == []
+
+
+def test_files_of_a_comparison(folder, results, compared):
+    results("old/slider/kinematics", motion())
+    results("new/slider/kinematics", motion(x=(0.25, np.nan, 3.0)))
+    results("new/other/kinematics", motion())
+    compared("--out", "out", "--junit", "junit.xml")
+    assert short(csv.DictReader(io.StringIO((folder / "out/differences.csv").read_text()))) == {
+        ("motion", "B.x", "moved"),
+        ("", "", "new"),
+    }
+    assert (folder / "out/differences.png").read_bytes().startswith(b"\x89PNG")
+    suites = {
+        suite.name: [(case.name, bool(case.result)) for case in suite] for suite in JUnitXml.fromfile("junit.xml")
+    }
+    assert suites == {"slider/kinematics": [("motion", True)], "other/kinematics": [("result", True)]}
+    compared("--rtol", "1", "--out", "out")
+    assert not (folder / "out/differences.png").exists()
+
+
+def test_nothing_to_compare(folder, results, compared):
+    results("old/kinematics", motion())
+    done, _ = compared()
+    assert done.exit_code == 2
+    assert "new: there is no such folder of results" in done.stderr
+    results("new/elsewhere", motion())
+    done, _ = compared()
+    assert done.exit_code == 2
+    assert "no result stands in both folders; old has kinematics; new has elsewhere" in done.stderr
+    results("new/kinematics", motion())
+    (folder / "new/kinematics/motion.csv").write_text("theta\n1\n")
+    done, _ = compared()
+    assert done.exit_code == 2
+    assert "motion.csv: is not the table that its manifest describes" in done.stderr
+
+
+def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatch, invoke):
+    monkeypatch.chdir(tmp_path)
+    for name, jobs in (("old", 1), ("new", 2)):
+        run = ("--jobs", jobs, "--seed", 3, "--set", "mechanism.parameters.r1=11")
+        assert invoke("run", ARM, "--no-plots", "--quiet", "--out", name, *run).exit_code in (0, 1)
+    done = invoke("compare", "old", "new", "--rtol", "0", "--atol", "0")
+    assert done.exit_code == 0, done.stdout
+    assert invoke("run", "--verify", "old").exit_code == 0
+    table = tmp_path / "old/kinematics/motion.csv"
+    header, first, *rest = table.read_text().splitlines(keepends=True)
+    table.write_text("".join([header, first.replace("30,60,", "30,60.5,"), *rest]))
+    done = invoke("run", "--verify", "old/kinematics/manifest.json", "--json")
+    assert done.exit_code == 1
+    [moved] = json.loads(done.stdout)
+    assert (moved["column"], moved["old"], moved["new"]) == ("theta2", "60.5", "60")
+
+
+def test_verify_tells_bytes_that_are_others(results, invoke, folder):
+    results("old", motion())
+    assert invoke("run", "--verify", "old").exit_code == 0
+    table = folder / "old/motion.csv"
+    table.write_text(table.read_text().replace("90,3,", "90,3.0,").replace("90,3\n", "90,3.0\n"))
+    done = invoke("run", "--verify", "old")
+    assert done.exit_code == 1
+    assert ",motion,,bytes," in done.stdout
+
+
+def test_verify_takes_no_other_study(results, invoke):
+    results("old", motion())
+    done = invoke("run", "slider.yaml", "--verify", "old")
+    assert (done.exit_code, "beside it stand no studies" in done.stderr) == (2, True)
+    done = invoke("run", "--verify", "old", "--seed", 2)
+    assert (done.exit_code, "no options but --jobs" in done.stderr) == (2, True)
+    done = invoke("run", "--verify", "nowhere")
+    assert (done.exit_code, "there is no such folder" in done.stderr) == (2, True)
