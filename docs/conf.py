@@ -39,3 +39,4 @@ napoleon_use_param = False
 napoleon_use_rtype = False
 autodoc_class_signature = "separated"
 autodoc_preserve_defaults = True
+autodoc_default_options = {"exclude-members": "__init__, __new__"}

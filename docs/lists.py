@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import groupby
 
 from mechdesign.reference import Entry, entries, tables
@@ -86,7 +87,12 @@ def listed(title: str, before: str, found: Iterable[Entry]) -> str:
     parts = [before]
     for kind, words in groupby(found, key=lambda entry: entry.kind):
         parts.append(f"## {kind[0].upper()}{kind[1:]}")
-        for entry in words:
+        alike = list(words)
+        where = alike[0].where
+        if where and all(entry.where == where for entry in alike):
+            parts.append(f"Stands in {', '.join(map(code, where))}.")
+            alike = [replace(entry, where=()) for entry in alike]
+        for entry in alike:
             text, *facts = _told(entry)
             parts += [f"**{code(entry.word)}**: {text}", *facts]
     return _page(title, parts)

@@ -37,9 +37,8 @@ class Extras:
 
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
-    folder = study.path.parent if study.path is not None else Path()
     files = {
-        Path(os.path.relpath(file, folder)).as_posix(): hashlib.sha256(text.encode()).hexdigest()
+        Path(os.path.relpath(file, study.folder.path)).as_posix(): hashlib.sha256(text.encode()).hexdigest()
         for _, file, text in study.inputs()
     }
     return {

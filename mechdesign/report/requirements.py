@@ -85,6 +85,10 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
 
     Parameters
     ----------
+    study : Study
+        With the requirements.
+    result : Result
+        Of one question.
     whole : bool
         Whether the result has all its rows; if not, rows that are missing are no mistake.
 

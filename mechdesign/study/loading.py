@@ -81,7 +81,7 @@ class Study:
     stiffness: StiffnessSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
-    allow_files: bool = False  #: whether files that it names may lie outside its folder
+    folder: Folder  #: where the files lie that it names, and what they held when it was loaded
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
@@ -94,21 +94,14 @@ class Study:
         """The name of its folder of results, that of its file or else its own."""
         return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
 
-    @property
-    def folder(self) -> Folder:
-        """Where the files lie that it names."""
-        return _folder(self.path, self.allow_files)
-
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"
         return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
-        """Files that the study reads: the keys of their names, the file, and what it holds."""
+        """Files that the study reads: the keys of their names, the file, and what it held when the study was loaded."""
         for keys, name in files(self.resolved, self.questions):
-            # One that is gone since has been read nevertheless.
-            with contextlib.suppress(StudyError):
-                yield keys, self.folder.path / name, self.folder.text(name)
+            yield keys, self.folder.path / name, self.folder.text(name)
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
@@ -175,13 +168,13 @@ def load(
         raise StudyError("give a study as one of a file's name, a mapping, or text=... in YAML")
     if text is not None:
         content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
-        return load_bytes(content, None, overrides, seed, allow_files=allow_files)
+        return load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
     if isinstance(source, Mapping):
         data = _plain_data(source, "the study")
         document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
         override(document, changes)
         sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, b"", sha256, changes, seed, allow_files=allow_files)
+        return load_document(document, None, Folder(anywhere=allow_files), b"", sha256, changes, seed)
     assert source is not None
     file = pathlib.Path(source)
     try:
@@ -190,7 +183,7 @@ def load(
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
-    return load_bytes(whole, file, overrides, seed, allow_files=allow_files)
+    return load_bytes(whole, file, overrides, seed, Folder(file.parent, allow_files))
 
 
 @one_thread()
@@ -199,14 +192,14 @@ def load_bytes(
     path: pathlib.Path | None,
     overrides: Sequence[str] | Mapping[str, Any] = (),
     seed: int | None = None,
-    *,
-    allow_files: bool = False,
+    folder: Folder | None = None,
 ) -> Study:
-    """Load a study from the bytes of a file; see `load`."""
+    """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     document, changes = read(content, str(path or _TEXT)), _texts(overrides)
     override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
-    return load_document(document, path, content, sha256, changes, seed, allow_files=allow_files)
+    folder = folder or Folder(path.parent if path is not None else pathlib.Path())
+    return load_document(document, path, folder, content, sha256, changes, seed)
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
@@ -241,13 +234,12 @@ def _plain_data(value: Any, what: str) -> Any:
 def load_document(
     document: Document,
     path: pathlib.Path | None,
+    folder: Folder,
     text: bytes,
     text_sha256: str,
     changes: tuple[str, ...] = (),
     seed: int | None = None,
     original: Mechanism | None = None,
-    *,
-    allow_files: bool = False,
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
@@ -255,7 +247,6 @@ def load_document(
     """
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
-    folder = _folder(path, allow_files)
     reporter = Reporter(document)
     data = _sections(document, reporter)
     context, formulas = _context(data, reporter)
@@ -293,13 +284,9 @@ def load_document(
         **{command: parts.get(command) for command in COMMANDS},
         requirements=parts["requirements"],
         targets=parts["targets"],
-        allow_files=allow_files,
+        folder=folder,
         warnings=tuple(reporter.warnings),
     )
-
-
-def _folder(path: pathlib.Path | None, allow_files: bool) -> Folder:
-    return Folder(path.parent if path is not None else pathlib.Path(), allow_files)
 
 
 def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:

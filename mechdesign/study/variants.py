@@ -60,8 +60,8 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     if follows(study, changed):
         document = Document(file, resolved, values={(): Mark(file)})
         return load_document(
-            document, study.path, study.text, study.text_sha256, study.overrides, study.seed, study.mechanism,
-            allow_files=study.allow_files,
+            document, study.path, study.folder, study.text, study.text_sha256, study.overrides, study.seed,
+            study.mechanism,
         )  # fmt: skip
     description = study.mechanism.description
     new = {name: dataclasses.replace(description.places[name], nominal=float(value)) for name, value in places.items()}

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import mechdesign
 from mechdesign.files import Transaction
 from mechdesign.results import Column, Result, Table
 
@@ -364,3 +365,25 @@ def test_a_study_that_is_edited_while_it_runs(here, analysis, invoke):
     assert told["study"]["sha256"] == hashlib.sha256(SLIDER.encode()).hexdigest()
     assert "kept" not in invoke(*arguments).stdout
     assert "kept" in invoke(*arguments).stdout
+
+
+def test_an_input_that_changes_while_it_is_computed(here, invoke, monkeypatch):
+    """The manifest vouches for what was read; the next run sees the change."""
+    (here / "x.csv").write_text("6\n5\n")
+    (here / "arm.yaml").write_text(
+        STUDY[: STUDY.index("kinematics:")] + "kinematics:\n  path: {P.x: x.csv, P.y: [6, 6]}\n"
+    )
+    arguments = ("run", "arm.yaml", "--no-plots", "--resume", "--out", "out")
+    compute = mechdesign.kinematics
+
+    def change(study, **options):
+        (here / "x.csv").write_text("6\n4\n")
+        return compute(study, **options)
+
+    monkeypatch.setattr(mechdesign, "kinematics", change)
+    assert invoke(*arguments).exit_code == 0
+    first = (here / "out/kinematics/motion.csv").read_text()
+    inputs = json.loads((here / "out/kinematics/manifest.json").read_text())["inputs"]
+    assert inputs == {"x.csv": hashlib.sha256(b"6\n5\n").hexdigest()}
+    assert "kept" not in invoke(*arguments).stdout
+    assert (here / "out/kinematics/motion.csv").read_text() != first

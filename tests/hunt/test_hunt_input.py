@@ -314,6 +314,12 @@ FINDS = [
     ("four_bar", "kinematics", ["mechanism.parameters.nosuch=99"], 2),
     ("four_bar", "kinematics", ["x" * 100_000 + "=1"], 2),
     ("two_rpr_printed", "kinematics", ["kinematics.path.C.1.0=5e-324"], None),
+    (
+        "one_in_a_billion",
+        "reliability",
+        ["mechanism.links.ground.O.1=0.0", "reliability.limits={P.y: 1e-301}"],
+        None,
+    ),
 ]
 
 

@@ -377,3 +377,9 @@ def test_what_is_echoed_is_short_and_printable() -> None:
     assert len(told) == len(caught.value.problems) >= 4
     assert all(line.isprintable() and len(line) < 400 for line in told)
     assert r"\x1b[2J\u202e\n\x00x" in told[0]
+
+
+def test_a_mechanism_has_a_bounded_number_of_links() -> None:
+    links = "".join(f"    a{index}: [O, P{index}, 1]\n" for index in range(20_000))
+    with pytest.raises(StudyError, match=r"mechanism\.links: 20001 links are too many"):
+        load(text=f"mechanism:\n  links:\n    ground: {{O: [0, 0]}}\n{links}  drives: [a1]\n")

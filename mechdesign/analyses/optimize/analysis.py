@@ -288,7 +288,7 @@ def _assembles_alike(
     """Whether the study of this data has the assemblies of the mechanism that was evaluated, whatever is given."""
     try:
         text = yaml.safe_dump(dict(data), sort_keys=False).encode()
-        alone = load_bytes(text, study.path, allow_files=study.allow_files).mechanism
+        alone = load_bytes(text, study.path, folder=study.folder).mechanism
         return all(alone.plan(names).modes == mechanism.plan(names).modes for names in given)
     except MechdesignError:
         return False

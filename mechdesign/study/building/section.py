@@ -242,6 +242,9 @@ class Limit(fields.Model):
         return self
 
 
+# Most links of a mechanism; to solve it takes time in proportion to their square.
+MAX_LINKS = 1000
+
 Wanted = Expression | tuple[tuple[float, ...], ...] | str
 """A target as it was written: an expression (a number is one without names), rows, or the name of a file."""
 
@@ -263,6 +266,12 @@ TargetValue = Annotated[
 ]
 
 
+def _not_too_many(raw: Any) -> Any:
+    if isinstance(raw, dict) and len(raw) > MAX_LINKS:
+        raise failure(f"{len(raw)} links are too many: at most {MAX_LINKS} are solved in reasonable time")
+    return raw
+
+
 class MechanismSection(fields.Model):
     """What the mechanism is: links and the points they share, other joints, drives, and a sketch of the wanted
     assembly.
@@ -271,7 +280,7 @@ class MechanismSection(fields.Model):
     parameters: dict[str, fields.AnyValue] = Field(default_factory=dict)
     """Numbers with a name for expressions anywhere in the study; each may use those above it. Example: {r: 40, l: 3*r}
     """
-    links: dict[fields.LinkName, Link]
+    links: Annotated[dict[fields.LinkName, Link], BeforeValidator(_not_too_many)]
     """Rigid bodies by name. ``ground`` is required; its frame is the world. A point that two links name is a pin
     between them. Example: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
     """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,20 +20,28 @@ MAX_FILE_BYTES = 50_000_000
 
 @dataclass(frozen=True)
 class Folder:
-    """The folder of a study, in which the files lie that it names; `anywhere`, those may lie elsewhere as well."""
+    """The folder of a study, in which the files lie that it names; `anywhere`, those may lie elsewhere as well.
+
+    A file is read once: what becomes of it while the study is computed changes nothing.
+    """
 
     path: Path = Path()
     anywhere: bool = False
+    _read: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def text(self, name: str) -> str:
-        """Read a file.
+        """What a file holds.
 
         Raises
         ------
         StudyError
             Where it lies elsewhere, cannot be read, or is no text of a bounded size.
         """
-        file = self.path / name
+        if name not in self._read:
+            self._read[name] = self._text(self.path / name)
+        return self._read[name]
+
+    def _text(self, file: Path) -> str:
         try:
             if not self.anywhere and not file.resolve().is_relative_to(self.path.resolve()):
                 raise StudyError(f"{file} is not in the folder of the study; --allow-files reads it all the same")
