@@ -164,7 +164,7 @@ def test_resume_computes_again_only_what_is_not_whole_and_the_same(studies, anal
     elif spoil == "plots":
         arguments.remove("--no-plots")
     done = invoke(*arguments)
-    assert done.exit_code == 0
+    assert done.exit_code == 0, done.output
     assert len(computed) == (1 if spoil == "nothing" else 2)
     assert ("kept" in done.stdout) == (spoil == "nothing")
 

@@ -17,7 +17,6 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -73,6 +72,8 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     table = result.tables.get("reliability")
     if result.command != "reliability" or table is None:
         return None
+    from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
+
     poses, rows = result.drawn["poses"], table.where(scope="pose", method=best_probability(table))
     failure = table["failure"][rows]
     if not np.isfinite(failure).any():
