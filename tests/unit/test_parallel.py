@@ -59,5 +59,5 @@ def test_interrupt_of_the_consumer_drops_what_is_not_begun():
 
 
 def test_jobs_must_be_positive():
-    with pytest.raises(ValueError, match="at least 1"):
+    with pytest.raises(ValueError, match="from 1 to"):
         list(map_chunks(abs, [1], 0))

@@ -143,8 +143,11 @@ def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table
         parts.append(motion.columns())
         bad = int(np.count_nonzero(motion.reason))
         if bad:
-            told = "no pose is" if bad == poses.count else f"{bad} of {poses.count} poses are not"
-            warnings.append(f"mode {assembly.label}: {told} valid")
+            warnings.append(
+                f"mode {assembly.label}: no pose is valid in this assembly"
+                if bad == poses.count
+                else f"mode {assembly.label}: {bad} of {poses.count} poses are not valid in this assembly"
+            )
     columns = [Column("mode", np.array(labels), "", "assembly: the joints that choose it and their sides")]
     for same in zip(*parts, strict=True):
         columns.append(dataclasses.replace(same[0], values=np.concatenate([column.values for column in same])))
