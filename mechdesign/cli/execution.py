@@ -113,7 +113,6 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
-    if before is not None:
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
     if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
         return kept

@@ -12,7 +12,6 @@ from mechdesign.commands import COMMANDS
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.journal import Journal
-from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
 
@@ -101,6 +100,8 @@ def kinematics(
     ------
     AssemblyError
         If no pose at all can be assembled.
+    MechanismError
+        If a pose's coordinates do not determine the mechanism, or an output does not exist.
     StudyError
         If all modes are asked of poses that give different coordinates.
 
@@ -325,13 +326,12 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
-    """A command's answer, with the same digits whatever the threads of linear algebra; knows its study."""
+    """A command's answer, which knows its study."""
     answer = getattr(import_module(COMMANDS[command].module), command)
     if all_modes:
         options["all_modes"] = True
     try:
-        with one_thread():
-            result = answer(study, seed=seed, **options)
+        result = answer(study, seed=seed, **options)
     except Interrupted as interrupt:
         raise Interrupted(Answer.of(study, interrupt.result, seed, all_modes=all_modes)) from None
     return Answer.of(study, result, seed, all_modes=all_modes)

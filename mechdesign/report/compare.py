@@ -43,7 +43,7 @@ class Tolerance(NamedTuple):
 class Tolerances:
     """Tolerances of columns: of the patterns that fit ``command.table.column`` the last counts.
 
-    A pattern may begin with the folder, ``two_rpr/reliability.*``.
+    A pattern may begin with the folder, ``FOLDER/reliability.*``.
     """
 
     default: Tolerance

@@ -144,24 +144,7 @@ def load(
 ) -> Study:
     """Load a study from a file, a mapping or a text in YAML.
 
-    Parameters
-    ----------
-    source : path or mapping
-        The study file, or the study as plain data; NumPy's numbers and arrays are taken as numbers and lists.
-    overrides : sequence of str, or mapping
-        ``"a.b.c=value"``, or values by their dotted names; applied in their order, before the study is checked.
-    seed : int, optional
-        In place of the study's own.
-    text : str or bytes
-        The study in YAML, in place of `source`. Files that it names are looked for in the working directory, as are
-        those of a mapping.
-    allow_files : bool
-        Whether files that the study names may lie outside its folder.
-
-    Raises
-    ------
-    StudyError
-        With every mistake found, each as ``file:line:column: key path: what, and what would mend it``.
+    Parameters and errors are told at `mechdesign.load`, the door to it.
     """
     named = isinstance(source, str) and "\n" not in source
     if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):

@@ -55,32 +55,7 @@ def kinematics(
 ) -> Result:
     """Solve every pose of the study's kinematics.
 
-    Parameters
-    ----------
-    study : Study
-    seed : ignored
-        Kinematics draws no random numbers.
-    jobs : int or None
-        Threads that solve a long sweep; None uses every processor.
-    all_modes : bool
-        Whether to follow every other assembly of the same links as well.
-
-    Returns
-    -------
-    Result
-        Tables ``motion``, ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and ``toggles`` of
-        four-bars and slider-cranks; ``targets`` where there are some; ``instant_centres`` where
-        pairs of links are named; ``jacobian`` where the study names as many outputs of it, or outputs, as drives;
-        ``modes`` with `all_modes`.
-
-    Raises
-    ------
-    AssemblyError
-        If no pose at all can be assembled.
-    MechanismError
-        If a pose's coordinates do not determine the mechanism, or an output does not exist.
-    StudyError
-        If all modes are asked of poses that give different coordinates.
+    Parameters, tables and errors are told at `mechdesign.kinematics`, the door to it.
     """
     question = motion_question(study)
     poses = question.poses

@@ -61,23 +61,7 @@ def optimize(
 ) -> Result:
     """Evaluate designs, and find the best one for each set of weights [S1, eqs. 27, 28].
 
-    Parameters
-    ----------
-    seed : int, optional
-        Of the search and the front, in place of the study's; a grid is not random.
-    jobs : int or None
-        Workers; the result does not depend on their number.
-    journal : Journal, optional
-        Where finished designs are kept when the computation is interrupted, and found when it is begun anew.
-
-    Raises
-    ------
-    StudyError
-        If there is nothing to vary or to compare.
-    AssemblyError
-        If no design is feasible; the message says why, what most designs fail by first.
-    Interrupted
-        On Ctrl-C, with the designs that are finished.
+    Parameters, tables and errors are told at `mechdesign.optimize`, the door to it.
     """
     section = study.optimize
     if section is None or not section.variables:

@@ -45,30 +45,7 @@ _Groups = Sequence[tuple[SolvedPoses, DriveRates]]
 def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Errors of a study's outputs from its tolerances and clearances.
 
-    Parameters
-    ----------
-    study : Study
-    seed : int, optional
-        In place of the study's.
-    jobs : int or None
-        Threads; the result does not depend on it.
-
-    Returns
-    -------
-    Result
-        Tables ``moments``, ``reliability`` and ``capability`` (where there are limits) and ``contributions``; of
-        methods that sample the errors ``density`` (of two outputs), ``histogram``, ``convergence`` and ``estimate``
-        (where there are limits); where tolerances are allocated ``allocation`` and ``confirmation``, and the study
-        ``allocated.yaml`` that has them.
-
-    Raises
-    ------
-    StudyError
-        If nothing varies.
-    AssemblyError
-        If no pose at all can be assembled.
-    Interrupted
-        On Ctrl-C, with what was found so far.
+    Parameters, tables and errors are told at `mechdesign.reliability`, the door to it.
     """
     keep_freed_memory()
     sources, warnings = find_sources(study)

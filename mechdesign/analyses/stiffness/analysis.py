@@ -79,27 +79,9 @@ class Body:
 
 @one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Stiffness of a body or a pin at every pose of the study.
+    """Stiffness of a body or a pin at every pose of the study [S4].
 
-    Parameters
-    ----------
-    study : Study
-    seed : ignored
-        Nothing is random.
-    jobs : int or None
-        Threads.
-
-    Returns
-    -------
-    Result
-        Tables ``stiffness``, ``compliance``, ``springs`` and, with loads, ``deflections``  [S4].
-
-    Raises
-    ------
-    StudyError
-        If the study has no stiffness section.
-    AssemblyError
-        If no pose at all can be assembled.
+    Parameters, tables and errors are told at `mechdesign.stiffness`, the door to it.
     """
     body = ask(study)
     poses = study_poses(study, "stiffness")

@@ -62,19 +62,7 @@ ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; re
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Reachable region of a point: indices (GII, GRI, SUI), local indices on a grid, and the boundary.
 
-    Parameters
-    ----------
-    study : Study
-        With a workspace section.
-    seed, jobs
-        Not used: nothing is random, and one region takes a moment.
-
-    Raises
-    ------
-    StudyError
-        If the section lacks what cannot be assumed, or over a range the inverse problem has no closed form.
-    AssemblyError
-        If no point of the scan can be reached, or the region has no end.
+    Parameters, tables and errors are told at `mechdesign.workspace`, the door to it.
     """
     section = study.workspace
     if section is not None and study.mechanism.mobility == 1:

@@ -27,15 +27,14 @@ def differences_figure(moved: Sequence[Moved]) -> Figure:
     figure, panels = style.page(len(shown), columns, _HEIGHT, across=_ACROSS, down=_DOWN, **_MARGINS)
     room = panels[0].get_position().width * style.width()
     for axes, each in zip(panels, shown, strict=True):
-        unit = f" [{style.printed(each.unit)}]" if each.unit else ""
         if each.along is None:
             axes.plot(each.old, each.new, "o", color=style.VERMILION, markersize=4, linestyle="none")
             both = np.concatenate([each.old, each.new])
             ends = [both[np.isfinite(both)].min(initial=np.inf), both[np.isfinite(both)].max(initial=-np.inf)]
             if ends[0] < ends[1]:
                 axes.plot(ends, ends, color=style.FAINT, linewidth=1.0, zorder=1)
-            axes.set_xlabel(f"old{unit}")
-            axes.set_ylabel(f"new{unit}")
+            axes.set_xlabel(style.axis_label("old", each.unit))
+            axes.set_ylabel(style.axis_label("new", each.unit))
         else:
             order = np.argsort(each.along.values, kind="stable")
             for values, name, color, dashes in (
@@ -43,9 +42,8 @@ def differences_figure(moved: Sequence[Moved]) -> Figure:
                 (each.new, "new", style.VERMILION, style.DASHES[1]),
             ):
                 axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
-            along = f" [{style.printed(each.along.unit)}]" if each.along.unit else ""
-            axes.set_xlabel(f"{each.along.name}{along}")
-            axes.set_ylabel(unit.strip())
+            axes.set_xlabel(style.axis_label(each.along.name, each.along.unit))
+            axes.set_ylabel(style.axis_label("", each.unit).strip())
             axes.legend(loc="best")
         axes.set_title(style.folded(each.name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
     left = len(moved) - len(shown)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.report.figures.style import printed
+from mechdesign.report.figures.style import printed, raised
 from mechdesign.report.requirements import unit_of
 from mechdesign.results import Column, Result, Table
 
@@ -22,7 +22,6 @@ _POSE = ("drive", "given", "held coordinate")
 _NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
-_RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
 _MINUS = "\N{MINUS SIGN}"
 _TOGETHER = "\N{NO-BREAK SPACE}"
 _NARROW = "\N{NARROW NO-BREAK SPACE}"
@@ -92,7 +91,7 @@ def shown(value: float) -> str:
     if value and not _SMALL <= abs(value) < _LARGE:
         mantissa, power = f"{value:.{_DIGITS - 1}e}".split("e")
         mantissa = mantissa.rstrip("0").rstrip(".").replace("-", _MINUS)
-        return f"{mantissa}\N{MIDDLE DOT}10{str(int(power)).translate(_RAISED)}"
+        return f"{mantissa}\N{MIDDLE DOT}10{raised(int(power))}"
     places = max(0, _DIGITS - 1 - int(np.floor(np.log10(abs(value)))) if value else 0)
     text = f"{value:,.{places}f}".replace(",", _NARROW).replace("-", _MINUS)
     return text.rstrip("0").rstrip(".") if "." in text else text
