@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from scipy.optimize import minimize_scalar
 
 import mechdesign
 from mechdesign.analyses.kinematics.analysis import kinematics
@@ -109,6 +110,46 @@ def test_a_second_peak_beside_the_end_of_the_sweep() -> None:
         assert (row["max"], row["max_at"]) == pytest.approx((1.125, 173), rel=1e-9)
         # The slope is zero where cos t = -1/32.
         assert row["min"] == pytest.approx(2 / 32**2 - 1 - 1 / (8 * 32), rel=1e-12)
+
+
+def test_the_peak_torque_lies_between_the_rows() -> None:
+    # By virtual work the effort is 500 times the slope of B.x = 40 cos t + sqrt(120^2 - (40 sin t + 20)^2).
+    def slope(degrees: float) -> float:
+        t = np.radians(degrees)
+        high = 40 * np.sin(t) + 20
+        return float(-40 * np.sin(t) - high * 40 * np.cos(t) / np.sqrt(120**2 - high**2))
+
+    low, high = (minimize_scalar(lambda t, s=s: s * slope(t), bounds=b, method="bounded", options={"xatol": 1e-6})
+                 for s, b in ((1, (20, 120)), (-1, (240, 340))))  # fmt: skip
+    for step in (5, 24, 40):
+        row = extremes(
+            SLIDER,
+            "kinematics={outputs: [B.x], loads: [{at: B, force: [-500, 0]}], "
+            f"sweep: {{theta: {{from: 0, to: 360, step: {step}}}}}}}",
+        )["theta_effort"]
+        assert (row["min"], row["max"]) == pytest.approx((500 * low.fun, -500 * high.fun), rel=1e-11)
+        assert (row["min_at"], row["max_at"]) == pytest.approx((low.x, high.x), abs=1e-4)
+
+
+@pytest.mark.parametrize("step", [5, 30, 36])
+def test_an_advantage_is_infinite_at_a_dead_centre_and_an_effort_where_the_drive_holds_nothing(step: int) -> None:
+    rows = extremes(
+        SLIDER,
+        f"kinematics={{mechanical_advantage: {{B.x: theta}}, sweep: {{theta: {{from: 0, to: 360, step: {step}}}}}}}",
+    )
+    row = rows["B.x_advantage"]
+    stretched, folded = 360 - np.degrees(np.arcsin(20 / 160)), 180 - np.degrees(np.arcsin(20 / 80))
+    assert (row["min"], row["max"]) == (-np.inf, np.inf)
+    for end in ("min_at", "max_at"):
+        assert min(abs(row[end] - stretched), abs(row[end] - folded)) < 1e-6
+    limit = np.degrees(np.arccos((60**2 + 100**2 - 120**2) / (2 * 60 * 100)))
+    row = extremes(
+        ROCKER,
+        f"kinematics={{loads: [{{link: rocker, moment: 3}}], sweep: {{crank: {{from: -180, to: 180, step: {step}}}}}}}",
+    )["crank_effort"]
+    assert np.isinf([row["min"], row["max"]]).any()
+    infinite = "min" if np.isinf(row["min"]) else "max"
+    assert abs(row[f"{infinite}_at"]) == pytest.approx(limit, abs=1e-6)
 
 
 def test_designs_that_reach_a_limit_are_left_to_be_asked_one_by_one() -> None:

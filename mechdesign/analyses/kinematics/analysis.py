@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics import peaks, targets
 from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
 from mechdesign.analyses.kinematics.instant_centres import MOTIONS, REST, TRANSLATION
 from mechdesign.analyses.kinematics.lines import PoseLine
@@ -21,7 +21,6 @@ from mechdesign.analyses.kinematics.motion import (
     motion_question,
     move,
 )
-from mechdesign.analyses.kinematics.peaks import extremes, needed
 from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
@@ -151,7 +150,7 @@ def tables_between(
     ends : sequence of Boundary
         Limits of motion, of a single design.
     names : collection of str, optional
-        Outputs and errors whose extremes between the poses are wanted; all where left out.
+        Outputs, errors and efforts whose extremes between the poses are wanted; all where left out.
 
     Returns
     -------
@@ -163,11 +162,14 @@ def tables_between(
     loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
     torn = np.zeros(poses.designs, dtype=bool)
     if swept is not None and (loops or "extremes" in wanted):
-        coordinates = needed(motion, names) if "extremes" in wanted else []
-        line = PoseLine(motion, swept, coordinates, functions(loops, "toggles" in wanted), ends)
+        coordinates = peaks.needed(motion, names) if "extremes" in wanted else []
+        others = functions(loops, "toggles" in wanted)
+        if "extremes" in wanted:
+            others |= peaks.functions(motion, names)
+        line = PoseLine(motion, swept, coordinates, others, ends)
     tables = {}
     if "extremes" in wanted:
-        tables["extremes"] = extremes(motion, swept, line, names)
+        tables["extremes"] = peaks.extremes(motion, swept, line, names)
     if loops:
         tables["loops"] = loops_table(motion, loops, line)
     if loops and line is not None and "toggles" in wanted:

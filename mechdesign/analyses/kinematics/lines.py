@@ -38,11 +38,12 @@ AT_ROW = 1e-9
 class Function:
     """A function of configurations, and its slope, of configurations and the velocities at unit speed of the sweep.
 
-    Rounding is judged by `size`; `radian` is a radian in its unit, where it is an angle.
+    Rounding is judged by `size`; `radian` is a radian in its unit, where it is an angle. One without a slope has no
+    value either where the drives do not move the mechanism in one way.
     """
 
     value: Callable[[Configuration], Value]
-    slope: Callable[[Configuration, Rates], Value]
+    slope: Callable[[Configuration, Rates], Value] | None
     size: float = 1.0
     radian: float | None = None
 
@@ -171,8 +172,11 @@ class PoseLine:
         values, slopes = np.full((2, len(self._functions), *shape), np.nan)
         steady = valid & (regularity(linear) >= self._steady)
         for k, function in enumerate(self._functions):
-            values[k] = np.where(valid, function.value(configuration), np.nan)
-            slopes[k] = np.where(steady, function.slope(configuration, velocity), np.nan)
+            known = valid if function.slope is not None else steady
+            values[k] = np.where(known, function.value(configuration), np.nan)
+            if function.slope is not None:
+                slopes[k] = np.where(steady, function.slope(configuration, velocity), np.nan)
+        values[np.isinf(values)] = np.nan
         slopes[~np.isfinite(slopes)] = np.nan
         return values, slopes, valid
 

@@ -73,6 +73,15 @@ def characteristic_length(study: Study) -> float | None:
     return None
 
 
+@dataclass(frozen=True)
+class Static:
+    """A drive's effort or a mechanical advantage: the name of its column, its unit and its meaning."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
 @dataclass(frozen=True, eq=False)
 class MotionQuestion:
     """What a study asks of every pose.
@@ -109,6 +118,21 @@ class MotionQuestion:
     def centres(self) -> list[Centre]:
         """Pairs of links whose instant centres are asked."""
         return [Centre(*pair) for pair in self.section.instant_centres]
+
+    @property
+    def statics(self) -> list[Static]:
+        """Efforts of the drives, where there are loads, and mechanical advantages."""
+        label, found = self.study.units.label, []
+        for drive in self.drives if self.section.loads else ():
+            unit = label("moment" if drive.quantity == "angle" else "force")
+            found.append(Static(f"{drive.name}_effort", unit, "drive effort that balances the loads"))
+        for name, given in self.section.mechanical_advantage.items():
+            units = {"length": label("length"), "angle": ""}
+            above, below = (units[self.study.mechanism.quantity(each)] for each in (given, name))
+            unit = "" if above == below else above or f"1/{below}"
+            meaning = f"force or moment of {name} over that put in at {given}, without friction"
+            found.append(Static(f"{name}_advantage", unit, meaning))
+        return found
 
     @property
     def mixed(self) -> bool:
@@ -258,30 +282,8 @@ class Motion:
                     put(entry(output, drive), value)
             put("det_J", jacobian.determinant)
             put("inverse_condition", jacobian.inverse_condition)
-        work: dict[str, float] = {}
-        for load in self.question.section.loads:
-            if load.at is not None and load.force is not None:
-                work |= {f"{load.at}.{axis}": work.get(f"{load.at}.{axis}", 0.0) + force
-                         for axis, force in zip("xy", load.force, strict=True)}  # fmt: skip
-            if load.link is not None and load.moment is not None:
-                work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
-        moved = Jacobian.of(linear, [study.mechanism.coordinate(name) for name in work]).entries
-        for k, drive in enumerate(drives if work else ()):
-            put(f"{drive.name}_effort", -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True)))
-        for name, given in self.question.section.mechanical_advantage.items():
-            put(f"{name}_advantage", self._advantage(linear, name, given))
-
-    @quiet
-    def _advantage(self, linear: Linearization, output: str, given: str) -> Value:
-        """Force of an output over that at its input: by virtual work the input's rate over the output's."""
-        mechanism, drives = self.question.study.mechanism, [drive.name for drive in self.question.drives]
-        both = [mechanism.coordinate(name) for name in (output, given)]
-        rows = Jacobian.of(linear, both).entries
-        k = drives.index(given) if given in drives else 0
-        given_out, put_in = rows[0][k], rows[1][k]
-        sizes = [mechanism.size if c.quantity == "length" else 1.0 for c in both]
-        still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
-        return np.where(still & (put_in != 0), np.inf, put_in / given_out)
+        for name, values in statics(self.question, linear).items():
+            put(name, values)
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
@@ -308,17 +310,7 @@ class Motion:
         ):  # fmt: skip
             if name in arrays:
                 columns.append(Column(name, arrays[name], "", meaning))
-        for drive in question.drives:
-            name = f"{drive.name}_effort"
-            if name in arrays:
-                unit = label("moment" if drive.quantity == "angle" else "force")
-                columns.append(Column(name, arrays[name], unit, "drive effort that balances the loads"))
-        for name, given in question.section.mechanical_advantage.items():
-            units = {"length": label("length"), "angle": ""}
-            above, below = (units[question.study.mechanism.quantity(each)] for each in (given, name))
-            unit = "" if above == below else above or f"1/{below}"
-            meaning = f"force or moment of {name} over that put in at {given}, without friction"
-            columns.append(Column(f"{name}_advantage", arrays[f"{name}_advantage"], unit, meaning))
+        columns += [Column(s.name, arrays[s.name], s.unit, s.meaning) for s in question.statics]
         return [*columns, *shared(self.question.study.units, valid=self.valid)]
 
     def pose_columns(self) -> list[Column]:
@@ -336,6 +328,39 @@ class Motion:
         far = error.output in study.mechanism.points
         meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+
+
+def statics(question: MotionQuestion, linear: Linearization) -> dict[str, Value]:
+    """Efforts of the drives by virtual work, and mechanical advantages, by their columns; unknown where it stalls."""
+    mechanism, drives, section = question.study.mechanism, question.drives, question.section
+    work: dict[str, float] = {}
+    for load in section.loads:
+        if load.at is not None and load.force is not None:
+            for axis, force in zip("xy", load.force, strict=True):
+                work[f"{load.at}.{axis}"] = work.get(f"{load.at}.{axis}", 0.0) + force
+        if load.link is not None and load.moment is not None:
+            work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
+    moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
+    found: dict[str, Value] = {
+        f"{drive.name}_effort": -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
+        for k, drive in enumerate(drives if work else ())
+    }
+    for name, given in section.mechanical_advantage.items():
+        found[f"{name}_advantage"] = _advantage(question, linear, name, given)
+    return found
+
+
+@quiet
+def _advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> Value:
+    """Force of an output over that at its input: by virtual work the input's rate over the output's."""
+    mechanism, drives = question.study.mechanism, [drive.name for drive in question.drives]
+    both = [mechanism.coordinate(name) for name in (output, given)]
+    rows = Jacobian.of(linear, both).entries
+    k = drives.index(given) if given in drives else 0
+    given_out, put_in = rows[0][k], rows[1][k]
+    sizes = [mechanism.size if c.quantity == "length" else 1.0 for c in both]
+    still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
+    return np.where(still & (put_in != 0), np.inf, put_in / given_out)
 
 
 def thinned(motion: Motion, swept: str) -> Flags:

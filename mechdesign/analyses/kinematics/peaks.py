@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.lines import STILL, PoseLine
-from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.lines import STILL, Function, PoseLine
+from mechdesign.analyses.kinematics.motion import Motion, statics
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
@@ -24,6 +24,8 @@ Along = Callable[[Ints, Floats], Floats]
 
 # Error of the place of an extreme or a zero, as a part of its segment.
 PLACE_PRECISION = 1e-13
+# A function that doubles within this part of the way to the poses beside its extreme has a pole there.
+POLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,10 +144,10 @@ def peaks(line: PoseLine, rows: Ints, still: Floats, *, all_poses: bool = False)
     )
 
 
-def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak:
+def searched(line: PoseLine, along: Along, table: Floats, still: Floats, *, poles: bool = False) -> Peak:
     """Smallest values of functions without slopes, by golden section beside the poses that are below their neighbours.
 
-    `table` has their values at the poses of the line, shape (functions, n).
+    `table` has their values at the poses of the line, shape (functions, n); at `poles` these are minus infinity.
     """
     before, after = np.arange(len(line.row)), np.arange(len(line.row))
     before[line.end], after[line.begin] = line.begin, line.end
@@ -161,12 +163,26 @@ def searched(line: PoseLine, along: Along, table: Floats, still: Floats) -> Peak
         return np.where(np.isnan(one), np.inf, one)
 
     at = np.stack([line.place[before[node]], line.place[node], line.place[after[node]]])
+    for row, side in ((0, before[node]), (2, after[node])) if poles else ():
+        # Beyond a zero or a pole the function may fall again.
+        lanes = np.flatnonzero(known[function, node] * table[function, side] < 0)
+
+        def beside_pose(lane: Ints, x: Floats, some: Ints = lanes) -> Floats:
+            return np.asarray(along(node[some[lane]], x)[function[some[lane]], np.arange(len(lane))])
+
+        ends = table[function[lanes], node[lanes]], table[function[lanes], side[lanes]]
+        at[row, lanes] = _roots(beside_pose, at[1, lanes], ends[0], at[row, lanes], ends[1])
     low, high = at.min(axis=0), at.max(axis=0)
     place, least = lowest(value, low, high) if len(node) else (low, low)
+    if poles and len(node):
+        size = -line.least(-np.abs(table))[function, line.row[node] // line.each]
+        beside = [value(place + part * (end - place)) for part in (POLE, 2 * POLE) for end in (low, high)]
+        known = np.where(np.isfinite(beside), beside, -np.inf).max(axis=0)
+        least = np.where((least < -size) & (least < 2 * known), -np.inf, least)
     # Which of the two segments beside the pose it lies in.
     ahead = (place - line.place[node]) * (line.place[after[node]] - line.place[node]) > 0
     found = Places(function, node, np.where(ahead, after[node], before[node]), place, least, np.ones_like(node))
-    return _best(line, still, 1, table, found.take(np.isfinite(least)), False)
+    return _best(line, still, 1, table, found.take(least < np.inf), False)
 
 
 def _best(line: PoseLine, still: Floats, sign: int, values: Floats, between: Places, all_poses: bool) -> Peak:
@@ -209,13 +225,24 @@ def needed(motion: Motion, names: Collection[str] | None) -> list[Coordinate]:
     return found
 
 
+def functions(motion: Motion, names: Collection[str] | None) -> dict[str, Function]:
+    """Efforts and mechanical advantages that a line must follow for the extremes of some, or of all."""
+    question = motion.question
+
+    def function(name: str) -> Function:
+        mechanism = question.study.mechanism
+        return Function(lambda configuration: statics(question, mechanism.linearize(configuration))[name], None)
+
+    return {each.name: function(each.name) for each in question.statics if names is None or each.name in names}
+
+
 def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Collection[str] | None = None) -> Table:
-    """Smallest and largest value of each output and error over the motion, and the ratio of the times between.
+    """Smallest and largest value of each output, error and effort over the motion, and the ratio of the times between.
 
     Where one coordinate is swept they are those of the whole motion, from limit to limit, between its poses too;
-    elsewhere those of the valid poses. `time_ratio` is the longer over the shorter part of a full turn of the swept
-    angle between the two extremes, for a drive of constant speed; nan elsewhere. `min_at` is the swept coordinate, or
-    the row where there is none.
+    elsewhere those of the valid poses. Efforts and mechanical advantages are infinite at their poles. `time_ratio` is
+    the longer over the shorter part of a full turn of the swept angle between the two extremes, for a drive of constant
+    speed; nan elsewhere. `min_at` is the swept coordinate, or the row where there is none.
 
     Between the poses those of `names` are searched, or all, along `line`, the motion along `swept`.
     """
@@ -224,6 +251,11 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     each = poses.count // poses.designs
     curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in outputs}
     curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
+    units = [study.units.label(quantity) for quantity, _ in curves.values()]
+    for static in motion.question.statics:
+        values = motion.arrays[static.name]
+        curves[static.name] = ("none", np.where(np.isinf(values), np.nan, values))
+        units.append(static.unit)
     at = poses.values[swept] if swept is not None else np.tile(np.arange(each, dtype=float), poses.designs)
     turn = 2 * np.pi / study.units.angle_factor
     sizes = {"length": mechanism.size, "angle": turn}
@@ -243,21 +275,29 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     moving = np.asarray(found[1, 0] - found[0, 0] > still)
     if line is not None:
         _between(motion, line, names, found, row, still, moving)
+    for k, static in enumerate(motion.question.statics, len(curves) - len(motion.question.statics)):
+        infinite = (motion.valid & np.isposinf(motion.arrays[static.name])).reshape(poses.designs, each)
+        place = at.reshape(infinite.shape)[np.arange(poses.designs), infinite.argmax(axis=1)]
+        found[1, :, k] = np.where(infinite.any(axis=1), [np.full(poses.designs, np.inf), place], found[1, :, k])
     (low, low_at), (high, high_at) = found
     timed = np.zeros(poses.designs, dtype=bool)
     if line is not None and mechanism.quantity(line.swept) == "angle" and np.ptp(at) >= turn * (1 - 1e-9):
         timed = motion.valid.reshape(-1, each).all(axis=1) & ~line.torn & (not line.ends)
-    part = np.where(timed & moving, (high_at - low_at) % turn, np.nan)
+    part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
     with np.errstate(divide="ignore"):
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
     where = f"{swept or 'row'} at the"
     unit = study.units.label(mechanism.quantity(swept)) if swept is not None else ""
-    units = [study.units.label(quantity) for quantity, _ in curves.values()]
     return Table(
         "extremes",
         (
-            Column("output", np.tile(np.array(list(curves)), poses.designs), "", "output or error, in its own unit"),
+            Column(
+                "output",
+                np.tile(np.array(list(curves)), poses.designs),
+                "",
+                "output, error, effort or mechanical advantage, in its own unit",
+            ),
             Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
             Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
             Column("max", high.T.ravel(), "", "largest value over the motion, in `unit`"),
@@ -282,7 +322,7 @@ def _between(
     study, outputs = motion.question.study, motion.question.outputs
     swept = study.mechanism.coordinate(line.swept)
 
-    def take(peak: Peak, end: int, which: Sequence[int], exact: bool) -> None:
+    def take(peak: Peak, end: int, which: Sequence[int], *, exact: bool = False) -> None:
         sign = 1 - 2 * end
         value = np.where(np.isnan(found[end, 0, which]), np.inf, sign * found[end, 0, which])
         away, rounding = np.abs(peak.position - row[end, which]), still[which]
@@ -297,13 +337,24 @@ def _between(
     mine = [k for k, output in enumerate(outputs) if names is None or output.name in names]
     rows = np.array([line.rows[outputs[k].name] for k in mine], dtype=np.intp)
     for end, peak in enumerate(peaks(line, rows, still[mine])):
-        take(peak, end, mine, True)
-    wrong = list(range(len(outputs), len(still)))
+        take(peak, end, mine, exact=True)
+    wrong = list(range(len(outputs), len(outputs) + len(motion.errors)))
     if any(names is None or error.name in names for error in motion.errors):
         for end, sign in enumerate((1, -1)):
             along = _errors(motion, line, sign)
             every = np.arange(len(line.row))
-            take(searched(line, along, along(every, line.place), still[wrong]), end, wrong, False)
+            take(searched(line, along, along(every, line.place), still[wrong]), end, wrong)
+    asked = functions(motion, names)
+    held = [
+        k for k, static in enumerate(motion.question.statics, len(outputs) + len(motion.errors)) if static.name in asked
+    ]
+    rows = np.array([line.rows[name] for name in asked], dtype=np.intp)
+    for end, sign in enumerate((1, -1) if asked else ()):
+
+        def effort(node: Ints, place: Floats, sign: int = sign) -> Floats:
+            return np.asarray(sign * line.at(node, place)[rows])
+
+        take(searched(line, effort, sign * line.values[rows], still[held], poles=True), end, held)
 
 
 def _errors(motion: Motion, line: PoseLine, sign: int) -> Along:

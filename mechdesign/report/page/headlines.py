@@ -141,6 +141,8 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
     for row in rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
+        if rule.table == "extremes" and words["output"].endswith(("_effort", "_advantage")):
+            continue
         unit = unit_of(table, column.name, row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
