@@ -176,3 +176,21 @@ optimize:
     alone = mechdesign.load(tmp_path / "out" / "optimum.yaml")
     assert mechdesign.workspace(alone).main["area"] == pytest.approx(result.main["area"], rel=1e-5)
     assert not any("sketch" in warning for warning in result.warnings)
+
+
+def test_an_optimum_that_is_stopped_between_its_poses_is_told(tmp_path):
+    # With the crank at 180 deg A is 160 from D, which rod and rocker do not reach.
+    text = """\
+mechanism:
+  parameters: {c: 45}
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 60], rod: [A, B, 70], rocker: [D, B, c]}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [60, 0], B: [94, 50]}
+kinematics: {poses: [{theta: 40}, {theta: 60}, {theta: 320}], outputs: [B.x]}
+optimize: {variables: {c: {from: 45, to: 46, step: 1}}, maximize: kinematics.B.x}
+"""
+    (tmp_path / "rocker.yaml").write_text(text)
+    told = mechdesign.optimize(mechdesign.load(tmp_path / "rocker.yaml")).warnings
+    assert len(told) == 1
+    assert "between poses 2 and 3 (60 to 320 deg) the mechanism is stopped" in told[0]
+    assert "kinematics.conditioning, at_least" in told[0]

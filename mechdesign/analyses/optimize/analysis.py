@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -41,6 +41,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.loading import load_bytes
+from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.workspace import Over
 from mechdesign.study.variants import changed_data, rewritten, variant
 
@@ -48,6 +49,8 @@ from mechdesign.study.variants import changed_data, rewritten, variant
 MAX_KEPT_ROWS = 10_000_000
 # Reasons of infeasible designs that are reported one by one.
 MAX_REASONS = 10
+# Poses between two listed ones at which it is looked whether an optimum can go from one to the other.
+BETWEEN = 100
 
 
 @one_thread()
@@ -127,7 +130,9 @@ def _ask(
     explorer = Explorer(judge.known, dimensions, budget, judge.parts(), rough=rough, slow=evaluator.slow)
     if section.method == "search":
         use_all = section.evaluations is not None
-        return tuple(_doubts(searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all), budget))
+        ending = searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all)
+        names = [[goal.name for goal, weight in zip(judge.goals, row, strict=True) if weight] for row in weights]
+        return tuple(_doubts(ending, budget, [own[0] if len(own) == 1 else "a weighted sum" for own in names]))
     # The ends of the front, and what is best on the whole, are searched for; between them it is spread.
     explorer.left = budget // 2
     ones = np.ones((1, len(smallest)))
@@ -137,21 +142,26 @@ def _ask(
     return ()
 
 
-def _doubts(ending: searching.Ending, budget: int) -> Iterator[str]:
-    """What speaks against the optima of a search."""
+def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[str]:
+    """What speaks against the optima of a search; `objectives` are what each row of weights looks for."""
     more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
     if not ending.checked:
         yield f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
-    for row, (ends, rounding) in enumerate(zip(ending.ends, ending.rounding, strict=True)):
+    for row, (ends, rounding, best) in enumerate(zip(ending.ends, ending.rounding, ending.best, strict=True)):
         found = ends[np.isfinite(ends)]
         far = max(searching.AGREEMENT * np.abs(found).min(initial=np.inf), rounding)
         agree = np.abs(found - found.min(initial=np.inf)) <= far
         if len(ends) > 1 and agree.sum() < len(ends):
             of = f" for row {row + 1} of the weights" if len(ending.ends) > 1 else ""
             lost = f", {len(ends) - len(found)} found no feasible design" if len(found) < len(ends) else ""
-            spread = f"between {abs(found).min():.6g} and {abs(found).max():.6g}" if len(found) else "nowhere"
+            spread = "nowhere"
+            if len(found):
+                spread = f"with {objectives[row]} between {abs(found).min():.6g} and {abs(found).max():.6g}"
+            last = f", and the last steps from the best led to {abs(best):.6g}" * bool(
+                len(found) and best < found.min() - far
+            )
             yield (f"the {len(ends)} starts of the search{of} ended {spread}, {agree.sum()} of them within "
-                   f"{100 * searching.AGREEMENT:g} % of the best{lost}; {more}")  # fmt: skip
+                   f"{100 * searching.AGREEMENT:g} % of the best{lost}{last}; {more}")  # fmt: skip
 
 
 def _none_feasible(designs: Designs) -> str:
@@ -221,6 +231,7 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         data = changed_data(study, numbers)
         try:
             best = variant(study, numbers)
+            doubts += [f"{name}.yaml: {words}" for words in _parted(best, designs)]
             judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
             commands = tuple(dict.fromkeys(each.command for each in judged))
             drawings, given = _drawings(best, commands), _given(best, commands)
@@ -237,6 +248,29 @@ def optimum_files(study: Study, designs: Designs, marked: Mapping[str, int]) -> 
         text, beside = rewritten(study, data, heading)
         files |= {f"{name}.yaml": text, **beside}
     return files, doubts
+
+
+def _parted(study: Study, designs: Designs) -> Iterator[str]:
+    """Listed poses that one drive does not lead from one to the next."""
+    if not any(each.command == "kinematics" and not each.expression for each in designs.goals):
+        return
+    poses = study_poses(study, "kinematics")
+    if not poses.listed or len(poses.groups) > 1 or len(poses.names) > 1 or poses.count < 2:
+        return
+    (name,), listed = poses.names, poses.groups[0].values[poses.names[0]]
+    values = np.linspace(listed[:-1], listed[1:], BETWEEN + 2, axis=1)[:, 1:-1].ravel()
+    group = PoseGroup((name,), {name: values}, np.arange(len(values)))
+    failed = np.zeros(len(values), dtype=bool)
+    for solved in solve_poses(study, Poses((group,), len(values), False, (len(values),))):
+        failed[solved.rows] = ~solved.configuration.valid
+    missed = np.flatnonzero(failed.reshape(-1, BETWEEN).any(axis=1)).tolist()
+    unit = study.units.label(study.mechanism.quantity(name))
+    if missed:
+        ways = ", ".join(f"{k + 1} and {k + 2} ({listed[k]:.6g} to {listed[k + 1]:.6g} {unit})" for k in missed)
+        yield (
+            f"{name} cannot run from pose to pose: between poses {ways} the mechanism is stopped or comes apart; "
+            "a condition keeps off such places, e.g. subject_to: [{result: kinematics.conditioning, at_least: 0.3}]"
+        )
 
 
 def _given(study: Study, commands: Iterable[str]) -> list[tuple[str, ...]]:

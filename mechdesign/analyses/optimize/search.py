@@ -73,11 +73,14 @@ class Ending:
         one; nan where a start found no feasible point.
     rounding : list of float
         For each row of weights the difference below which two of these values are the same.
+    best : list of float
+        For each row of weights the smallest value after the last steps from the best start; nan where none is feasible.
     """
 
     checked: bool
     ends: list[Floats]
     rounding: list[float]
+    best: list[float]
 
 
 def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
@@ -129,7 +132,8 @@ def search(
     objectives = [_weighted(known, smallest, row) for row in rows]
     merits = [known.merit(each) for each in objectives if known.feasible.any()]
     rounding = [_rounding(known, merit, merit.min()) for merit in merits] or [0.0] * len(rows)
-    return Ending(checked, [_ends(known, each, begins) for each in objectives], rounding)
+    best = [float(_ends(known, each, [0, len(known.u)])[0]) for each in objectives]
+    return Ending(checked, [_ends(known, each, begins) for each in objectives], rounding, best)
 
 
 def _start(
