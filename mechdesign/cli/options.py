@@ -71,7 +71,11 @@ JOBS = _text(
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
-NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
+NO_PLOTS = _flag(
+    "no_plots",
+    "--no-plots",
+    "Draw no pictures; those of a run before are removed, as they would not fit the new tables.",
+)
 FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
 STYLE = _text(
     "style",

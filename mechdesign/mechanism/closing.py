@@ -29,6 +29,12 @@ SWEEP_POSES = 721
 END_HALVINGS = 40
 # Advice for most groups that do not close.
 CHECK_LENGTHS = "check the lengths"
+# Loops that stay open by less than this part of the mechanism's size nearly close, as they do in a singular pose.
+NEARLY = 0.01
+NEARLY_CLOSED = (
+    "the sketch may be drawn in a singular pose, in which the drives do not hold it: draw it in another pose, the "
+    "platform turned a little; or check the lengths"
+)
 
 
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
@@ -44,7 +50,10 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
         reason = _closed_otherwise(core, plan, x, start)
         if reason is not None:
             return reason
-    where, mend = open_group(state, equations.gaps(x))
+    gaps = equations.gaps(x)
+    where, mend = open_group(state, gaps)
+    if plan.iterative and mend == CHECK_LENGTHS and np.abs(gaps).max() < NEARLY * core.size:
+        mend = NEARLY_CLOSED
     if not plan.iterative:
         drawn = Plan(core, plan.structure, plan.modes, follows=False)
         for k, (coordinate, _) in enumerate(given):

@@ -10,7 +10,7 @@ from itertools import chain
 from mechdesign.errors import EXIT_CODES
 from mechdesign.expressions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
-from mechdesign.reference import keys, tables
+from mechdesign.reference import keys, synonyms, tables
 from mechdesign.reference.entries import Entry
 from mechdesign.study.text.fields import quoted
 from mechdesign.study.text.forms import TERMS
@@ -42,6 +42,8 @@ def results() -> Iterator[Entry]:
                     where=where)  # fmt: skip
     for name, meaning in STATISTICS.items():
         text = f"{meaning} of a local index over the region, after the index's name: sigma_min_{name}"
+        if name == "min":
+            text += "; 0 wherever the region ends at a singularity, of an index that is 0 there, as inverse_condition"
         yield Entry(f"*_{name}", "result of workspace", text, where=where)
 
 
@@ -70,7 +72,7 @@ def exit_codes() -> Iterator[Entry]:
 
 # A further kind of word is one more function here.
 SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (
-    keys.entries, terms, indices, results, tables.entries, expressions, units, exit_codes,
+    keys.entries, terms, indices, results, tables.entries, expressions, units, exit_codes, synonyms.entries,
 )  # fmt: skip
 
 

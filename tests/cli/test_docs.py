@@ -18,6 +18,9 @@ from mechdesign.reference import entries, find
         ("130", "interrupted"),
         ("reliability.clearances", "    radial: Mean radial clearance"),
         ("thou", "0.001 * inch"),
+        ("torque", "<drive>_effort"),
+        ("stroke", "kinematics.extremes.B.x.range"),
+        ("inverse_condition_min", "0 wherever the region ends at a singularity"),
     ],
 )
 def test_a_word_is_told(word, told, invoke):

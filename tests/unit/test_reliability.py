@@ -121,7 +121,7 @@ def test_a_parameter_that_sets_two_places_varies_both_and_says_so(tmp_path: Path
     alone = ask(tmp_path, SLIDER_CRANK, "dimensions: {a: 0.3, b: 0.6}", "methods: [analytic]")
     slopes = alone.tables["contributions"]["sensitivity"]
     assert together.tables["contributions"]["sensitivity"] == pytest.approx([slopes[0] + 2 * slopes[1]], rel=1e-12)
-    assert together.warnings == ["parameter 'a' varies crank.length, rod.length together"]
+    assert together.warnings == ["parameter that moves several dimensions together: 'a' crank.length, rod.length"]
 
 
 def test_a_place_varies_alone_beside_its_parameter(tmp_path: Path) -> None:

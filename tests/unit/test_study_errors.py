@@ -98,6 +98,13 @@ MECHANISM = [
     ("{r: 30}", "{r: s + 1, s: 2}", "a parameter may use those above it, and 's' is below"),
     ("{r: 30}", "{r: r}", "unknown name 'r' in 'r'"),
     ("{r: 30}", "{r: 30, sin: 2}", "'sin' is a word of the expression language"),
+    (
+        "drives:",
+        "limits: {mu: [30, 150]}\n  drives:",
+        "8:11: mechanism.limits: a limit says what it is of, a measure, "
+        "drive, distance or angle: [{measure: mu, min: 30, max: 150}]",
+    ),
+    ("drives:", "limits: [{mu: [30, 150]}]\n  drives:", "[{measure: mu, min: 30, max: 150}]"),
     ("{r: 30}", "[30]", "2:15: mechanism.parameters: expected a mapping of names, not a list of 1"),
 ]
 
@@ -207,6 +214,15 @@ QUESTIONS = [
     (
         "optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GII, weights: [[1, 2]]}",
         "2 weights for 1 goals",
+    ),
+    (
+        "reliability: {dimensions: {r: 1}, limits: {kinematics.extremes.rocker.angle.range: 1}}",
+        "of a swing or a stroke draw the linkage twice, at both ends, and limit a measure between",
+    ),
+    (
+        "optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GII, "
+        "subject_to: [{contains: {circle: 5, center: [0, r]}}]}",
+        "with 'center: free' the shape may lie anywhere",
     ),
     ("reliability: {dimensions: {r: -1}}", "10:31: reliability.dimensions.r: must be at least 0, not -1"),
     ("reliability: {dimensions: {rod.lenght: 1}}", "did you mean 'rod.length'?"),
@@ -383,3 +399,21 @@ def test_a_mechanism_has_a_bounded_number_of_links() -> None:
     links = "".join(f"    a{index}: [O, P{index}, 1]\n" for index in range(20_000))
     with pytest.raises(StudyError, match=r"mechanism\.links: 20001 links are too many"):
         load(text=f"mechanism:\n  links:\n    ground: {{O: [0, 0]}}\n{links}  drives: [a1]\n")
+
+
+def test_a_sketch_in_a_singular_pose_is_told_as_such() -> None:
+    # All legs point at P: with drawn places that are rounded, the platform cannot turn into the lengths measured.
+    with pytest.raises(StudyError, match=r"the sketch may be drawn in a singular pose.*the platform turned a little"):
+        load(
+            text="""\
+mechanism:
+  links:
+    ground: {A1: [-216.506, -125], A2: [216.506, -125], A3: [0, 250]}
+    leg_1: {from: A1, to: B1, telescopic: true}
+    leg_2: {from: A2, to: B2, telescopic: true}
+    leg_3: {from: A3, to: B3, telescopic: true}
+    platform: {P: [0, 0], B1: [-51.96, -30], B2: [51.96, -30], B3: [0, 60]}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}, l3: {length: leg_3}}
+  sketch: {P: [0, 0], B1: [-52, -30], B2: [52, -30], B3: [0, 60]}
+"""
+        )

@@ -287,7 +287,7 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     with np.errstate(divide="ignore"):
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
     ratio[~np.isfinite(ratio)] = np.nan
-    where = f"{swept or 'row'} at the"
+    where = f"{swept or 'row (from 0)'} at the"
     unit = study.units.label(mechanism.quantity(swept)) if swept is not None else ""
     return Table(
         "extremes",

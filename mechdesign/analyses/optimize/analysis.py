@@ -30,7 +30,7 @@ from mechdesign.analyses.region.curves import workspace_nodes
 from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
 from mechdesign.analyses.workspace.contained import fitting_scale
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.question import answer, questions, split
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
@@ -169,6 +169,12 @@ def _none_feasible(designs: Designs) -> str:
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
     told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
+    for each in designs.conditions:
+        index, statistic = split(each.column) if each.regional and each.shape is None else ("", "")
+        values = designs.found[each][np.isfinite(designs.found[each])] if statistic == "min" else np.empty(0)
+        if values.size and (np.abs(values) <= 0).all():
+            told += (f"; {each.column} is 0 in all of them, as it is wherever the region ends at a singularity: bound "
+                     f"{index}_mean, or keep the region off singularities by mechanism.limits")  # fmt: skip
     return f"no design of {len(designs)} is feasible: {told}"
 
 

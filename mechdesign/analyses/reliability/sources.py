@@ -251,7 +251,8 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
         raise StudyError((study.problem(message, "reliability"),))
     mechanism: Mechanism = study.mechanism
     scalars = []
-    warnings = []
+    warnings: list[str] = []
+    together: list[str] = []
     for name, dimension in section.dimensions.items():
         nominal = 0.0
         if name in study.parameters.nominal:
@@ -262,7 +263,7 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
             elif len(dimensions) > 1:
-                warnings.append(f"parameter '{name}' varies {', '.join(dimensions)} together")
+                together.append(f"'{name}' {', '.join(dimensions)}")
         else:
             kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
             if kind == "place":
@@ -277,6 +278,9 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
         else:
             law = marginal(dimension, nominal, factor)
         scalars.append(Scalar(name, kind, law, moves, factor, unit))
+    if together:
+        parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
+        warnings.append(f"{parameters} several dimensions together: {'; '.join(together)}")
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(mechanism, name, clearance) for name, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))

@@ -46,7 +46,7 @@ class Difference:
     change: str  # `MOVED`, ...
     rows: int = 0  # how many
     largest: float = math.nan  # absolute difference; inf between a number and none; nan of words
-    relative: float = math.nan  # largest difference over the old value, maybe of another row
+    relative: float = math.nan  # that difference over the old value
     old: str = ""  # where it is largest
     new: str = ""
     row: str = ""  # its pose or key
@@ -97,7 +97,7 @@ class Comparison:
             "change": "moved, missing, new; unit, verdict or outcome: another one",
             "rows": "how many rows",
             "largest": "largest absolute difference, in `unit`; inf between a number and nan; nan of words",
-            "relative": "largest difference over the old value",
+            "relative": "that difference over the old value of the same row",
             "old": "old value where the absolute difference is largest",
             "new": "new value there",
             "row": "pose or key of that row, or of the first that is missing or new",

@@ -65,7 +65,7 @@ def compare_tables(
         if beyond.size:
             row = beyond[np.argmax(size[beyond])]
             with np.errstate(divide="ignore", invalid="ignore"):
-                relative = float(np.max(size[beyond] / np.where(np.isfinite(a[beyond]), np.abs(a[beyond]), 1)))
+                relative = float(size[row] / (np.abs(a[row]) if np.isfinite(a[row]) else 1))
             largest = np.abs(a[np.isfinite(a)]).max(initial=0.0)
             share = float(size[row] / largest) if largest else math.inf
             told = {"old": f"{a[row]:.12g}", "new": f"{b[row]:.12g}", "unit": before.unit}

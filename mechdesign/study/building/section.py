@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from mechdesign.errors import suggestion
+from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
@@ -242,6 +242,17 @@ class Limit(fields.Model):
         return self
 
 
+def _named_limits(raw: Any) -> Any:
+    """What is given as {name: [low, high]} is told with the limits that it means."""
+    for given in [raw] if isinstance(raw, dict) else raw if isinstance(raw, list) else []:
+        name, bounds = next(iter(given.items()), ("gap", None)) if isinstance(given, dict) else ("", None)
+        if given is raw or (isinstance(bounds, list) and name not in Limit.fields_by_key()):
+            low, high = bounds if isinstance(bounds, list) and len(bounds) == 2 else (30, 150)
+            written = cut(f"measure: {name}, min: {low}, max: {high}")
+            raise failure(f"a limit says what it is of, a measure, drive, distance or angle: [{{{written}}}]")
+    return raw
+
+
 # Most links of a mechanism; to solve it takes time in proportion to their square.
 MAX_LINKS = 1000
 
@@ -304,7 +315,7 @@ class MechanismSection(fields.Model):
     """Named quantities, usable like coordinates: reported where ``outputs`` names them, limited, required, optimised.
     Example: {mu: {angle: [rod, rocker]}, lead: B.x - A.x}
     """
-    limits: tuple[Limit, ...] = ()
+    limits: Annotated[tuple[Limit, ...], BeforeValidator(_named_limits)] = ()
     """What the motion keeps. A pose outside has valid 0 but keeps its positions; the nominal mechanism is judged.
     Example: [{distance: [P, Q], min: 10}, {drive: crank, max: 120}]
     """

@@ -321,7 +321,8 @@ def _check_fixed(checker: Checker, shape: Outline, path: KeyPath, moved: Collect
         names = {name for number in numbers if number.expression for name in number.expression.names}
         for name in sorted(names.intersection(moved)):
             told = f"{name!r} changes with the variables, and what is to be contained is the same for every design"
-            checker.report((*path, key), told)
+            free = "; with 'center: free' the shape may lie anywhere in the region" * (key == "center")
+            checker.report((*path, key), told + free)
 
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:

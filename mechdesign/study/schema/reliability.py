@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import MEASURED
@@ -415,6 +416,13 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
             checker.kind(path, ORDERS["length"][order])
     elif base in mechanism.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
+    elif base not in known and base.partition(".")[0] in COMMANDS:
+        message = (
+            "a limit is of the error of a coordinate in one pose, not of a result; of a swing or a stroke draw the "
+            "linkage twice, at both ends, and limit a measure between, e.g. mechanism.measures: {swing: {angle: "
+            "[rocker_1, rocker_2]}} and reliability.limits: {swing: 0.2}"
+        )
+        report(path, message, at_key=True)
     else:
         checker.coordinate(base, path, at_key=True, order=order)
 

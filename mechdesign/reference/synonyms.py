@@ -1,0 +1,26 @@
+"""The field's words for what the reference has under another name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from mechdesign.reference.entries import Entry
+
+# What a word is here: the word of the reference, and how it is meant.
+SYNONYMS: Mapping[str, tuple[str, str]] = {
+    "torque": (
+        "<drive>_effort",
+        "the effort of an angle drive; kinematics.loads asks for it, extremes.csv has its peak",
+    ),
+    "baseline": ("compare", "results to compare with: mechdesign compare BASELINE RESULTS"),
+    "lash": ("clearances", "reliability.clearances, the play in the pins"),
+    "play": ("clearances", "reliability.clearances, the play in the pins"),
+    "stroke": ("range", "the range of a coordinate: kinematics.extremes.B.x.range of extremes.csv"),
+    "swing": ("range", "the range of an angle: kinematics.extremes.rocker.angle.range of extremes.csv"),
+}
+
+
+def entries() -> Iterator[Entry]:
+    """Words of the field, and what they are called here."""
+    for word, (own, meaning) in SYNONYMS.items():
+        yield Entry(word, "other word", f"see {own}: {meaning}")
