@@ -149,7 +149,13 @@ def test_other_pieces_of_the_region_contain_nothing() -> None:
 def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
     shapes = "[{contains: {rectangle: [180, 90], center: free}}, {contains: {circle: 20, center: [0, 80]}}]"
     study = study_of(ARM, f"optimize.subject_to={shapes}")
-    designs = mechdesign.optimize(study).tables["designs"]
+    result = mechdesign.optimize(study)
+    designs, best = result.tables["designs"], result.tables["optimum"]
+    x, y = (best[f"{axis} of rectangle 180 x 90"][0] for axis in "xy")
+    width, height = best["scale of rectangle 180 x 90"][0] * np.array([90, 45])
+    nearest = np.hypot(max(abs(x) - width, 0), max(abs(y) - height, 0))
+    assert nearest >= abs(best["l1"][0] - best["l2"][0]) - 1e-6
+    assert np.hypot(abs(x) + width, abs(y) + height) <= best["l1"][0] + best["l2"][0] + 1e-6
     inner, outer = np.abs(designs["l1"] - designs["l2"]), designs["l1"] + designs["l2"]
     free = [
         max(ring_of_rectangle(180, 90, a, b), ring_of_rectangle(90, 180, a, b))

@@ -29,13 +29,13 @@ from mechdesign.analyses.poses import solve_poses, solve_shown, study_poses
 from mechdesign.analyses.region.curves import workspace_nodes
 from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
-from mechdesign.analyses.workspace.contained import fitting_scale
+from mechdesign.analyses.workspace.contained import Shape, fitting_scale
 from mechdesign.analyses.workspace.question import answer, questions, split
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
@@ -98,7 +98,7 @@ def optimize(
                 raise
             raise Interrupted(_finished_part(partial)) from None
     tables = [
-        optimum_table(designs), designs_table(designs), bounds_table(designs),
+        optimum_table(designs, _places(designs, evaluator)), designs_table(designs), bounds_table(designs),
         best_table(designs), sensitivity,
     ]  # fmt: skip
     marked: dict[str, int] = {}
@@ -318,6 +318,23 @@ def _assembles_alike(
         return False
 
 
+def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
+    """Where a design's workspace holds shapes best."""
+    if not shapes:
+        return []
+    panels = answer(questions(study, wanted=("area",))[0], {}, 1, SINGLE).panels
+    return [complex(fitting_scale(shape, panels)[1][0]) for shape in shapes]
+
+
+def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
+    """Where the optima hold shapes that may lie anywhere, of a single region."""
+    shapes = [each.shape for each in designs.conditions if each.shape is not None and each.shape.centre is None]
+    if not shapes or len(evaluator.questions) > 1:
+        return {}
+    rows = [_centres(variant(designs.study, designs.numbers(k)), shapes) for k in designs.winners.tolist()]
+    return {shape.name: column for shape, column in zip(shapes, np.array(rows, dtype=complex).T, strict=True)}
+
+
 def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study, Result]:
     """A design as a study, with what was judged of it: its workspace, or else its motion with the targets' errors."""
     made = variant(designs.study, numbers)
@@ -327,10 +344,8 @@ def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study,
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:
-            contained = []
-            if shapes := [each.shape for each in designs.conditions if each.shape is not None]:
-                panels = answer(questions(plain, wanted=("area",))[0], {}, 1, SINGLE).panels
-                contained = [(shape, complex(fitting_scale(shape, panels)[1][0])) for shape in shapes]
+            shapes = [each.shape for each in designs.conditions if each.shape is not None]
+            contained = list(zip(shapes, _centres(plain, shapes), strict=True))
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
         if any(each.command == "kinematics" for each in designs.goals):

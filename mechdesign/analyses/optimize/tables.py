@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, steps
-from mechdesign.numerics.arrays import Flags
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 
@@ -17,10 +19,12 @@ MAX_BEST = 10
 BEST_DISTANCE = 0.05
 # How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
 AT_BOUND = 1e-4
+# Part of the mechanism's size below which the place of a shape is zero.
+PLACE_ROUNDING = 1e-9
 
 
-def optimum_table(designs: Designs) -> Table:
-    """The best design for each row of weights."""
+def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
+    """The best design for each row of weights; `places` are where each lets a shape lie that it is to contain."""
     study, rows, variables = designs.study, designs.winners, designs.variables
     scores = [designs.score(row)[winner] for row, winner in zip(designs.weights, rows, strict=True)]
     parameters = {name: column[rows] for name, column in variables.items() if name in study.parameters.nominal}
@@ -33,11 +37,26 @@ def optimum_table(designs: Designs) -> Table:
     columns = (
         *(Column(f"w_{each.name}", column, "", f"weight of {each.name}") for each, column in weights),
         *designs.columns(rows),
+        *(
+            Column(
+                f"{axis} of {name}",
+                _settled(study, part(centre)),
+                study.units.label("length"),
+                f"where the centre of {name} fits best",
+            )
+            for name, centre in places.items()
+            for axis, part in (("x", np.real), ("y", np.imag))
+        ),
         *shared(study.units, score=scores),
         *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
         Column("active", _active(designs), "", "bounds and conditions that the optimum lies at"),
     )
     return Table("optimum", columns, "the best design for each set of weights")
+
+
+def _settled(study: Study, places: Floats) -> Floats:
+    """Places without what rounding leaves of zero."""
+    return np.where(np.abs(places) < PLACE_ROUNDING * study.mechanism.size, 0.0, places)
 
 
 def designs_table(designs: Designs) -> Table:

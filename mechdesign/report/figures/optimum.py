@@ -166,7 +166,7 @@ def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float)
         if other != index:
             draw_ghost(axes, sweep.mechanism, sweep.configuration, int(other))
     for point, curve in curves.items():
-        axes.plot(curve.real, curve.imag, color=style.BLUE, linewidth=1.6, zorder=2.8, label=f"path of {point}")
+        axes.plot(curve.real, curve.imag, color=style.BLUE, linewidth=1.6, zorder=3.6, label=f"path of {point}")
     draw_mechanism(axes, sweep.mechanism, sweep.configuration, index, travel=sweep.travel)
     return figure
 
