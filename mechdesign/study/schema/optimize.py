@@ -163,7 +163,7 @@ class Outline(fields.Model):
         BeforeValidator(_centre),
         fields.OrShort({"const": "free"}),
     ] = None
-    """Centre [x, y]. ``free``, or left out: anywhere in the region. Example: [0, 300]"""
+    """Centre [x, y], the same for all designs. ``free``, or left out: anywhere in the region. Example: [0, 300]"""
 
     @property
     def numbers(self) -> Mapping[str, tuple[fields.StudyNumber, ...]]:
