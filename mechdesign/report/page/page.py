@@ -213,6 +213,7 @@ def _about(study: Study) -> dict[str, Any]:
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told, "solution": rest, "loops": loops,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told,
+        "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip
