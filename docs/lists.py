@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import groupby
 
 from mechdesign.reference import Entry, entries, tables
-from mechdesign.reference.messages import meaning, messages
+from mechdesign.reference.messages import PART, messages
 from mechdesign.reference.tables import TableText
 
 # Sections of the study with a page each, in the order of the format; keys that stand alone share one.
@@ -31,6 +31,14 @@ LISTS = {
         (),
     ),
     "exit_codes": ("Exit codes", "What a command ends with; of several questions the largest.", ("exit code",)),
+}
+# Parts of a group of messages: title, and exit codes.
+MESSAGES: dict[str, tuple[int | None, ...]] = {
+    "Errors in the study or the command (exit code 2)": (2,),
+    "The mechanism cannot do it (exit code 3)": (3,),
+    "Failures (exit code 4)": (4,),
+    "Warnings: the results are there": (None,),
+    "Parts of these messages": (PART,),
 }
 _APART = ("key", "table", "column", "local index", "result of workspace", "exit code")
 _SPECIAL = re.compile(r"([\\*_<>\[\]$|#])")
@@ -117,16 +125,22 @@ def table_page(command: str, found: Iterable[TableText]) -> str:
 def messages_page() -> str:
     """The page of errors and warnings."""
     parts = [
-        "Every error and warning, by what it speaks of; `<names>` stand for what differs. `mechdesign docs TEXT` finds "
-        'those that contain a text, for example `mechdesign docs "singular position"`. A message about a key of the '
-        "study begins with the file, the line and the key."
+        "Every error and warning, in the order in which one meets them; `<words>` stand for what differs. Behind an "
+        "arrow stands what mends it, where the message does not say so itself. `mechdesign docs TEXT` finds those that "
+        'contain a text, for example `mechdesign docs "singular position"`, or a whole message as it was printed.',
+        "An error of a study begins with the file, the line, the column and the key. Exit codes are those of "
+        "[](exit_codes.md): with 2 nothing was computed.",
     ]
-    for subject, about in groupby(messages(), key=lambda message: message.subject):
-        parts.append(f"## {subject[0].upper()}{subject[1:]}")
-        of_subject = sorted(about, key=lambda message: (message.code is None, message.code or 0))
-        for number, same in groupby(of_subject, key=lambda message: message.code):
-            said = meaning(number)
-            parts += [f"{said[0].upper()}{said[1:]}.", "\n".join(f"- {code(message.text)}" for message in same)]
+    for group, about in groupby(messages(), key=lambda message: message.group):
+        parts += [f"## {group.title}", group.about]
+        told = list(about)
+        for title, codes in MESSAGES.items():
+            lines = [
+                f"- {code(each.text)}" + (f" \N{RIGHTWARDS ARROW} {each.mend}" if each.mend else "")
+                for each in told if each.code in codes
+            ]  # fmt: skip
+            if lines:
+                parts += [f"**{title}**", "\n".join(lines)]
     return _page("Messages", parts)
 
 

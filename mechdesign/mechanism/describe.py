@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.diagnosis import joints_in_words
+from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.diagnosis import joints_in_words, near_singular
 from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
@@ -77,13 +77,8 @@ def describe(mechanism: Mechanism) -> str:
     lines.append(f"branch: {description.branch}")
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
-    near = float(regularity(mechanism.linearize(mechanism.sketch_configuration)))
-    if near < STALLED:
-        lines.append(
-            f"warning: the sketch is at a singular position (regularity {near:.1g} of 1): its drives hold the links "
-            "hardly or not at all there, and rates there mean nothing"
-        )
-    return "\n".join(lines)
+    singular = near_singular(float(regularity(mechanism.linearize(mechanism.sketch_configuration))))
+    return "\n".join([*lines, *([singular] if singular else [])])
 
 
 def links_in_words(description: Description) -> list[LinkWords]:

@@ -19,7 +19,7 @@ from helpers.tables import unsaid
 import mechdesign
 from mechdesign.errors import MechdesignError
 from mechdesign.reference import entries, tables
-from mechdesign.reference.messages import find_messages, messages
+from mechdesign.reference.messages import find_messages, groups, messages, unread
 from mechdesign.results import Result
 
 ROOT = Path(__file__).parents[2]
@@ -168,7 +168,39 @@ def test_what_a_wrong_study_is_told_is_a_message_of_the_reference(change, code):
 
 def test_messages_are_texts():
     assert len(messages()) > 300
-    assert [told for told in messages() if not re.search("[a-z] [a-z'(<]", told.text)] == []
+    assert [told.text for told in messages() if not re.search("[a-z] [a-z'(<`]", told.text)] == []
+    assert [told.text for told in messages() if re.search("[A-Z]{3,} [A-Z]|<[^<>]*[_|<]", told.text)] == []
+
+
+def test_every_message_is_in_a_group_with_words_for_what_differs():
+    """A file without a group has texts of pictures only; names of the source are no words for a reader."""
+    found = {Path(name).parts[:2] for name in unread()}
+    assert found <= {
+        ("report", "figures"),
+        ("report", "page"),
+        ("mechanism", "describe.py"),
+        ("mechanism", "margins.py"),
+    }
+    unsaid = {
+        (told.group.title, place)
+        for told in messages() for place in re.findall("<([^<>]*)>", told.source)
+        if place not in told.group.places and place[0].isalpha() and "|" not in place
+    }  # fmt: skip
+    assert unsaid == set()
+    for group in groups():
+        sources = [told.source for told in messages() if told.group is group]
+        assert sources
+        assert [part for part in group.mends if not any(part in source for source in sources)] == []
+
+
+def test_a_message_is_found_with_what_mends_it():
+    (dead,) = find_messages("3 poses are at a dead centre: B.x stands still there, and det_J is 0")
+    assert "det_J is 0" in dead.word
+    assert "shall turn back" in dead.text
+    (many,) = find_messages("a sweep of more than 10,000,000 poses")
+    assert "larger step" in many.text
+    (pose,) = find_messages("pose crank = 30 deg: cannot be assembled")
+    assert "change a length" in pose.text
 
 
 def test_the_pages_have_every_word():

@@ -130,11 +130,11 @@ class MotionQuestion:
         points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
         rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
         given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
-        told = f"{given} for {counted(len(drives), 'drive')}; name as many"
+        words = f"{given} for {counted(len(drives), 'drive')}; name as many"
         if not named:
-            told = f"no outputs are named; name as many as there are drives, {len(drives)},"
-        told += f" by kinematics.jacobian: [{', '.join(rows)}]"
-        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), told)
+            words = f"no outputs are named; name as many as there are drives, {len(drives)},"
+        words += f" by kinematics.jacobian: [{', '.join(rows)}]"
+        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), words)
 
 
 def motion_question(study: Study) -> MotionQuestion:
