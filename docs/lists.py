@@ -8,7 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import groupby
+
+import yaml
 
 from mechdesign.reference import Entry, entries, tables
 from mechdesign.reference.messages import PART, messages
@@ -40,6 +43,7 @@ MESSAGES: dict[str, tuple[int | None, ...]] = {
     "Warnings: the results are there": (None,),
     "Parts of these messages": (PART,),
 }
+LINE = 80  # characters of a line of an example
 _APART = ("key", "table", "column", "local index", "result of workspace", "exit code")
 _SPECIAL = re.compile(r"([\\*_<>\[\]$|#])")
 _CODE = re.compile(r"(`[^`]+`)")
@@ -71,9 +75,55 @@ def _told(entry: Entry) -> Iterator[str]:
     }
     lines = [f"- {what}: {text}" for what, text in facts.items() if text]
     lines += [f"- {code(word)}: {markdown(text)}" for word, text in entry.words]
-    lines += [f"- Example: {code(f'{entry.last}: {example}')}" for example in entry.examples]
     if lines:
         yield "\n".join(lines)
+    if entry.examples:
+        yield f"```yaml\n{in_place(entry)}\n```"
+
+
+@cache
+def _examples() -> dict[str, tuple[str, ...]]:
+    return {entry.word: entry.examples for entry in entries() if entry.kind == "key"}
+
+
+def in_place(entry: Entry) -> str:
+    """The examples of a key where they stand in a study, each further one as a comment."""
+    *above, last = entry.word.split(".")
+    lines: list[str] = []
+    indent = dash = ""
+    for k, part in enumerate(above):
+        name = _example_name(".".join(above[:k]), [*above, last][k + 1]) if part == "*" else part
+        if not name:
+            dash = "- "
+            continue
+        lines.append(f"{indent}{dash}{name}:")
+        indent, dash = indent + " " * (2 + len(dash)), ""
+    first, *others = entry.examples
+    lines += _written(f"{indent}{dash}{last}:", first, indent + " " * (2 + len(dash)))
+    return "\n".join([*lines, *(f"{indent}{' ' * len(dash)}# or {last}: {each}" for each in others)])
+
+
+def _example_name(path: str, inner: str) -> str:
+    """A name that stands in a mapping of names, out of its examples; empty of a list."""
+    for given in map(yaml.safe_load, _examples()[path]):
+        if isinstance(given, dict):
+            names = [name for name in given if name != "ground"]
+            fitting = [name for name in names if isinstance(given[name], dict) and inner in given[name]]
+            return str([*fitting, *names][0])
+    return ""
+
+
+def _written(key: str, example: str, indent: str) -> list[str]:
+    """A key with its example, whose entries have lines of their own where one line would be long."""
+    if len(key) + len(example) < LINE or example[0] not in "{[":
+        return [f"{key} {example}"]
+    parts, depth, begin = [], 0, 1
+    for k, letter in enumerate(example):
+        depth += (letter in "{[") - (letter in "}]")
+        if (letter == "," and depth == 1) or depth == 0:
+            parts.append(example[begin:k].strip())
+            begin = k + 1
+    return [key, *(f"{indent}{'- ' if example[0] == '[' else ''}{part}" for part in parts)]
 
 
 def _page(title: str, parts: Iterable[str]) -> str:
