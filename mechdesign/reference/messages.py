@@ -103,10 +103,9 @@ def groups() -> tuple[Group, ...]:
 def messages() -> tuple[Message, ...]:
     """Every message of the package, group by group, in the order of a group's files and of the source in them."""
     found: dict[tuple[Group, str], tuple[int, int | None]] = {}
-    for name, texts in _read().items():
+    for name, texts in _read(owned=True):
         group, begin = _owner(name)
-        if group is None:
-            continue
+        assert group is not None
         for text, code in texts:
             before = found.get((group, text))
             # What is an error, or a warning, is not told again as a part of one.
@@ -121,7 +120,7 @@ def messages() -> tuple[Message, ...]:
 
 def unread() -> list[str]:
     """Files with texts that belong to no group."""
-    return [name for name, texts in _read().items() if texts and _owner(name)[0] is None]
+    return [name for name, texts in _read(owned=False) if texts]
 
 
 def _owner(name: str) -> tuple[Group | None, str]:
@@ -131,9 +130,12 @@ def _owner(name: str) -> tuple[Group | None, str]:
     return group, begin
 
 
-def _read() -> dict[str, list[tuple[str, int | None]]]:
+def _read(*, owned: bool) -> Iterator[tuple[str, list[tuple[str, int | None]]]]:
+    """Files that belong to a group, or that do not, with their texts and exit codes."""
     sources = dict(_sources(files("mechdesign")))
-    return {name: _Reader.read(text, sources, texts=name.startswith(_ROOMS)) for name, text in sources.items()}
+    for name, text in sources.items():
+        if (_owner(name)[0] is not None) == owned:
+            yield name, _Reader.read(text, sources, texts=name.startswith(_ROOMS))
 
 
 def shown(text: str, group: Group) -> str:
