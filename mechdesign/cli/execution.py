@@ -236,7 +236,9 @@ def tell(given: Outcome, options: Options) -> None:
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{who} {given.failed}")
+        from mechdesign.cli.docs import look_up
+
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 

@@ -17,7 +17,7 @@ from PIL import Image
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import counted, explain
-from mechdesign.mechanism.describe import describe
+from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import fit
@@ -206,24 +206,14 @@ def _about(study: Study) -> dict[str, Any]:
             told[kind].append(words)
         elif kind not in ("links", "mobility"):
             rest.append(line.strip())
-    places = description.places
     links = [
-        {
-            "name": name,
-            "kind": "telescopic leg" if link.telescopic else "link",
-            "points": ", ".join([*link.points, *(end for end in link.ends or () if end not in link.points)]),
-            "length": shown(places[f"{name}.length"].nominal) if f"{name}.length" in places else "",
-        }
-        for name, link in description.links.items()
-    ]
-    drives = [
-        f"{name}, the {drive.kind} of {drive.target}"
-        + (f" to {drive.reference}" if drive.reference != "ground" else "")
-        for name, drive in description.drives.items()
+        (link.name, ", ".join(link.points), "varies" if link.telescopic else shown(link.length) if link.length else "")
+        for link in links_in_words(description)
     ]
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives, "parameters": parameters, "told": told, "solution": rest, "loops": loops,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told,
+        "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip

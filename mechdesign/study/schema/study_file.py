@@ -143,4 +143,7 @@ def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> 
             return key, rest[length:]
     if schema_fields(StudyFile, path):
         return rest[0], rest[1:]
+    if len(rest) > 1 and _INDEX.fullmatch(rest[-1]):
+        place, hint = dotted([*path, *rest[:-1]]), suggestion(rest[0], data)
+        raise StudyError([Problem(f"there is no {place} to have a {rest[-1]!r}{hint}", file=label)])
     return ".".join(rest), []
