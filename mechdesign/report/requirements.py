@@ -135,7 +135,7 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     path = requirement.result.partition(".")[2]
     chosen = choose(result, path, requirement.where, absolute=requirement.abs)
     table, name, values = chosen.table, chosen.column, chosen.values
-    words = _words(requirement)
+    words = in_words(requirement)
     rows = np.flatnonzero(chosen.counts)
     if chosen.missing and whole:
         raise UnknownColumnError(chosen.missing)
@@ -166,7 +166,8 @@ def unit_of(table: Table, name: str, row: int) -> str:
     return str(table["unit"][row]) if IN_UNIT in column.meaning and "unit" in table else column.unit
 
 
-def _words(requirement: Requirement) -> str:
+def in_words(requirement: Requirement) -> str:
+    """What is required: the result, the rows that count, the bounds."""
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))

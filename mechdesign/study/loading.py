@@ -226,7 +226,7 @@ def load_document(
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
-    The assembly is that of the `original`, a study that differs in numbers alone, where else the sketch would choose.
+    Where it differs from the `original` in numbers alone the assembly is that of the original; else the sketch chooses.
     """
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
@@ -404,8 +404,14 @@ def _adapter(key: str) -> TypeAdapter[Any]:
 
 
 def _compiled(description: Description, reporter: Reporter, original: Mechanism | None) -> Mechanism | None:
+    alike = original is not None and _alike(description, original.description)
     try:
-        return Mechanism(description) if original is None else Variant(original, description)
+        return Variant(original, description) if alike and original is not None else Mechanism(description)
     except MechanismError as error:
         reporter.report(error.key.split("."), str(error))
         return None
+
+
+def _alike(one: Description, other: Description) -> bool:
+    """Whether two mechanisms differ in numbers alone."""
+    return dataclasses.replace(one, places=other.places, sketch=other.sketch) == other
