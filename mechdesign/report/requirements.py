@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError, few_comparisons
+from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import Result, Table
 from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
 from mechdesign.study import Study
@@ -110,6 +110,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ...     print(verdict)
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
     """
+    if "cases" in result.drawn:
+        return tuple(over_cases(result.drawn["cases"].verdicts))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -152,6 +154,20 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         words, met, float(values[worst]), place_of(table, int(worst), name, freedom),
         margin_of(requirement, float(values[worst])), unit_of(table, name, int(worst)),
     )  # fmt: skip
+
+
+def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
+    """Verdicts on each requirement over cases, given by their names in words: the worst, and how many miss it."""
+    for cases in verdicts:
+        names = list(cases)
+        unmet = [k for k, each in enumerate(cases.values()) if not each.met]
+        margins = [-np.inf if np.isnan(each.margin) else each.margin for each in cases.values()]
+        k = int(np.argmin(margins))
+        worst = cases[names[k]]
+        place = ", ".join(filter(None, (names[k], worst.place)))
+        if unmet:
+            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first {names[unmet[0]]}"
+        yield replace(worst, met=not unmet, place=place)
 
 
 def margin_of(requirement: Requirement, value: float) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 import mechdesign
 from mechdesign.errors import StudyError
-from mechdesign.sweep.cases import Answered, Case, Wanted, answers, foresee, variant
+from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, variant
 
 SLIDER_CRANK = """
 mechanism:

@@ -24,7 +24,7 @@ ORDER = (
     ("mechdesign.analyses.workspace",),
     ("mechdesign.analyses.optimize",),
     ("mechdesign.report",),
-    ("mechdesign.sweep",),
+    ("mechdesign.experiments",),
     ("mechdesign.door",),
     ("mechdesign.reference",),
     ("mechdesign.cli",),

@@ -15,7 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe
 from mechdesign.report.figures import style
@@ -88,7 +88,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         drawing=drawing or (_sketch(study) if plots else ""),
         plots=plots,
         answers=answers,
-        questions=COMMANDS,
+        questions=QUESTIONS,
         required=required,
         met=sum(each["met"] for each in required),
         warnings=warnings,

@@ -163,7 +163,6 @@ class Answer:
         except Exception as error:
             code, why = _explained(error)
             return Answered(tuple(numbers), tuple(verdicts), (), code, why)
-        warnings += map(str, study.warnings)
         for command in commands_of(study, self.wanted):
             try:
                 result = ask(study, command)
