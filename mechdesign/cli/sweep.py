@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -69,6 +70,12 @@ def _varied(text: str) -> tuple[str, Any]:
     return name, listed.data
 
 
+def _as_typed(error: StudyError) -> StudyError:
+    """The same mistakes under the options that say what `Matrix.overrides` made of them."""
+    written = re.compile(r"--set matrix\.(\w+)=.*")
+    return StudyError([replace(each, file=written.sub(r"--\1", each.file)) for each in error.problems])
+
+
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
     given = None
@@ -78,7 +85,8 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         return given.exit_code
     except Interrupted:
         raise
-    except Exception as error:
+    except Exception as wrong:
+        error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
         given = failure(path.stem if path is not None else "study", "sweep", Path(), error)
         return given.exit_code
     finally:

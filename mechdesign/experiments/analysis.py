@@ -153,8 +153,16 @@ def _result(study: Study, found: Cases) -> Result:
     part = f"{len(answered)} of {asked} cases were answered; this is what they are" if len(answered) < asked else ""
     return Result(
         "sweep", {"sweep": Table("sweep", tuple(_columns(study, found)), "what becomes of each case of the matrix")},
-        tuple(_warnings(study, found)), counts, told, interrupted=part, drawn={"cases": found},
+        tuple(_warnings(study, found)), counts, told, interrupted=part, drawn=_drawn(study, found),
     )  # fmt: skip
+
+
+def _drawn(study: Study, found: Cases) -> dict[str, Any]:
+    """What pictures show: the entries that vary, and the results with what is required of them."""
+    bounds = [(each.at_least, each.at_most) for each in study.requirements]
+    limits = dict(zip(requirement_names(study), bounds, strict=True))
+    results = limits | {each.title: (None, None) for each in found.wanted}
+    return {"cases": found, "entries": [name for name, _ in found.cases[0].changes], "results": results}
 
 
 def _columns(study: Study, found: Cases) -> Iterator[Column]:
@@ -232,7 +240,7 @@ def _warnings(study: Study, found: Cases) -> Iterator[str]:
             twice.append((k, seen))
     if twice:
         k, seen = twice[0]
-        yield f"{counted(len(twice), 'case')} repeat others; the first, {found.named(k)}, is case {seen + 1} once more"
+        yield f"{len(twice)} of {len(cases)} cases are repeated; {found.named(k)} is case {seen + 1} once more"
     warned = [k for k, each in enumerate(found.answers) if each.warnings]
     if warned:
         k = warned[0]

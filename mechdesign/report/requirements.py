@@ -166,7 +166,7 @@ def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
         worst = cases[names[k]]
         place = ", ".join(filter(None, (names[k], worst.place)))
         if unmet:
-            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first {names[unmet[0]]}"
+            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first is case {unmet[0] + 1}"
         yield replace(worst, met=not unmet, place=place)
 
 
