@@ -166,9 +166,11 @@ def _drawn(study: Study, found: Cases) -> dict[str, Any]:
 
 
 def _columns(study: Study, found: Cases) -> Iterator[Column]:
-    """The number of the case, what varies, the requirements, the results, and how it ended."""
+    """The number of the case and how it ended, what varies, the requirements, the results, and why it failed."""
     count, answered = len(found.answers), found.answers
     yield Column("case", np.arange(1, count + 1), "", "number of the case")
+    codes = np.array([each.exit_code for each in answered])
+    yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
     for place, name in enumerate(name for name, _ in found.cases[0].changes):
         values = [case.changes[place][1] for case in found.cases[:count]]
         yield Column(name, _array(values), unit_of(study, name), "varied")
@@ -181,10 +183,8 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     for k, wanted in enumerate(found.wanted):
         numbers = [each.numbers[k] for each in answered]
         unit = next((each.unit for each in numbers if each.unit), "")
-        yield Column(wanted.title, np.array([each.value for each in numbers]), unit, "result")
+        yield Column(wanted.title, np.array([each.value for each in numbers]), unit, "chosen result")
     yield Column("warnings", np.array([len(each.warnings) for each in answered]), "", "number of warnings")
-    codes = np.array([each.exit_code for each in answered])
-    yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
     yield Column("reason", np.array([each.failed for each in answered]), "", "why the case failed")
 
 
