@@ -83,6 +83,14 @@ def test_run_answers_the_matrix_of_a_study(study, invoke):
     assert wrong.exit_code == 2
 
 
+def test_github_shows_requirements_that_cases_do_not_meet(study, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    done = invoke("run", "press.yaml", "--no-plots", "--set", f"matrix.vary={{{R}: [20, 30]}}")
+    assert done.exit_code == 1
+    assert "::error file=press.yaml,line=9,col=16::" in done.stderr
+    assert "1 of 2 cases do not meet it" in done.stderr
+
+
 def test_options_are_in_place_of_the_matrix_of_the_study(study, invoke):
     matrix = f"matrix: {{vary: {{{R}: '20:30'}}, method: sobol, samples: 8, results: [kinematics.B.x.max]}}\n"
     (study / "press.yaml").write_text(STUDY + matrix)
