@@ -159,3 +159,20 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
     assert len(computed) == 3
     for column in whole.columns:
         np.testing.assert_array_equal(again[column.name], column.values)
+
+
+def test_pictures_show_means_ranges_limits_and_cases_that_miss_them():
+    result = mechdesign.sweep(study_of({"vary": {R: [25, 35, 45], L: [100, 120]}}))
+    swing = np.degrees(np.arcsin([[r / length for length in (100, 120)] for r in (25, 35, 45)]))
+    panels = result.figure("main_effects").axes
+    # Rows: the stroke, the rod's angle; columns: crank, rod.
+    over_crank, over_rod = panels[2], panels[3]
+    for axes, values in ((over_crank, swing), (over_rod, swing.T)):
+        limit, means = (line.get_ydata() for line in axes.lines)
+        np.testing.assert_allclose(means, values.mean(axis=1))
+        np.testing.assert_allclose(limit, 25)
+        bars = np.array(axes.collections[0].get_segments())[:, :, 1]
+        np.testing.assert_allclose(bars, np.stack([values.min(axis=1), values.max(axis=1)], axis=1))
+    met = (swing <= 25) & (np.array([[25], [35], [45]]) * 2 >= 70)
+    points = {line.get_marker(): len(line.get_xdata()) for line in result.figure("scatter").axes[-1].lines}
+    assert (points["o"], points["X"]) == (met.sum(), (~met).sum())

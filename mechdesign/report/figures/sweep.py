@@ -19,13 +19,15 @@ from mechdesign.study import Study
 
 # Inches.
 _MARGINS = {"left": 1.05, "right": 0.15, "bottom": 0.75}
-_TOP, _TOP_OF_LEGEND = 0.55, 0.8
+_LEGEND = 0.25  # a line of it
+_GAP = 0.1
+_NARROWEST = 0.9  # of a panel
 _ACROSS, _DOWN = 0.22, 0.22
 _TALL, _FLAT = 2.6, 1.5  # of a panel of main effects, in one row and in many
 _SQUARE = 3.6  # of a panel of scatters, at most
-# Entries, and results, that a picture has room for.
+# Entries, rows of panels, and quantities that a picture has room for.
 MOST_ENTRIES = 6
-MOST_RESULTS = 6
+MOST_ROWS = 6
 MOST_SCATTERED = 7
 # More values than that are gathered into classes of as many cases.
 MOST_VALUES = 12
@@ -100,33 +102,14 @@ def figures(study: Study, result: Result) -> Gallery:
 
 
 def main_effects(entries: Sequence[_Axis], results: Sequence[_Axis], count: int) -> Figure:
-    """A row of panels a result, a column an entry: mean and range over the cases of each value; dashed, its limits."""
-    across, down = entries[:MOST_ENTRIES], results[:MOST_RESULTS]
-    tall = max(_FLAT, _TALL / len(down))
-    figure, panels = style.page(
-        len(across) * len(down), len(across), tall, top=_TOP, across=_ACROSS, down=_DOWN, **_MARGINS
-    )  # fmt: skip
-    room = panels[0].get_position().width * style.width()
-    for k, axes in enumerate(panels):
-        row, column = divmod(k, len(across))
-        entry, number = across[column], down[row]
-        groups = [(x, number.values[which & np.isfinite(number.values)]) for x, which in entry.groups()]
-        groups = [(x, values) for x, values in groups if values.size]
-        places = np.array([x for x, _ in groups])
-        means = np.array([values.mean() for _, values in groups])
-        low = np.array([values.min() for _, values in groups])
-        high = np.array([values.max() for _, values in groups])
-        _limits(axes, number, upright=False)
-        axes.vlines(places, low, high, color=style.SKY, linewidth=4.0, zorder=2)
-        dashes = "none" if entry.words else "-"
-        axes.plot(places, means, "o", color=style.BLUE, markersize=4, linestyle=dashes, linewidth=1.2, zorder=3)
-        axes.set_xlim(*entry.span())
-        axes.set_ylim(*number.span())
-        _ticks(axes, entry, number, outer_x=row == len(down) - 1, outer_y=column == 0)
-        if row == len(down) - 1:
-            axes.set_xlabel(entry.label(room + _ACROSS / 2), fontsize=_NAME)
-        if column == 0:
-            axes.set_ylabel(number.label(tall), fontsize=_NAME)
+    """A row of panels a result, a column an entry: mean and range over the cases of each value; dashed, its limits.
+
+    Where there is no room for all entries side by side, the rest stands below.
+    """
+    across = entries[:MOST_ENTRIES]
+    columns = min(len(across), _fitting())
+    blocks = [across[k : k + columns] for k in range(0, len(across), columns)]
+    down = results[: max(1, MOST_ROWS // len(blocks))]
     alone = all(which.sum() == 1 for each in across for _, which in each.groups())
     gathered = any(len(np.unique(each.values)) > MOST_VALUES for each in across)
     by = f"value, many values in {CLASSES} classes of as many cases" if gathered else "value"
@@ -134,22 +117,74 @@ def main_effects(entries: Sequence[_Axis], results: Sequence[_Axis], count: int)
     words = f"main effects over {counted(count, 'case')}: {shown}"
     if any(each.limits for each in down):
         words += "; grey: not met"
-    _title(figure, words + _without(down, count) + _left(entries, across, "entries") + _left(results, down, "results"))
+    words += _without(down, count) + _left(entries, across, "entries") + _left(results, down, "results")
+    title, top = _title(words)
+    tall = max(_FLAT, _TALL / len(down))
+    # Below each block of several stand its names.
+    gap = _DOWN if len(blocks) == 1 else _MARGINS["bottom"]
+    figure, panels = style.page(
+        columns * len(down) * len(blocks), columns, tall, top=top, across=_ACROSS, down=gap, **_MARGINS
+    )  # fmt: skip
+    figure.text(0.01, 1 - 0.08 / figure.get_figheight(), title, va="top", fontsize=_TITLE)
+    room = panels[0].get_position().width * style.width()
+    for k, axes in enumerate(panels):
+        row, column = divmod(k, columns)
+        block, number = blocks[row // len(down)], down[row % len(down)]
+        if column >= len(block):
+            axes.remove()
+            continue
+        named = len(blocks) > 1 or row == len(down) - 1
+        _effect(axes, block[column], number)
+        _ticks(axes, block[column], number, outer_x=named, outer_y=column == 0)
+        if named:
+            axes.set_xlabel(block[column].label(room + _ACROSS / 2), fontsize=_NAME)
+        if column == 0:
+            axes.set_ylabel(number.label(tall), fontsize=_NAME)
     return figure
+
+
+def _effect(axes: Axes, entry: _Axis, number: _Axis) -> None:
+    """Mean and range of a result over the cases of each value of an entry."""
+    groups = [(x, number.values[which & np.isfinite(number.values)]) for x, which in entry.groups()]
+    groups = [(x, values) for x, values in groups if values.size]
+    places = [x for x, _ in groups]
+    _limits(axes, number, upright=False)
+    low, high = ([end(values) for _, values in groups] for end in (np.min, np.max))
+    axes.vlines(places, low, high, color=style.SKY, linewidth=2.5 if style.narrow() else 4.0, zorder=2)
+    axes.plot(
+        places, [values.mean() for _, values in groups], "o", color=style.BLUE, markersize=3 if style.narrow() else 4,
+        linestyle="none" if entry.words else "-", linewidth=1.2, zorder=3,
+    )  # fmt: skip
+    axes.set_xlim(*entry.span())
+    axes.set_ylim(*number.span())
 
 
 def scatter(entries: Sequence[_Axis], results: Sequence[_Axis], table: Table, *, required: bool) -> Figure:
     """Every two of the entries and results against another, a point a case; those that do not meet a limit marked."""
-    taken = [*entries[: MOST_SCATTERED - 1]]
-    taken += results[: MOST_SCATTERED - len(taken)]
+    most = min(MOST_SCATTERED, _fitting() + 2)
+    taken = [*entries[: most - 1]]
+    taken += results[: most - len(taken)]
     size = len(taken) - 1
     side = min(_SQUARE, (style.width() - _MARGINS["left"] - _MARGINS["right"] - (size - 1) * _ACROSS) / size)
-    figure, panels = style.page(size * size, size, side, top=_TOP_OF_LEGEND, across=_ACROSS, down=_DOWN, **_MARGINS)
-    room = panels[0].get_position().width * style.width()
     codes = table["exit_code"]
-    kinds = [
-        (_MET if required else ("answered", *_MET[1:]), codes == 0), (_MISSED, codes == 1), (_FAILED, codes > 1),
-    ]  # fmt: skip
+    met = _MET if required else ("answered", *_MET[1:])
+    kinds = [(*kind, which) for kind, which in ((met, codes == 0), (_MISSED, codes == 1), (_FAILED, codes > 1))]
+    kinds = [kind for kind in kinds if kind[-1].any()]
+    limits = "; grey: not met" if any(each.limits for each in taken) else ""
+    told = _left(entries, taken, "entries") + _left(results, taken, "results")
+    title, top = _title(f"cases: every two quantities against each other{limits}{told}")
+    columns = 1 if style.narrow() else len(kinds)
+    legend = top
+    top += _LEGEND * -(-len(kinds) // columns)
+    figure, panels = style.page(size * size, size, side, top=top, across=_ACROSS, down=_DOWN, **_MARGINS)
+    figure.text(0.01, 1 - 0.08 / figure.get_figheight(), title, va="top", fontsize=_TITLE)
+    for words, color, marker, which in kinds:
+        label = f"{words} ({counted(int(which.sum()), 'case')})"
+        panels[0].plot([], [], marker, color=color, markersize=6, linestyle="none", label=label)
+    place = (0.0, 1 - (legend - _GAP) / figure.get_figheight())
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="upper left", bbox_to_anchor=place, ncols=columns,
+                  borderaxespad=0.0)  # fmt: skip
+    room = panels[0].get_position().width * style.width()
     for k, axes in enumerate(panels):
         row, column = divmod(k, size)
         if column > row:
@@ -158,10 +193,10 @@ def scatter(entries: Sequence[_Axis], results: Sequence[_Axis], table: Table, *,
         x, y = taken[column], taken[row + 1]
         _limits(axes, x, upright=True)
         _limits(axes, y, upright=False)
-        for (_, color, marker), which in kinds:
+        for _, color, marker, which in kinds:
             axes.plot(
-                x.values[which], y.values[which], marker, color=color, markersize=4.5, markeredgewidth=0.4,
-                markeredgecolor="white", linestyle="none", zorder=3,
+                x.values[which], y.values[which], marker, color=color, markersize=3 if style.narrow() else 4.5,
+                markeredgewidth=0.4, markeredgecolor="white", linestyle="none", zorder=3,
             )  # fmt: skip
         axes.set_xlim(*x.span())
         axes.set_ylim(*y.span())
@@ -170,17 +205,13 @@ def scatter(entries: Sequence[_Axis], results: Sequence[_Axis], table: Table, *,
             axes.set_xlabel(x.label(room + _ACROSS / 2), fontsize=_NAME)
         if column == 0:
             axes.set_ylabel(y.label(side), fontsize=_NAME)
-    for (words, color, marker), which in kinds:
-        if which.any():
-            label = f"{words} ({counted(int(which.sum()), 'case')})"
-            panels[0].plot([], [], marker, color=color, markersize=6, linestyle="none", label=label)
-    handles, labels = panels[0].get_legend_handles_labels()
-    top = 1 - 0.3 / figure.get_figheight()
-    figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.0, top), ncols=3, fontsize=_NAME)
-    limits = "; grey: not met" if any(each.limits for each in taken) else ""
-    told = _left(entries, taken, "entries") + _left(results, taken, "results")
-    _title(figure, f"cases: every two quantities against each other{limits}{told}")
     return figure
+
+
+def _fitting() -> int:
+    """Panels for which the page has room side by side."""
+    room = style.width() - _MARGINS["left"] - _MARGINS["right"]
+    return max(1, int((room + _ACROSS) / (_NARROWEST + _ACROSS)))
 
 
 def _limits(axes: Axes, of: _Axis, *, upright: bool) -> None:
@@ -201,13 +232,15 @@ def _ticks(axes: Axes, x: _Axis, y: _Axis, *, outer_x: bool, outer_y: bool) -> N
         else:
             values = np.unique(of.values[np.isfinite(of.values)])
             few = 1 < len(values) <= FEW_VALUES and not of.limits
-            axis.set_major_locator(FixedLocator(values.tolist()) if few else MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
+            round_ones = MaxNLocator(2 if style.narrow() else 4, steps=[1, 2, 2.5, 5, 10])
+            axis.set_major_locator(FixedLocator(values.tolist()) if few else round_ones)
             axis.set_tick_params(labelbottom=outer, labelleft=outer)
 
 
-def _title(figure: Figure, words: str) -> None:
+def _title(words: str) -> tuple[str, float]:
+    """A title in lines, and the room that it takes (inches)."""
     folded = style.folded(words, _TITLE, style.width() - 0.2)
-    figure.text(0.01, 1 - 0.08 / figure.get_figheight(), folded, va="top", fontsize=_TITLE)
+    return folded, style.line(_TITLE) * (folded.count("\n") + 1) + 2 * _GAP
 
 
 def _left(all_of: Sequence[_Axis], shown: Sequence[_Axis], what: str) -> str:
