@@ -9,18 +9,20 @@ MAX_JOBS = 512  # threads or processes of one command
 
 @dataclass(frozen=True)
 class Command:
-    """One question: a command, a function of the package and a section of the study file, all of its name."""
+    """One question: a command and a function of the package, both of its name."""
 
     name: str
     question: str
     answer: str
+    room: str = ""
 
     @property
     def module(self) -> str:
         """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
-        return f"mechdesign.analyses.{self.name}.analysis"
+        return f"mechdesign.{self.room or f'analyses.{self.name}'}.analysis"
 
 
+# Each has a section of its name in the study file.
 COMMANDS = {
     command.name: command
     for command in (
@@ -39,3 +41,11 @@ COMMANDS = {
         ),
     )
 }
+SWEEP = Command(
+    "sweep",
+    "Which cases meet what is required?",
+    "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
+    room="experiments",
+)
+# Of the cases of a matrix the questions above are asked.
+QUESTIONS = COMMANDS | {SWEEP.name: SWEEP}

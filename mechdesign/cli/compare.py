@@ -107,7 +107,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
 def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
     """Compute again what a manifest describes and write its tables."""
     command = content.get("command")
-    if command not in mechdesign.commands.COMMANDS:
+    if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
     if content.get("interrupted"):
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")

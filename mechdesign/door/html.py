@@ -12,7 +12,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import counted
 from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_words
 from mechdesign.mechanism.diagnosis import joints_in_words
@@ -80,7 +80,7 @@ def answer_html(
         "answer.html.j2",
         command=answer.command,
         study=study.name,
-        question=COMMANDS[answer.command].question,
+        question=QUESTIONS[answer.command].question,
         counts=[f"{what}: {count:,}" for what, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
         verdicts=shown,

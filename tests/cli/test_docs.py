@@ -15,7 +15,7 @@ from mechdesign.reference import entries, find
     [
         ("pin", "normal_in_disc: "),
         ("GII", "global isotropy index"),
-        ("--junit", "stands in: run"),
+        ("--junit", "stands in: sweep, run"),
         ("kinematics", "takes: mechdesign kinematics STUDY [OPTIONS]"),
         ("130", "interrupted"),
         ("reliability.clearances", "    radial: Mean radial clearance"),

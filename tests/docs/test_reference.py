@@ -74,6 +74,8 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     front = study_of(FIVE_BAR, "optimize.method=pareto", "optimize.evaluations=60",
                      "optimize.variables.a={from: 0.25, to: 0.27}")  # fmt: skip
     ranged = study_of(ARM)
+    cases = study_of(FOUR_BAR, "matrix={vary: {mechanism.links.rod.length: [85, 90]}, results: [kinematics.B.x.max]}",
+                     "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
     stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
     return (
         ("pieces", mechdesign.workspace(bar), bar),
@@ -83,6 +85,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         ("path", mechdesign.workspace(four), four),
         ("modes", mechdesign.kinematics(four, all_modes=True), four),
         ("centres", mechdesign.kinematics(four), four),
+        ("cases", mechdesign.sweep(cases), cases),
         ("range", mechdesign.workspace(ranged), ranged),
         ("eigen", mechdesign.stiffness(stiff), stiff),
     )
@@ -127,7 +130,7 @@ def test_no_column_of_the_reference_is_idle():
 def test_every_table_that_the_package_names_is_in_the_reference():
     named = {
         f"{call.args[0].value}.csv"
-        for folder in ("analyses", "cli")
+        for folder in ("analyses", "cli", "experiments")
         for path in (ROOT / "mechdesign" / folder).rglob("*.py")
         for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "Table"

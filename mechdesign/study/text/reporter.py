@@ -17,8 +17,6 @@ from mechdesign.study.text.units import QUANTITY, QuantityError, measure
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
-# Keys that come with a later release, wherever they stand.
-LATER = ("matrix",)
 # What is expected where pydantic says of which type an error is.
 _EXPECTED = defaultdict(
     lambda: "something else",
@@ -39,7 +37,7 @@ _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 def unknown_key(name: str, known: Iterable[str]) -> str:
     """Say that a key is not known, and which one may be meant."""
-    return "is not available in this version" if name in LATER else f"unknown key{suggestion(name, known)}"
+    return f"unknown key{suggestion(name, known)}"
 
 
 class Reporter:
