@@ -36,7 +36,7 @@ from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import check_writable, write_file, write_sketch
 from mechdesign.results import Column, Table
@@ -251,7 +251,7 @@ class Book:
             study.label,
             [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
             met=sum(verdict.met for verdict in verdicts),
-            required=len(study.requirements),
+            required=sum(len(judged_by(study, command)) for command in questions(study)),
             warnings=len({warning for given in told for warning in given.warnings}),
             drawing="" if self.options.no_plots else thumbnail(study),
             link=f"{study.label}/{pages.REPORT}",

@@ -25,7 +25,7 @@ from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
@@ -187,8 +187,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    judged = [each for each in study.requirements if command in (command_of(each), SWEEP.name)]
-    if len(verdicts) != len(judged):
+    if len(verdicts) != len(judged_by(study, command)):
         return None
     settle(directory)
     code = _exit_code(failed, verdicts, table)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import Result, Table
 from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
@@ -34,6 +35,11 @@ class Verdict:
 def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
+
+
+def judged_by(study: Study, command: str) -> list[int]:
+    """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
+    return [k for k, each in enumerate(study.requirements) if command in (command_of(each), SWEEP.name)]
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:

@@ -9,13 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
+from itertools import zip_longest
+from operator import itemgetter
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from mechdesign.commands import QUESTIONS
+from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe
 from mechdesign.report.figures import style
@@ -27,7 +29,7 @@ from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.reliability import in_words
@@ -167,17 +169,16 @@ def _hash(text: str) -> str:
 
 
 def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, Any]]:
-    """The requirements of the questions that were asked, in the order of the study, each with its verdict."""
-    by_command = {each.command: each for each in answers}
-    verdicts = {command: iter(each.verdicts) for command, each in by_command.items()}
-    rows: list[dict[str, Any]] = []
-    for requirement in study.requirements:
-        command = command_of(requirement)
-        if command in by_command:
-            verdict = next(verdicts[command], None)
-            met = verdict is not None and verdict.met
-            rows.append({"command": command, "verdict": verdict, "met": met, **_in_words(requirement)})
-    return rows
+    """The requirements of the questions that were asked, in the order of the study, each with its verdict.
+
+    Those of its cases, where they were asked, come last.
+    """
+    rows: list[tuple[bool, int, dict[str, Any]]] = []
+    for each in answers:
+        for k, verdict in zip_longest(judged_by(study, each.command), each.verdicts):
+            about = {"command": each.command, "verdict": verdict, "met": verdict is not None and verdict.met}
+            rows.append((each.command == SWEEP.name, k, about | _in_words(study.requirements[k])))
+    return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:
