@@ -11,10 +11,10 @@ from mechdesign.numerics.arrays import Floats
 # Steps, as parts of the largest; four neighbouring ones are fitted together.
 STEPS: Floats = 0.5 ** np.arange(6.0)
 _FITTED = 4
-# Powers of the step in the fits of the odd part, and of the even part less the value in the middle.
-_ODD, _EVEN = (1, 3, 5), (1, 2, 4)
-# A fit disagrees with the next wider one beyond so many of its errors.
-_DISAGREES = 3.0
+# Powers of the step in the fits of the odd part, of the even part less the value in the middle, and of one side.
+_ODD, _EVEN, _SIDE = (1, 3, 5), (1, 2, 4), (1, 2, 3)
+# Student's 97.5 % quantile of two degrees of freedom, which four steps leave a fit of two terms.
+_STUDENT = 4.303
 # A bend counts from so many of its errors on, and from this part of the slope on.
 _BEND_ERRORS, _BEND_PART = 10.0, 1e-4
 
@@ -42,8 +42,8 @@ def slope(middle: Floats, below: Floats, above: Floats, step: float) -> Slope:
     -----
     The odd part of the differences is a slope, a cubic and a fifth-order term. Four neighbouring steps are fitted with
     and without the last: what they differ by, or the rest that is left, is the error; of three sets of steps the least
-    counts. Rough values, such as counts of samples, agree by chance where the steps are small: a fit that the next
-    wider one contradicts has their difference as its error. The even part has no linear term, but at a kink.
+    counts. Rough values, such as counts of samples, agree by chance where the steps are small: two sets of steps that
+    contradict each other both have their difference as their error. The even part has no linear term, but at a kink.
     """
     rounding = np.finfo(float).eps * np.abs(np.concatenate([below, above, middle[None]])).max(axis=0, initial=0.0)
     found: list[tuple[Floats, ...]] = []
@@ -52,18 +52,20 @@ def slope(middle: Floats, below: Floats, above: Floats, step: float) -> Slope:
         low, high = below[first : first + _FITTED], above[first : first + _FITTED]
         odd = _linear(0.5 * (high - low), steps, _ODD, rounding)
         even = _linear(0.5 * (high + low) - middle, steps, _EVEN, rounding)
-        found.append((*odd, *even))
-    value, error, bend, bend_error = np.array(found).transpose(1, 0, 2)
-    wider = np.abs(np.diff(value, axis=0))
-    error[1:] = np.where(wider > _DISAGREES * error[:-1], np.maximum(error[1:], wider), error[1:])
+        sides = [_linear(sign * (side - middle), steps, _SIDE, rounding)[0] for sign, side in ((-1, low), (1, high))]
+        found.append((*odd, *even, *sides))
+    value, error, *rest = np.array(found).transpose(1, 0, 2)
+    apart = np.abs(value[:, None] - value)
+    error = np.maximum(error, np.where(apart > error[:, None] + error, apart, 0.0).max(axis=1))
     best = np.argmin(np.where(np.isnan(error), np.inf, error), axis=0)[None]
-    value, error, bend, bend_error = (np.take_along_axis(each, best, 0)[0] / step for each in
-                                      (value, error, bend, bend_error))  # fmt: skip
+    value, error, bend, bend_error, left, right = (
+        np.take_along_axis(each, best, 0)[0] / step for each in (value, error, *rest)
+    )
     kinked = (np.abs(bend) > _BEND_ERRORS * bend_error) & (np.abs(bend) > _BEND_PART * np.abs(value))
     nan = np.full_like(value, np.nan)
     return Slope(
         np.where(kinked, nan, value), np.where(kinked, nan, error),
-        np.where(kinked, value - bend, nan), np.where(kinked, value + bend, nan),
+        np.where(kinked, left, nan), np.where(kinked, right, nan),
     )  # fmt: skip
 
 
@@ -72,5 +74,5 @@ def _linear(values: Floats, steps: Floats, powers: tuple[int, ...], rounding: Fl
     full, short = (np.linalg.pinv(steps[:, None] ** np.array(some)) for some in (powers, powers[:-1]))
     found = full[0] @ values
     rest = values - steps[:, None] ** np.array(powers[:-1]) @ (short @ values)
-    noise = np.sqrt((rest**2).sum(axis=0) / (len(steps) - len(powers) + 1)) + rounding
+    noise = _STUDENT * np.sqrt((rest**2).sum(axis=0) / (len(steps) - len(powers) + 1)) + rounding
     return found, np.maximum(np.abs(found - short[0] @ values), noise * np.linalg.norm(full[0]))
