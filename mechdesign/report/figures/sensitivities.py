@@ -41,6 +41,7 @@ def sensitivities_figure(table: Table) -> Figure:
     )  # fmt: skip
     for axes, rows in zip(panels, shown, strict=True):
         _panel(axes, table, rows)
+    panels[0].set_title("derivative", fontsize=_FIGURES, loc="right")
     panels[-1].set_xlabel("change of the result, in % of its size, for 1 % of the number more", fontsize=_NAME)
     cut = [f"{len(results) - len(shown)} more results"] if len(results) > len(shown) else []
     cut += ["the largest of each"] if any(len(rows) == MOST_BARS for rows in shown) else []
