@@ -29,9 +29,9 @@ from mechdesign.cli.execution import (
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS, SWEEP
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
-from mechdesign.experiments.analysis import prepared
+from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
@@ -54,11 +54,11 @@ SUMMARY = "summary.csv"  # of several studies, beside their folders
 def questions(study: Study) -> tuple[str, ...]:
     """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
 
-    Last the cases of its matrix.
+    Last what is asked of cases of the whole study.
     """
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
-    cases = [SWEEP.name] if study.matrix is not None else []
+    cases = [each.name for each in (SWEEP, SENSITIVITIES) if getattr(study, each.section or each.name) is not None]
     return (*(asked or ["kinematics"]), *cases)
 
 
@@ -135,7 +135,9 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS, goals=True)
             if study.matrix is not None:
-                prepared(study)
+                analysis.prepared(study)
+            if study.sensitivities is not None:
+                sensitivities.prepared(study)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
