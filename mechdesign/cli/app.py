@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from inspect import Parameter, Signature
 from typing import Annotated, Any
 
@@ -74,20 +74,36 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
 
                 raise typer.Exit(compare(**said))
             study, options = said.pop("study"), Options(**said)
-            if name in COMMANDS:
-                from mechdesign.cli.execution import ask
-
-                raise typer.Exit(ask(name, study, options))
-            if options.verify is not None:
-                from mechdesign.cli.compare import verify
-
-                raise typer.Exit(verify(study, options))
-            from mechdesign.cli import batch
-
-            raise typer.Exit((batch.check if name == "check" else batch.run)(study, options))
+            with _placed(options):
+                raise typer.Exit(_called(name, study, options))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, short_help=short, help=long)(command)
+
+
+def _called(name: str, study: Any, options: Options) -> int:
+    """The exit code of a command that takes studies."""
+    if name in COMMANDS:
+        from mechdesign.cli.execution import ask
+
+        return ask(name, study, options)
+    if options.verify is not None:
+        from mechdesign.cli.compare import verify
+
+        return verify(study, options)
+    from mechdesign.cli import batch
+
+    return (batch.check if name == "check" else batch.run)(study, options)
+
+
+def _placed(options: Options) -> AbstractContextManager[None]:
+    """Where great work goes."""
+    if options.executor is None:
+        return nullcontext()
+    from mechdesign.executors import named
+    from mechdesign.parallel import on
+
+    return on(named(options.executor, options.jobs))
 
 
 for _name, _asked in COMMANDS.items():
@@ -97,7 +113,7 @@ _add(
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME, given.VERIFY,
+        given.RESUME, given.VERIFY, given.EXECUTOR,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",

@@ -69,6 +69,14 @@ JOBS = _text(
     min=1,
     max=MAX_JOBS,
 )
+EXECUTOR = _text(
+    "executor",
+    str,
+    "--executor",
+    "NAME",
+    "Where great work is computed: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
+    "concurrent.futures.Executor. The results do not depend on it. Default: here.",
+)
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
@@ -148,7 +156,12 @@ TOLERANCES = _text(
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
-OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
+OWN = {
+    "kinematics": (ANIMATE, ALL_MODES, BEFORE),
+    "workspace": (BEFORE,),
+    "optimize": (RESUME_DESIGNS, EXECUTOR),
+    "reliability": (EXECUTOR,),
+}
 
 
 @dataclass(frozen=True)
@@ -165,6 +178,7 @@ class Options:
     overrides: tuple[str, ...] | None = ()
     seed: int | None = None
     jobs: int | None = None
+    executor: str | None = None
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
