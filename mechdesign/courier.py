@@ -41,11 +41,16 @@ class LostWorkerError(MechdesignError):
 
 
 class Pool:
-    """Workers of an executor, `width` of them; `open_` gives one, and another where workers were lost."""
+    """`width` workers of an executor; `open_` gives one, and another where workers were lost."""
 
     def __init__(self, open_: Callable[[], Executor], width: int) -> None:
-        self._open, self.width = open_, width
+        self._open, self._width = open_, width
         self.executor = open_()
+
+    @property
+    def width(self) -> int:
+        """Number of workers."""
+        return self._width
 
     def renew(self) -> None:
         """Take other workers, once some were lost."""
@@ -97,11 +102,10 @@ class Courier(Generic[Item, Value]):
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:
         source, left = iter(items), length_hint(items)
         tasks: deque[_Task] = deque()
-        ahead = LOOK_AHEAD * self._pool.width
         done = losses = 0
         try:
             while True:
-                while len(tasks) < ahead:
+                while len(tasks) < (ahead := LOOK_AHEAD * self._pool.width):
                     # The last tasks are short: no worker waits long for another.
                     shared = -(-left // ahead) if left > 0 else self._chunks
                     own = [*islice(source, min(self._chunks, shared))]

@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from itertools import chain
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -66,11 +67,11 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
             raise StudyError(f"--executor {name} gives no concurrent.futures.Executor, but {kind!r}")
         return executor
 
-    pool = Pool(open_, worker_count(jobs))
-    if jobs is None:
-        # Those of the standard library say it.
-        pool.width = getattr(pool.executor, "_max_workers", pool.width)
-    return pool
+    first = open_()
+    # Those of the standard library say how many workers they have.
+    width = worker_count(jobs) if jobs is not None else getattr(first, "_max_workers", worker_count(None))
+    opened = chain([first], iter(open_, None))
+    return Pool(lambda: next(opened), width)
 
 
 class _Dask(Pool):
@@ -78,7 +79,7 @@ class _Dask(Pool):
 
     def __init__(self, name: str, address: str, jobs: int | None) -> None:
         try:
-            from distributed import Client, LocalCluster
+            distributed: Any = importlib.import_module("distributed")
         except ImportError:
             message = "needs dask, which is not installed: pip install 'mechdesign[cluster]'"
             raise StudyError(f"--executor {name} {message}") from None
@@ -86,12 +87,12 @@ class _Dask(Pool):
         try:
             if address == LOCAL:
                 with _deaf():
-                    self._cluster = LocalCluster(
+                    self._cluster = distributed.LocalCluster(
                         n_workers=worker_count(jobs), threads_per_worker=1, dashboard_address=None, silence_logs=50
                     )
             else:
                 _knock(address)
-            self._client: Any = Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
+            self._client: Any = distributed.Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
         except (OSError, ValueError, RuntimeError) as error:
             self._end()
             raise StudyError(f"--executor {name}: no scheduler answers there: {error}") from None
@@ -101,20 +102,16 @@ class _Dask(Pool):
             self.close()
             message = f"the scheduler has no workers after {counted(_FIRST_WORKER, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
-        self._counted = 0.0
-        super().__init__(lambda: self._client.get_executor(pure=False), 1)
+        self._counted, self._threads = -_RECOUNT, 1
+        self.executor = self._client.get_executor(pure=False)
 
     @property
     def width(self) -> int:
         """Number of threads of the workers, which come and go."""
         if time.monotonic() - self._counted > _RECOUNT:
-            self._width = max(1, sum(self._client.nthreads().values()))
+            self._threads = max(1, sum(self._client.nthreads().values()))
             self._counted = time.monotonic()
-        return self._width
-
-    @width.setter
-    def width(self, width: int) -> None:
-        self._width = width
+        return self._threads
 
     def renew(self) -> None:
         """The scheduler takes other workers itself."""
@@ -132,8 +129,10 @@ class _Dask(Pool):
 def _knock(address: str) -> None:
     """Whether anybody answers, found out sooner than by a client that tries again and again."""
     place = urlsplit(address if "://" in address else f"tcp://{address}")
-    with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS):
-        pass
+    with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS) as stream:
+        # A scheduler speaks first.
+        if place.scheme == "tcp" and not stream.recv(1):
+            raise OSError("it does not answer as one")
 
 
 @contextmanager
