@@ -149,7 +149,7 @@ def on(pool: Pool) -> Iterator[None]:
 
 
 @contextmanager
-def divided(share: Share) -> Iterator[None]:
+def divided(share: Share | None) -> Iterator[None]:
     """Inside, the values of great work are what a function gives: from its name, a map, and the items of that."""
     before = _division.set(share)
     try:
@@ -158,13 +158,33 @@ def divided(share: Share) -> Iterator[None]:
         _division.reset(before)
 
 
-def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
-    """A value of divided work: what it asks of other great work is its own."""
-    before = _division.set(None)
+class Divided(BaseException):
+    """Great work ends without its values, of which others compute a part."""
+
+
+@contextmanager
+def apart(left: list[Divided]) -> Iterator[None]:
+    """Inside, work may be divided without an end to what follows, which does not depend on it; `left` tells of it."""
     try:
-        return function(item)
+        yield
+    except Divided as error:
+        left.append(error)
+
+
+@contextmanager
+def here() -> Iterator[None]:
+    """Inside, no work goes elsewhere or is divided."""
+    pool, division = _pool.set(None), _division.set(None)
+    try:
+        yield
     finally:
-        _division.reset(before)
+        _pool.reset(pool)
+        _division.reset(division)
+
+
+def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
+    with here():
+        return function(item)
 
 
 def _name(function: Any) -> str:

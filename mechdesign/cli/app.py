@@ -13,7 +13,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, MERGE
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -73,7 +73,7 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
                 from mechdesign.cli.compare import compare
 
                 raise typer.Exit(compare(**said))
-            study, options = said.pop("study"), Options(**said)
+            study, options = said.pop("study"), Options(command=name, **said)
             with _placed(options):
                 raise typer.Exit(_called(name, study, options))
 
@@ -113,10 +113,20 @@ _add(
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME, given.VERIFY, given.EXECUTOR,
+        given.RESUME, given.VERIFY, given.EXECUTOR, given.SHARD,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
+)  # fmt: skip
+_add(
+    MERGE,
+    (
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.EXECUTOR,
+    ),
+    "Put together what runs with --shard computed.",
+    "Put together what runs with --shard computed: what a run without it gives, byte by byte. Options that change "
+    "numbers, such as --set and --seed, and --out are given again.",
 )  # fmt: skip
 _add(
     "check",
