@@ -36,6 +36,7 @@ from mechdesign.errors import Interrupted, OutputError, StudyError, counted, pri
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
+from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee
 from mechdesign.report.tables import to_csv
@@ -192,6 +193,8 @@ def _places(study: Study, root: Path, options: Options) -> list[tuple[str, Path]
         return found
     if alone := shards.found(root):
         return [(shards.command_of(alone[0]), root)]
+    if (done := manifest.read(root)) is not None and done.get("command") in COMMANDS:
+        return [(done["command"], root)]
     begun = [(command, directory) for command, directory in found if shards.found(directory)]
     given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
     return found if not begun or "run" in given else begun
@@ -289,10 +292,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (
-            str,
-            lambda given: OUTCOMES[given.exit_code] + " (kept)" * given.kept + f" ({given.shard})" * bool(given.shard),
-        ),
+        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),

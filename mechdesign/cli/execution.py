@@ -131,6 +131,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     elif merging:
+        # A mistake of the study is why there are none.
+        requirements.foresee(study, [command])
         raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
@@ -184,6 +186,10 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     except Interrupted:
         # A part of a part is nothing.
         raise KeyboardInterrupt from None
+    except MechdesignError:
+        # Merge comes to the same, and tells it.
+        taken.write(directory, origin, options.command)
+        raise
     taken.write(directory, origin, options.command)
     seconds = time.perf_counter() - begun
     return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
