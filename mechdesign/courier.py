@@ -27,7 +27,7 @@ Value = TypeVar("Value")
 # all in memory.
 LOOK_AHEAD = 3
 # Length of a task, in seconds, and how many times as many chunks as the one before it has at most.
-_SECONDS = 0.5
+_SECONDS = 1.0
 _GROWTH = 8
 # Bytes of a function that go along with every task, and longer functions that a worker keeps.
 _SHORT = 20_000
@@ -83,7 +83,7 @@ class Courier(Generic[Item, Value]):
     """An ordered map on the workers of a pool: `function` takes a list of items and gives a list of values.
 
     At most ``3 * width`` tasks are under way or waiting to be consumed; chunks are put together so that a task takes
-    about half a second. Chunks of lost workers are computed again.
+    about a second. Chunks of lost workers are computed again.
 
     Raises
     ------

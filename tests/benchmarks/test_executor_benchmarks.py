@@ -32,10 +32,8 @@ def arm(samples: int) -> Any:
 
 def generator(designs: int) -> Any:
     each = round(designs**0.5)
-    bounds = "{rod.length: {from: 80, to: 90, number: %d}, rocker.length: {from: 55, to: 65, number: %d}}" % (
-        each,
-        each,
-    )
+    spread = f"{{from: 80, to: 90, number: {each}}}"
+    bounds = f"{{rod.length: {spread}, ground.D.x: {spread}}}"
     text = f"""
     mechanism:
       links: {{ground: {{O: [0, 0], D: [100, 0]}}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}}
