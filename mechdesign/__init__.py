@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from mechdesign.door.questions import load as load
     from mechdesign.door.questions import optimize as optimize
     from mechdesign.door.questions import reliability as reliability
+    from mechdesign.door.questions import sensitivities as sensitivities
     from mechdesign.door.questions import stiffness as stiffness
     from mechdesign.door.questions import sweep as sweep
     from mechdesign.door.questions import workspace as workspace

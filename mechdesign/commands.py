@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 MAX_JOBS = 512  # threads or processes of one command
+MERGE = "merge"  # the command that puts shards together
+DIVIDED = ("optimize", "reliability", "sweep")  # commands whose work can be divided into shards
 
 
 @dataclass(frozen=True)
@@ -14,12 +16,13 @@ class Command:
     name: str
     question: str
     answer: str
-    room: str = ""
+    room: str = ""  # empty: that of the analysis of its name
+    section: str = ""  # of the study; empty: that of its name
 
     @property
     def module(self) -> str:
         """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
-        return f"mechdesign.{self.room or f'analyses.{self.name}'}.analysis"
+        return f"mechdesign.{self.room or f'analyses.{self.name}.analysis'}"
 
 
 # Each has a section of its name in the study file.
@@ -45,7 +48,14 @@ SWEEP = Command(
     "sweep",
     "Which cases meet what is required?",
     "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
-    room="experiments",
+    room="experiments.analysis",
+    section="matrix",
 )
-# Of the cases of a matrix the questions above are asked.
-QUESTIONS = COMMANDS | {SWEEP.name: SWEEP}
+SENSITIVITIES = Command(
+    "sensitivities",
+    "What does each number change?",
+    "Derivatives of chosen results with respect to numbers of the study, with error estimates.",
+    room="experiments.sensitivities",
+)
+# Of their cases the questions above are asked.
+QUESTIONS = COMMANDS | {SWEEP.name: SWEEP, SENSITIVITIES.name: SENSITIVITIES}

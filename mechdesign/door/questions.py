@@ -382,6 +382,51 @@ def sweep(
     return _ask("sweep", study, seed, jobs=jobs, progress=progress, journal=journal)
 
 
+def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
+    """What does each number change? Derivatives of results with respect to numbers of the study.
+
+    Parameters
+    ----------
+    study : Study
+        With a section ``sensitivities``: results, and the numbers that change.
+    seed : int, optional
+        Of the random numbers, in place of the study's, the same in every case; 0 is a seed.
+    jobs : int or None
+        Processes, a case each; None uses every processor. The result does not depend on them.
+    progress : Progress
+        Is told how far the computation is.
+
+    Returns
+    -------
+    Answer
+        Table ``sensitivities``: a row a result and number, with derivative, error estimate, unit and elasticity. At a
+        kink the derivative is nan, and the slopes on both sides are given.
+
+    Raises
+    ------
+    StudyError
+        If there is no such section, a name is unknown, or what is to change is no number; nothing was computed.
+
+    Examples
+    --------
+    The stroke of a slider-crank is twice its crank, whatever its rod.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism:
+    ...   parameters: {r: 30, l: 100}
+    ...   links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
+    ...   joints: {guide: {prismatic: [ground, slider], through: O}}
+    ...   drives: [crank]
+    ...   sketch: {A: [0, 30], B: [95, 0]}
+    ... sensitivities: {results: [kinematics.extremes.B.x.range], parameters: [r, l]}
+    ... ''')
+    >>> mechdesign.sensitivities(study).main["derivative"].round(6) + 0.0
+    array([2., 0.])
+    """
+    return _ask("sensitivities", study, seed, jobs=jobs, progress=progress)
+
+
 def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
     """A command's answer, which knows its study."""
     answer = getattr(import_module(QUESTIONS[command].module), command)

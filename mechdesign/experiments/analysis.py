@@ -212,7 +212,11 @@ def requirement_names(study: Study) -> list[str]:
 
 def unit_of(study: Study, name: str) -> str:
     """Unit of an entry, where it is a parameter or a number of the geometry; else nothing, or what the study says."""
-    section, *path = entry(study.resolved, name)
+    keys = entry(study.resolved, name)
+    for k in range(len(keys), 0, -1):
+        if keys[:k] in study.kinds:
+            return study.units.label(study.kinds[keys[:k]])
+    section, *path = keys
     if section != "mechanism" or len(path) < 2:
         return ""
     kind, owner, *rest = path

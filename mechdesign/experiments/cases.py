@@ -26,6 +26,8 @@ from mechdesign.study.text.document import Document, KeyPath, Mark
 
 # What is told of the rows of a result, by the word after its name.
 STATISTICS: Mapping[str, Callable[[Floats], Any]] = {"min": np.min, "max": np.max, "mean": np.mean, "range": np.ptp}
+# Sections that a case has not.
+_OF_CASES = ("matrix", "sensitivities")
 # Exit code of a case that the mechanism, or what the case says of it, makes impossible.
 IMPOSSIBLE = 3
 
@@ -140,7 +142,7 @@ def answers(
     Every question that one of them needs is answered once a case, with the study's seed. What cannot be loaded or
     answered says why in `Answered.failed`.
     """
-    yield from map_chunks(Answer(study, tuple(wanted)), cases, jobs, processes=True)
+    yield from map_chunks(Answer(study, tuple(wanted)), cases, jobs, processes=True, travels=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +212,7 @@ def variant(study: Study, case: Case) -> Study:
     StudyError
         If the entries make no study; every mistake in one go.
     """
-    data = copy.deepcopy({key: value for key, value in study.resolved.items() if key != "matrix"})
+    data = copy.deepcopy({key: value for key, value in study.resolved.items() if key not in _OF_CASES})
     document = Document("", data, values={(): Mark("")})
     override(document, case.overrides)
     drawn = data["mechanism"].get("sketch") == study.resolved["mechanism"].get("sketch")

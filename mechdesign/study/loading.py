@@ -35,6 +35,7 @@ from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, entry, override
 from mechdesign.study.schema.targets import Target
@@ -81,8 +82,10 @@ class Study:
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
     matrix: MatrixSection | None
+    sensitivities: SensitivitiesSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
+    kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
@@ -268,8 +271,10 @@ def load_document(
         parameters=parameters,
         **{command: parts.get(command) for command in COMMANDS},
         matrix=parts.get("matrix"),
+        sensitivities=parts.get("sensitivities"),
         requirements=parts["requirements"],
         targets=parts["targets"],
+        kinds=reporter.kinds,
         folder=folder,
         warnings=tuple(reporter.warnings),
     )
@@ -349,6 +354,8 @@ def _checked(checker: Checker) -> dict[str, Any]:
     if "matrix" in found:
         found["matrix"].checked(checker)
         _check_varied(found["matrix"], checker)
+    if "sensitivities" in found:
+        found["sensitivities"].checked(checker)
     found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
 

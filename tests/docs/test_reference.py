@@ -76,6 +76,9 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     ranged = study_of(ARM)
     cases = study_of(FOUR_BAR, "matrix={vary: {mechanism.links.rod.length: [85, 90]}, results: [kinematics.B.x.max]}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
+    slopes = study_of(
+        FOUR_BAR, "sensitivities={results: [kinematics.B.x.max], parameters: [mechanism.links.rod.length]}"
+    )
     stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
     return (
         ("pieces", mechdesign.workspace(bar), bar),
@@ -86,6 +89,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         ("modes", mechdesign.kinematics(four, all_modes=True), four),
         ("centres", mechdesign.kinematics(four), four),
         ("cases", mechdesign.sweep(cases), cases),
+        ("slopes", mechdesign.sensitivities(slopes), slopes),
         ("range", mechdesign.workspace(ranged), ranged),
         ("eigen", mechdesign.stiffness(stiff), stiff),
     )

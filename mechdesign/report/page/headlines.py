@@ -81,6 +81,7 @@ _RULES: dict[str, tuple[_Rule, ...]] = {
         _Rule("deflections", "d[xy]", "largest deflection {name}", "size"),
     ),
     "sweep": (),
+    "sensitivities": (),
 }  # fmt: skip
 
 

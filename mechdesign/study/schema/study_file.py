@@ -12,6 +12,7 @@ from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
 from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
@@ -35,6 +36,7 @@ class StudyFile(fields.Model):
     reliability: ReliabilitySection | None = None
     stiffness: StiffnessSection | None = None
     matrix: MatrixSection | None = None
+    sensitivities: SensitivitiesSection | None = None
     requirements: tuple[Requirement, ...] = ()
     """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts. Example: [{result:
     kinematics.mu, abs: true, at_least: 40}, {result: reliability.reliability, where: {method: monte_carlo}, at_least:

@@ -48,6 +48,7 @@ class Reporter:
         # In the order found, each once.
         self._problems = dict.fromkeys(document.problems)
         self.warnings: list[Problem] = []
+        self.kinds: dict[KeyPath, str] = {}
 
     @property
     def problems(self) -> list[Problem]:
@@ -79,6 +80,7 @@ class Reporter:
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        self.kinds[path] = kind
         for keys, raw in leaves(self.raw(path)):
             if isinstance(raw, str) and QUANTITY.fullmatch(raw):
                 try:
