@@ -8,7 +8,8 @@ from __future__ import annotations
 import difflib
 import re
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -62,17 +63,20 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return folded[close[0]] if close else None
 
 
-def printable(text: str) -> str:
+def printable(text: str, escape: Callable[[str], str] = ascii) -> str:
     """A text in one line, without characters that a terminal, an XML or a CSV file would take for more than letters.
 
-    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``.
+    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``; `escape` gives one with
+    a quotation mark on either side.
     """
-    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else escape(c)[1:-1] for c in text)
 
 
-def printable_lines(text: str) -> str:
+def printable_lines(text: str, escape: Callable[[str], str] = ascii) -> str:
     """The same of a text of several lines, which it keeps."""
-    return "\n".join(map(printable, text.split("\n")))
+    return "\n".join(printable(line, escape) for line in text.split("\n"))
 
 
 def cut(text: str, most: int = MAX_ECHO) -> str:

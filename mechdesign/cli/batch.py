@@ -151,7 +151,7 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             studies.append(load_study(path, options))
         except Exception as error:
-            yield book.missing(_failure(path.stem if path else "study", "check", Path(), error))
+            yield book.missing(_failure(printable(path.stem) if path else "study", "check", Path(), error))
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label

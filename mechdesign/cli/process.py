@@ -50,9 +50,9 @@ class Signals:
     """Interrupts, terminations and hang-ups are all a KeyboardInterrupt, at the first place that is fit for one.
 
     Inside an import or a finaliser it would be lost or become another error, and what blocks signals is not to be
-    disturbed though another thread lets them in. A signal that was ignored from the start
-    (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of ``timeout``, which
-    sends it to the process and to its group.
+    disturbed though another thread lets them in; one that is lost in a library is tried again. A signal that was
+    ignored from the start (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of
+    ``timeout``, which sends it to the process and to its group.
     """
 
     def __init__(self) -> None:
@@ -62,6 +62,7 @@ class Signals:
             signal.signal(each, self._hear)
         if hasattr(signal, "SIGALRM"):
             signal.signal(signal.SIGALRM, self._interrupt)
+            sys.unraisablehook = self._lost
 
     def hear(self) -> None:
         """Let through what has waited since the process began."""
@@ -79,6 +80,12 @@ class Signals:
         if self.number is None or number == signal.SIGINT:
             self.number = self.number or number
             self._interrupt(number, frame)
+
+    def _lost(self, error: sys.UnraisableHookArgs) -> None:
+        if isinstance(error.exc_value, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, _RETRY)
+        else:
+            sys.__unraisablehook__(error)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if hasattr(signal, "SIGALRM") and (_blocked() or _unfit(frame)):

@@ -14,7 +14,7 @@ from typing import Any
 
 from mechdesign.files import proper
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import plain
+from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
 
@@ -85,7 +85,7 @@ def compose(
             "files": dict(files),
         }
     )
-    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+    return (json_text(content, indent=2) + "\n").encode()
 
 
 def read(directory: Path) -> dict[str, Any] | None:

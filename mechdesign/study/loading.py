@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -92,7 +92,9 @@ class Study:
     @property
     def label(self) -> str:
         """The name of its folder of results, that of its file or else its own."""
-        return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        return (
+            printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        )
 
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"

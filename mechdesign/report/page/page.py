@@ -26,7 +26,7 @@ from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
-from mechdesign.report.page.pages import GENERATOR
+from mechdesign.report.page.pages import GENERATOR, harmless
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
@@ -138,7 +138,7 @@ def thumbnail(study: Study) -> str:
 
 def _page(template: str, *, moving: bool, **content: Any) -> bytes:
     environment = Environment(
-        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
+        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
