@@ -196,11 +196,24 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(result.interrupted)
 
 
+# What libraries say where memory runs out while they are loaded, or begin a thread.
+_NO_MEMORY = ("failed to map segment", "Cannot allocate memory", "can't start new thread")
+
+
+def _out_of_memory(error: BaseException | None) -> bool:
+    """Whether it came of a lack of memory, also where clearing up failed after it."""
+    while error is not None:
+        if isinstance(error, MemoryError) or any(text in str(error) for text in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
 def explain(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; what nobody foresaw asks to be reported."""
     if isinstance(error, MechdesignError):
         return error.exit_code, printable_lines(str(error))
-    if isinstance(error, MemoryError):
+    if _out_of_memory(error):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
     if "BrokenExecutor" in [kind.__name__ for kind in type(error).__mro__]:
         return 4, "a process that computed was killed, as where memory runs out; use fewer --jobs"

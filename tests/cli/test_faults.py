@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.errors import explain
 from mechdesign.files import Transaction
 from mechdesign.results import Column, Result, Table
 
@@ -341,6 +342,49 @@ def test_a_poor_environment(here):
     manifest = json.loads((here / "aus/größe/größe/kinematics/manifest.json").read_text(encoding="utf-8"))
     assert manifest["study"]["name"] == "Größe → µm"
     assert any(name.endswith(".png") for name in manifest["files"])
+
+
+def test_a_limit_of_memory(here, invoke):
+    """Nine million poses in 0.45 GB: a message, and what was there before."""
+    arguments = ("kinematics", "slider.yaml", "--no-plots", "--out", "out")
+    assert invoke(*arguments).exit_code == 0
+    old = contents(here / "out")
+
+    def little():
+        resource.setrlimit(resource.RLIMIT_AS, (450_000_000, 450_000_000))
+
+    great = ["--set", "kinematics.sweep.theta={from: 0, to: 90, number: 9000000}"]
+    done = subprocess.run(
+        [*COMMAND, *arguments, *great], capture_output=True, text=True, preexec_fn=little, check=False
+    )
+    assert done.returncode == 4
+    assert done.stderr.startswith("not enough memory for this")
+    assert contents(here / "out") == old
+
+
+def lacking(error):
+    """An error that clearing up met after memory ran out."""
+    try:
+        raise error
+    except Exception:
+        try:
+            raise ValueError("I/O operation on closed file.")
+        except ValueError as second:
+            return second
+
+
+@pytest.mark.parametrize(
+    ("error", "known"),
+    [
+        (lacking(MemoryError()), True),
+        (lacking(KeyError("x")), False),
+        (ImportError("libopenblas.so: failed to map segment from shared object"), True),
+        (RuntimeError("can't start new thread"), True),
+        (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), True),
+    ],
+)
+def test_a_lack_of_memory_is_known_whoever_meets_it(error, known):
+    assert explain(error)[1].startswith("not enough memory" if known else "internal error")
 
 
 def test_places_that_are_no_folders(here, invoke):
