@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign import shards
 from mechdesign.cli import terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.docs import explained
@@ -25,17 +26,20 @@ from mechdesign.cli.execution import (
     folder,
     interrupted,
     load_study,
+    place,
     tell,
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
+from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
+from mechdesign.report import manifest
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import check_writable, write_file, write_sketch
 from mechdesign.results import Column, Table
@@ -51,10 +55,14 @@ SUMMARY = "summary.csv"  # of several studies, beside their folders
 
 
 def questions(study: Study) -> tuple[str, ...]:
-    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
+    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
+
+    Last what is asked of cases of the whole study.
+    """
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
-    return tuple(asked) or ("kinematics",)
+    cases = [each.name for each in (SWEEP, SENSITIVITIES) if getattr(study, each.section or each.name) is not None]
+    return (*(asked or ["kinematics"]), *cases)
 
 
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
@@ -100,7 +108,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
         terminal.say("interrupted; what was finished is whole")
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     if options.junit is not None:
-        book.file(options.junit, _junit(answers).encode())
+        book.file(options.junit, junit(answers).encode())
     summary = _summary(answers)
     if book.several and any(given.written for given in answers):
         book.file((options.out or RESULTS) / SUMMARY, to_csv(summary).encode())
@@ -129,6 +137,10 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS, goals=True)
+            if study.matrix is not None:
+                analysis.prepared(study)
+            if study.sensitivities is not None:
+                sensitivities.prepared(study)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
@@ -151,35 +163,50 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             studies.append(load_study(path, options))
         except Exception as error:
-            yield book.missing(_failure(printable(path.stem) if path else "study", "check", Path(), error))
+            yield book.missing(failure(printable(path.stem) if path else "study", "check", Path(), error))
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label
+        root = folder(study, "", options, several=len(paths) > 1)
         try:
             claim(owners, study)
+            asked = _places(study, root, options)
         except StudyError as error:
-            yield book.missing(_failure(label, "check", Path(), error, study))
+            yield book.missing(failure(label, "check", Path(), error, study))
             continue
-        root = folder(study, "", options, several=len(paths) > 1)
         told: list[Outcome] = []
         try:
-            for command in questions(study):
+            for command, directory in asked:
                 try:
-                    check_writable(root / command)
-                    with owned(root / command):
-                        given = replace(answer(study, command, root / command, options), result=None)
+                    check_writable(directory)
+                    with owned(directory):
+                        given = replace(answer(study, command, directory, options), result=None)
                     tell(given, options)
                     annotate("error", of_verdicts(study, command, given.verdicts))
                     annotate("warning", of_warnings(study, command, given.warnings))
                 except KeyboardInterrupt as error:
-                    told.append(interrupted(study, command, root / command, error))
+                    told.append(interrupted(study, command, directory, error))
                     raise
                 except Exception as error:
-                    given = _failure(label, command, root / command, error, study)
+                    given = failure(label, command, directory, error, study)
                 told.append(given)
                 yield given
         finally:
             book.add(study, root, told)
+
+
+def _places(study: Study, root: Path, options: Options) -> list[tuple[str, Path]]:
+    """The questions of a study with their folders; of shards that one command computed, that alone."""
+    found = [(command, place(root / command, options)) for command in questions(study)]
+    if options.command != MERGE:
+        return found
+    if alone := shards.found(root):
+        return [(shards.command_of(alone[0]), root)]
+    if (done := manifest.read(root)) is not None and done.get("command") in COMMANDS:
+        return [(done["command"], root)]
+    begun = [(command, directory) for command, directory in found if shards.found(directory)]
+    given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
+    return found if not begun or "run" in given else begun
 
 
 class Book:
@@ -242,7 +269,7 @@ class Book:
             study.label,
             [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
             met=sum(verdict.met for verdict in verdicts),
-            required=len(study.requirements),
+            required=sum(len(judged_by(study, command)) for command in questions(study)),
             warnings=len({warning for given in told for warning in given.warnings}),
             drawing="" if self.options.no_plots else thumbnail(study),
             link=f"{study.label}/{pages.REPORT}",
@@ -253,7 +280,8 @@ class Book:
         self.exit_code = max(self.exit_code, explained(error)[0])
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+    """Say why a question has no answer; returns that as its outcome."""
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))
@@ -274,7 +302,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),
@@ -288,7 +316,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     return Table("summary", tuple(columns), meaning="what became of each question")
 
 
-def _junit(answers: Sequence[Outcome]) -> str:
+def junit(answers: Sequence[Outcome]) -> str:
     """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
 
     A requirement that is not met is a failure; whatever kept a command from its result is an error.

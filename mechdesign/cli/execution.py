@@ -13,20 +13,23 @@ from pathlib import Path
 from typing import Any
 
 import mechdesign
+from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, STYLES, Options
+from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
-from mechdesign.parallel import one_thread
+from mechdesign.parallel import Divided, divided, one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
+from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
@@ -40,6 +43,10 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
+
+
+# Commands that an interrupted run need not begin anew.
+_RESUMED = ("optimize", SWEEP.name)
 
 
 @dataclass(frozen=True)
@@ -58,6 +65,7 @@ class Outcome:
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
     result: Result | None = None
+    shard: str = ""  # what became of a part of it, where no more was asked
 
 
 def load_study(path: Path | None, options: Options) -> Study:
@@ -87,6 +95,11 @@ def folder(study: Study, name: str, options: Options, *, several: bool = False) 
     return options.out / study.label if several else options.out
 
 
+def place(directory: Path, options: Options) -> Path:
+    """The folder that a command writes in: of a shard its own, for others write at the same time."""
+    return directory if options.part is None else directory / options.part.folder
+
+
 def claim(owners: dict[str, Path | None], study: Study) -> None:
     """Take the folder of a study's name; `owners` says which file each folder belongs to.
 
@@ -108,22 +121,31 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
+    if options.part is not None:
+        return _shard(study, command, directory, options, options.part)
     begun = time.perf_counter()
     asked = extras(command, options)
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
-    if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
+    share, merging = None, options.command == MERGE and command in DIVIDED
+    if merging and shards.found(directory):
+        share = shards.merge(directory, manifest.computed_from(study, command))
+    elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
+    elif merging:
+        # A mistake of the study is why there are none.
+        requirements.foresee(study, [command])
+        raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, directory, options) if command == "optimize" else None
+    journal = _journal(study, command, directory, options) if command in _RESUMED else None
     if journal is not None:
         more["journal"] = journal
     try:
-        with terminal.Bar(quiet=options.quiet) as bar:
+        with terminal.Bar(quiet=options.quiet) as bar, divided(share):
             result: Result = getattr(mechdesign, command)(
                 study, seed=options.seed, jobs=options.jobs, progress=bar, **more
             )
@@ -141,12 +163,40 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         raise
     if journal is not None:
         journal.discard()
+    shards.remove(directory)
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
-    code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
+    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, result=result,
     )  # fmt: skip
+
+
+def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard) -> Outcome:
+    """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
+    told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
+    if command not in DIVIDED:
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
+    origin = manifest.computed_from(study, command)
+    if options.resume and shards.is_current(directory, origin):
+        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
+    requirements.foresee(study, [command])
+    taken = shards.Taken(shard)
+    try:
+        with terminal.Bar(quiet=options.quiet) as bar, divided(taken):
+            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
+    except Divided:
+        pass
+    except Interrupted:
+        # A part of a part is nothing.
+        raise KeyboardInterrupt from None
+    except MechdesignError:
+        # Merge comes to the same, and tells it.
+        taken.write(directory, origin, options.command)
+        raise
+    taken.write(directory, origin, options.command)
+    seconds = time.perf_counter() - begun
+    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
@@ -177,23 +227,24 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        rows = len(_main_table(directory))
+        table = _main_table(directory)
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+    if len(verdicts) != len(judged_by(study, command)):
         return None
     settle(directory)
-    code = _exit_code(failed, verdicts)
+    code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, rows, warnings, failed, verdicts, kept=True, written=True
+        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True
     )  # fmt: skip
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
-    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
-    return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
+def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
+    cases: list[int] = table["exit_code"].tolist() if "exit_code" in table else []
+    return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
 def _main_table(directory: Path) -> Table:
@@ -219,12 +270,12 @@ def _judged_and_written(
     return verdicts, writer.write(directory, study, result, verdicts, asked)
 
 
-def _journal(study: Study, directory: Path, options: Options) -> Journal:
-    """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
-    journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
+def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
+    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study.label}: optimize: {there}; begins anew", quiet=options.quiet)
+        terminal.say(f"{study.label}: {command}: {there}; begins anew", quiet=options.quiet)
     return journal
 
 
@@ -236,7 +287,12 @@ def tell(given: Outcome, options: Options) -> None:
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{who} {given.failed}")
+        from mechdesign.cli.docs import look_up
+
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
+    if given.shard:
+        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        return
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
@@ -274,10 +330,10 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 
 @one_thread()
-def ask(command: str, path: Path | None, options: Options) -> int:
-    """One command from end to end; returns its exit code."""
+def ask(command: str, path: Path | None, options: Options) -> Outcome:
+    """One command from end to end."""
     study = load_study(path, options)
-    directory = folder(study, command, options)
+    directory = place(folder(study, command, options), options)
     writer.check_writable(directory)
     with owned(directory):
         try:
@@ -288,7 +344,10 @@ def ask(command: str, path: Path | None, options: Options) -> int:
             raise
         if options.report:
             write_report(directory, study, [given], options)
+        if given.shard:
+            tell(given, options)
+            return given
         table = given.result.main if given.result is not None else _main_table(directory)
     terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
     tell(given, options)
-    return given.exit_code
+    return given

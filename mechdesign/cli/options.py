@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from inspect import Parameter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mechdesign.commands import MAX_JOBS
 from mechdesign.errors import StudyError
 from mechdesign.files import formats_of
+
+if TYPE_CHECKING:
+    from mechdesign.shards import Shard
 
 # Template of the study that is taken where there is none.
 BUILT_IN = "two_link_arm"
@@ -69,6 +72,22 @@ JOBS = _text(
     min=1,
     max=MAX_JOBS,
 )
+EXECUTOR = _text(
+    "executor",
+    str,
+    "--executor",
+    "NAME",
+    "Where great work is computed: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
+    "concurrent.futures.Executor. The results do not depend on it. Default: here.",
+)
+SHARD = _text(
+    "shard",
+    str,
+    "--shard",
+    "I/N",
+    "Compute the I-th of N parts of the great work alone, from 1 on, and keep it in the folder of the results; "
+    "`mechdesign merge` puts the parts together.",
+)
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
@@ -105,6 +124,33 @@ RESUME = _flag(
 )
 RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
+)
+VARY = _text(
+    "vary",
+    list[str],
+    "--vary",
+    "A.B.C=VALUES",
+    "An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of "
+    "a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.",
+)
+METHOD = _text(
+    "method", str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid."
+)
+SAMPLES = _text("samples", int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
+CASES = _text(
+    "cases",
+    Path,
+    "--cases",
+    "FILE",
+    "CSV file of cases instead of --vary: its first line names entries of the study, each line below is a case.",
+)
+RESULTS = _text(
+    "results",
+    list[str],
+    "--results",
+    "LIST",
+    "Results that are listed besides the requirements, with commas between, e.g. kinematics.mu.min,GII. Repeatable; in "
+    "place of those of the study's matrix.",
 )
 VERIFY = _text(
     "verify",
@@ -148,7 +194,12 @@ TOLERANCES = _text(
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
-OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
+OWN = {
+    "kinematics": (ANIMATE, ALL_MODES, BEFORE),
+    "workspace": (BEFORE,),
+    "optimize": (RESUME_DESIGNS, EXECUTOR, SHARD),
+    "reliability": (EXECUTOR, SHARD),
+}
 
 
 @dataclass(frozen=True)
@@ -165,6 +216,9 @@ class Options:
     overrides: tuple[str, ...] | None = ()
     seed: int | None = None
     jobs: int | None = None
+    executor: str | None = None
+    shard: str | None = None
+    command: str = ""  # that was given
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
@@ -186,9 +240,18 @@ class Options:
         for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
             if value is not None and self.no_plots:
                 raise StudyError(f"{option} and --no-plots contradict each other")
+        if self.shard is not None and self.report:
+            raise StudyError("--shard and --report contradict each other; merge takes --report")
         if self.style is not None and self.style not in STYLES:
             raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         formats_of(self.formats, "--format")
+
+    @property
+    def part(self) -> Shard | None:
+        """The shard that is to be computed."""
+        from mechdesign.shards import Shard
+
+        return None if self.shard is None else Shard.of(self.shard)
 
     @property
     def kinds(self) -> str:
