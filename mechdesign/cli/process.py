@@ -14,6 +14,9 @@ from typing import Any, TextIO
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _NOT_WRITTEN = 4  # exit code where results could not be written
 _BY_SIGNAL = 128  # exit code of a process that a signal ended, less the signal's number
+# Files of Python's that hold locks for an instant, and functions of `threading` that wait without.
+_LOCKING = tuple(part.replace("/", os.sep) for part in ("/threading.py", "/queue.py", "/concurrent/futures/"))
+_WAITS = ("wait", "_wait_for_tstate_lock")
 _RETRY = 0.02  # seconds until an interrupt that came amiss is tried again
 
 
@@ -99,8 +102,12 @@ def _blocked() -> bool:
 
 
 def _unfit(frame: FrameType | None) -> bool:
+    """Whether an interrupt in a frame would be lost, or leave a lock of threads or workers held for ever."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+        file, name = frame.f_code.co_filename, frame.f_code.co_name
+        if name in _WAITS and file.endswith("threading.py"):
+            return False
+        if file.startswith("<frozen importlib") or name == "__del__" or any(part in file for part in _LOCKING):
             return True
         frame = frame.f_back
     return False

@@ -102,6 +102,41 @@ def test_an_interrupt_during_imports(here, module):
     assert "rror" not in told
 
 
+# What a command does when it is interrupted: in a call back, whose errors are dropped; while it blocks signals and
+# another thread lets them in; in the queue that work goes to.
+INTERRUPTED = {
+    "call back": """
+        thing = type("Thing", (), {})()
+        reference = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+    """,
+    "blocked": """
+        threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        os.kill(os.getpid(), signal.SIGINT)
+        whole = sum(range(1_000_000))
+        print("whole")
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    """,
+    "queue": """
+        class Queue(queue.Queue):
+            def _put(self, item):
+                signal.raise_signal(signal.SIGINT)
+                print("whole")
+        Queue().put(1)
+    """,
+}
+
+
+@pytest.mark.parametrize("where", INTERRUPTED)
+def test_an_interrupt_at_a_bad_place_comes_a_little_later(where):
+    words = "import os, queue, signal, threading, time, weakref\nfrom mechdesign.cli import process\ndef command():"
+    text = f"{words}\n{INTERRUPTED[where]}\n        time.sleep(60)\nprocess.run(command)"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, timeout=30)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+    assert done.stdout == ("" if where == "call back" else "whole\n")
+
+
 BAD = ("closed", "full", "broken")
 
 
