@@ -13,7 +13,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
-from mechdesign.commands import COMMANDS, MERGE
+from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -73,20 +73,27 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
                 from mechdesign.cli.compare import compare
 
                 raise typer.Exit(compare(**said))
+            chosen: dict[str, Any] = {
+                key: said.pop(key) for key in ("vary", "method", "samples", "cases", "results") if key in said
+            }
             study, options = said.pop("study"), Options(command=name, **said)
             with _placed(options):
-                raise typer.Exit(_called(name, study, options))
+                raise typer.Exit(_called(name, study, options, chosen))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, short_help=short, help=long)(command)
 
 
-def _called(name: str, study: Any, options: Options) -> int:
-    """The exit code of a command that takes studies."""
-    if name in COMMANDS:
+def _called(name: str, study: Any, options: Options, chosen: dict[str, Any]) -> int:
+    """The exit code of a command that takes studies; `chosen` are the cases of a sweep."""
+    if name in COMMANDS or name == SENSITIVITIES.name:
         from mechdesign.cli.execution import ask
 
-        return ask(name, study, options)
+        return ask(name, study, options).exit_code
+    if name == SWEEP.name:
+        from mechdesign.cli.sweep import Matrix, sweep
+
+        return sweep(study, options, Matrix(**chosen))
     if options.verify is not None:
         from mechdesign.cli.compare import verify
 
@@ -106,9 +113,18 @@ def _placed(options: Options) -> AbstractContextManager[None]:
     return on(named(options.executor, options.jobs))
 
 
-for _name, _asked in COMMANDS.items():
+for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
     _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+_add(
+    SWEEP.name,
+    (
+        *given.COMMON[:2], given.VARY, given.METHOD, given.SAMPLES, given.CASES, given.RESULTS, *given.COMMON[2:],
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
+    ),
+    SWEEP.question,
+    f"{SWEEP.question} {SWEEP.answer}",
+)  # fmt: skip
 _add(
     "run",
     (
