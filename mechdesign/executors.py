@@ -96,7 +96,7 @@ class _Dask(Pool):
                     self._cluster = distributed.LocalCluster(
                         n_workers=worker_count(jobs),
                         threads_per_worker=1,
-                        dashboard_address=None,
+                        dashboard_address="127.0.0.1:0",
                         silence_logs=50,
                         preload=[__name__],
                     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from inspect import Parameter, Signature
 from typing import Annotated, Any
@@ -84,8 +84,8 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
     app.command(name, short_help=short, help=long)(command)
 
 
-def _called(name: str, study: Any, options: Options, chosen: dict[str, Any]) -> int:
-    """The exit code of a command that takes studies; `chosen` are the cases of a sweep."""
+def _called(name: str, study: Any, options: Options, chosen: Mapping[str, Any]) -> int:
+    """The exit code of a command that takes studies; `chosen` is what the options say of a sweep's cases."""
     if name in COMMANDS or name == SENSITIVITIES.name:
         from mechdesign.cli.execution import ask
 
