@@ -136,7 +136,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         return kept
     elif merging:
         # A mistake of the study is why there are none.
-        requirements.foresee(study, [command])
+        requirements.foresee(study, [command] if command in LONG else [])
         raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
@@ -180,7 +180,8 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
         return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
-    requirements.foresee(study, [command])
+    if command in LONG:
+        requirements.foresee(study, [command])
     taken = shards.Taken(shard)
     try:
         with terminal.Bar(quiet=options.quiet) as bar, divided(taken):
