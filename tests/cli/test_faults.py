@@ -69,14 +69,17 @@ def test_workers_end_with_their_parent(here, number):
         workers = until(lambda: len(found := children(process.pid)) == 2 and found)
         time.sleep(0.3)
         process.send_signal(number)
-        # Ends when nobody holds the other end.
-        told = process.stderr.read()
-        code = process.wait(30)
-    until(lambda: not any(map(alive, workers)), 5)
+        try:
+            # Ends when nobody holds the other end.
+            _, told = process.communicate(timeout=30)
+            until(lambda: not any(map(alive, workers)), 5)
+        finally:
+            for worker in filter(alive, workers):
+                os.kill(worker, signal.SIGKILL)
     if number == signal.SIGKILL:
-        assert code == -number
+        assert process.returncode == -number
     else:
-        assert code == 128 + number
+        assert process.returncode == 128 + number
         assert "interrupted" in told
     assert "Traceback" not in told
     assert not [path for path in here.rglob("*") if ".tmp" in path.name]
