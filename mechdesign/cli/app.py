@@ -120,7 +120,7 @@ _add(
     SWEEP.name,
     (
         *given.COMMON[:2], given.VARY, given.METHOD, given.SAMPLES, given.CASES, given.RESULTS, *given.COMMON[2:],
-        given.REPORT, given.JUNIT, given.RESUME_DESIGNS,
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
     ),
     SWEEP.question,
     f"{SWEEP.question} {SWEEP.answer}",
