@@ -158,7 +158,7 @@ VERIFY = _text(
     "--verify",
     "PATH",
     "Instead of studies: repeat what a manifest.json, or those in a folder, say was computed, and compare the bytes of "
-    "the tables; 1 where they are others. Files that a study names are looked for in the working directory.",
+    "the tables; 1 where they are others. Files that a study names are looked for beside it, else beside the manifest.",
 )
 
 
