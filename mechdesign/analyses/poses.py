@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -423,19 +424,24 @@ class Keeper:
     poses: Poses
     _parts: list[Configuration] = field(default_factory=list)
 
+    @cached_property
+    def rows(self) -> Ints:
+        """Which poses are shown."""
+        return _rows(self.poses, MAX_SHOWN_POSES)
+
     def keep(self, solved: SolvedPoses) -> None:
         """Take over the shown ones of some solved poses."""
-        index = np.flatnonzero(np.isin(solved.rows, _rows(self.poses, MAX_SHOWN_POSES)))
+        index = np.flatnonzero(np.isin(solved.rows, self.rows))
         if len(index):
             self._parts.append(solved.configuration.take(index))
 
     @property
     def shown(self) -> Shown:
         """All that was kept."""
-        rows, whole = _rows(self.poses, MAX_SHOWN_POSES), self._parts[0]
+        whole = self._parts[0]
         if len(self._parts) > 1:
-            whole = joined(self._parts, rows.shape, whole.take(0).vectors, {})
-        return Shown(self.study, self.poses, rows, whole)
+            whole = joined(self._parts, self.rows.shape, whole.take(0).vectors, {})
+        return Shown(self.study, self.poses, self.rows, whole)
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:

@@ -7,8 +7,9 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +21,19 @@ from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import one_thread
+from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.report.tables import from_csv
-from mechdesign.results import Result, Table
+from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
+_ROWS_AT_ONCE = 20_000  # of a table that is read from its file
 RESULTS = Path("results")  # where no other folder is asked for
 OUTCOMES = {
     0: "done",
@@ -134,7 +137,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
-        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
+        with terminal.Bar(quiet=options.quiet) as bar:
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -177,7 +181,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        rows = len(_main_table(directory))
+        rows = len(_main_table(directory, content))
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
@@ -196,17 +200,24 @@ def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
     return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
 
 
-def _main_table(directory: Path) -> Table:
-    """The main table of the results that are in a folder."""
-    content = manifest.read(directory)
-    assert content is not None
+def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
+    """The main table of the results in a folder with this manifest, read from its file where its rows are wanted."""
     file, about = next(iter(content["tables"].items()))
-    text = (directory / file).read_text(encoding="utf-8")
-    return from_csv(text, Path(file).stem, about["columns"], about["meaning"])
+
+    def blocks() -> Iterator[Table]:
+        with (directory / file).open(encoding="utf-8") as stream:
+            head = stream.readline()
+            lines = list(islice(stream, _ROWS_AT_ONCE))
+            while True:
+                yield from_csv(head + "".join(lines), Path(file).stem, about["columns"], about["meaning"])
+                if not (lines := list(islice(stream, _ROWS_AT_ONCE))):
+                    return
+
+    return LongTable(next(blocks()), int(about["rows"]), blocks)
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras
+    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -216,7 +227,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, progress)
 
 
 def _journal(study: Study, directory: Path, options: Options) -> Journal:
@@ -288,7 +299,10 @@ def ask(command: str, path: Path | None, options: Options) -> int:
             raise
         if options.report:
             write_report(directory, study, [given], options)
-        table = given.result.main if given.result is not None else _main_table(directory)
-    terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
+        if given.result is not None:
+            table = given.result.main
+        else:
+            table = _main_table(directory, manifest.read(directory) or {})
+        terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
     tell(given, options)
     return given.exit_code

@@ -63,13 +63,29 @@ def csv_blocks(table: Table) -> Iterator[str]:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([_harmless(printable(name)) for name in table.names])
     yield stream.getvalue()
-    for start in range(0, len(table), _BLOCK):
-        stream.seek(0)
-        stream.truncate()
-        rows = slice(start, start + _BLOCK)
-        texts = [(column.numeric, _texts(column.values[rows], _DIGITS)) for column in table.columns]
-        writer.writerows(zip(*(each if numeric else map(_harmless, each) for numeric, each in texts), strict=True))
-        yield stream.getvalue()
+    numbers = all(column.numeric for column in table.columns)
+    for part in table.blocks():
+        columns = [column.values for column in part.columns]
+        for start in range(0, len(part), _BLOCK):
+            rows = [values[start : start + _BLOCK] for values in columns]
+            if numbers:
+                yield _number_lines(rows)
+                continue
+            stream.seek(0)
+            stream.truncate()
+            cells = (_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in rows)
+            writer.writerows(zip(*cells, strict=True))
+            yield stream.getvalue()
+
+
+def _number_lines(columns: Sequence[NDArray[Any]]) -> str:
+    """Lines of numbers alone, as the writer of CSV has them: formatted all at once, which takes a third of the time."""
+    floats = [values.dtype.kind == "f" for values in columns]
+    line = ",".join(f"%.{_DIGITS}g" if each else "%d" for each in floats) + "\n"
+    flat: list[float] = [0] * (len(columns) * len(columns[0]))
+    for k, values in enumerate(columns):
+        flat[k :: len(columns)] = (values + 0.0 if floats[k] else values).tolist()
+    return line * len(columns[0]) % tuple(flat)
 
 
 def from_csv(text: str, name: str, columns: Sequence[Mapping[str, str]], meaning: str = "") -> Table:
@@ -113,13 +129,15 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def to_json(table: Table) -> str:
-    """The table as a JSON array with an object a row; booleans are 1 and 0 as in the CSV file, nan is null."""
-    lists = []
-    for column in table.columns:
-        values = np.asarray(column.values)
-        lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
-    lines = [
-        json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False) for row in zip(*lists, strict=True)
-    ]
-    return "[\n" + ",\n".join(lines) + "\n]\n" if lines else "[]\n"
+def json_blocks(table: Table) -> Iterator[str]:
+    """The table as a JSON array, an object a row, in blocks; booleans are 1 and 0 as in the CSV file, nan is null."""
+    before = "[\n"
+    for part in table.blocks():
+        lists = []
+        for column in part.columns:
+            values = np.asarray(column.values)
+            lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
+        for row in zip(*lists, strict=True):
+            yield before + json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False)
+            before = ",\n"
+    yield "\n]\n" if len(table) else "[]\n"

@@ -224,7 +224,7 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
     each = poses.count // poses.designs
     curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in outputs}
     curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
-    at = poses.values[swept] if swept is not None else np.tile(np.arange(each, dtype=float), poses.designs)
+    at = poses.values[swept] if swept is not None else poses.numbers
     turn = 2 * np.pi / study.units.angle_factor
     sizes = {"length": mechanism.size, "angle": turn}
     # By curve and design; of both ends the pose, and value and place.
