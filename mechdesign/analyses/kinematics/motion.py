@@ -173,7 +173,8 @@ class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
     `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
-    point whose values are those of the motion that goes through it.
+    point whose values are those of the motion that goes through it. Where the poses are some of a long motion, one in
+    `stride` of all is enough to follow it.
     """
 
     question: MotionQuestion
@@ -181,6 +182,7 @@ class Motion:
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    stride: int | None = None
 
     @property
     def valid(self) -> Flags:
@@ -347,9 +349,8 @@ def thinned(motion: Motion, swept: str) -> Flags:
     """Poses of a sweep that are enough to follow the motion: its ends, those where validity changes, some between."""
     poses, valid = motion.question.poses, motion.valid
     each = poses.count // poses.designs
-    taken: Flags = np.arange(each) % followed_stride(motion.question.study, poses, swept) == 0
-    taken[-1] = True
-    taken = np.tile(taken, poses.designs)
+    taken: Flags = poses.numbers % (motion.stride or followed_stride(motion.question.study, poses, swept)) == 0
+    taken[each - 1 :: each] = True
     change = valid[1:] != valid[:-1]
     taken[1:] |= change
     taken[:-1] |= change

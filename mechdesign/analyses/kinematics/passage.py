@@ -169,6 +169,7 @@ class _Picked:
                 for k, error in enumerate(parts[0].errors)
             ],
             np.concatenate([part.smooth for part in parts]),
+            self.stride,
         )
 
 
