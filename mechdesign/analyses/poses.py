@@ -19,7 +19,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, default, expand
@@ -27,6 +27,8 @@ from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 POSES_AT_ONCE = 65536
+# Threads that solve poses of a long motion: what is made of them is one thread's work, and more would fill the memory.
+_MOST_SOLVERS = 4
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
 # What an angle may turn between neighbouring poses so that the way round is certain.
@@ -110,6 +112,7 @@ def _solve_group(
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     mechanism: Mechanism = study.mechanism
     plan = mechanism.plan(group.names)
+    jobs = min(worker_count(jobs), _MOST_SOLVERS)
     pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
 
     def given(piece: slice = slice(None)) -> list[Floats]:

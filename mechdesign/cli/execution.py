@@ -138,7 +138,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         raise
     try:
         with terminal.Bar(quiet=options.quiet) as bar:
-            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar)
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar, options.jobs)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -217,7 +217,7 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress
+    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress, jobs: int | None
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -227,7 +227,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked, progress)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, progress, jobs)
 
 
 def _journal(study: Study, directory: Path, options: Options) -> Journal:

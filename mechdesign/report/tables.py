@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import printable
-from mechdesign.results import Column, Table
+from mechdesign.parallel import map_chunks
+from mechdesign.results import Column, LongTable, Table
 
 _DIGITS = 12
 _BLOCK = 20_000
@@ -57,29 +58,29 @@ def to_csv(table: Table) -> str:
     return "".join(csv_blocks(table))
 
 
-def csv_blocks(table: Table) -> Iterator[str]:
-    """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([_harmless(printable(name)) for name in table.names])
-    yield stream.getvalue()
-    numbers = all(column.numeric for column in table.columns)
-    for part in table.blocks():
-        columns = [column.values for column in part.columns]
-        for start in range(0, len(part), _BLOCK):
-            rows = [values[start : start + _BLOCK] for values in columns]
-            if numbers:
-                yield _number_lines(rows)
-                continue
-            stream.seek(0)
-            stream.truncate()
-            cells = (_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in rows)
-            writer.writerows(zip(*cells, strict=True))
-            yield stream.getvalue()
+def csv_blocks(table: Table, jobs: int | None = 1) -> Iterator[str]:
+    """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory.
+
+    That of a long table is made by `jobs` processes.
+    """
+    head = io.StringIO()
+    csv.writer(head, lineterminator="\n").writerow([_harmless(printable(name)) for name in table.names])
+    yield head.getvalue()
+    rows = (
+        [column.values[start : start + _BLOCK] for column in part.columns]
+        for part in table.blocks()
+        for start in range(0, len(part), _BLOCK)
+    )
+    yield from map_chunks(_lines, rows, jobs if isinstance(table, LongTable) else 1, processes=True)
 
 
-def _number_lines(columns: Sequence[NDArray[Any]]) -> str:
-    """Lines of numbers alone, as the writer of CSV has them: formatted all at once, which takes a third of the time."""
+def _lines(columns: Sequence[NDArray[Any]]) -> str:
+    """Lines of a table; of numbers alone they are formatted all at once, which takes a third of the time."""
+    if not all(values.dtype.kind in "fiub" for values in columns):
+        stream = io.StringIO()
+        cells = [_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in columns]
+        csv.writer(stream, lineterminator="\n").writerows(zip(*cells, strict=True))
+        return stream.getvalue()
     floats = [values.dtype.kind == "f" for values in columns]
     line = ",".join(f"%.{_DIGITS}g" if each else "%d" for each in floats) + "\n"
     flat: list[float] = [0] * (len(columns) * len(columns[0]))
