@@ -13,7 +13,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -73,11 +73,16 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
                 from mechdesign.cli.compare import compare
 
                 raise typer.Exit(compare(**said))
+            chosen = {key: said.pop(key) for key in ("vary", "method", "samples", "cases", "results") if key in said}
             study, options = said.pop("study"), Options(**said)
-            if name in COMMANDS:
+            if name in COMMANDS or name == SENSITIVITIES.name:
                 from mechdesign.cli.execution import ask
 
-                raise typer.Exit(ask(name, study, options))
+                raise typer.Exit(ask(name, study, options).exit_code)
+            if name == SWEEP.name:
+                from mechdesign.cli.sweep import Matrix, sweep
+
+                raise typer.Exit(sweep(study, options, Matrix(**chosen)))
             if options.verify is not None:
                 from mechdesign.cli.compare import verify
 
@@ -90,9 +95,18 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
     app.command(name, short_help=short, help=long)(command)
 
 
-for _name, _asked in COMMANDS.items():
+for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
     _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+_add(
+    SWEEP.name,
+    (
+        *given.COMMON[:2], given.VARY, given.METHOD, given.SAMPLES, given.CASES, given.RESULTS, *given.COMMON[2:],
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS,
+    ),
+    SWEEP.question,
+    f"{SWEEP.question} {SWEEP.answer}",
+)  # fmt: skip
 _add(
     "run",
     (

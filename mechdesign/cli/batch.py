@@ -29,13 +29,14 @@ from mechdesign.cli.execution import (
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
+from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import check_writable, write_file, write_sketch
 from mechdesign.results import Column, Table
@@ -51,10 +52,14 @@ SUMMARY = "summary.csv"  # of several studies, beside their folders
 
 
 def questions(study: Study) -> tuple[str, ...]:
-    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
+    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
+
+    Last what is asked of cases of the whole study.
+    """
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
-    return tuple(asked) or ("kinematics",)
+    cases = [each.name for each in (SWEEP, SENSITIVITIES) if getattr(study, each.section or each.name) is not None]
+    return (*(asked or ["kinematics"]), *cases)
 
 
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
@@ -100,7 +105,7 @@ def run(paths: Sequence[Path] | None, options: Options) -> int:
         terminal.say("interrupted; what was finished is whole")
         answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
     if options.junit is not None:
-        book.file(options.junit, _junit(answers).encode())
+        book.file(options.junit, junit(answers).encode())
     summary = _summary(answers)
     if book.several and any(given.written for given in answers):
         book.file((options.out or RESULTS) / SUMMARY, to_csv(summary).encode())
@@ -129,6 +134,10 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS, goals=True)
+            if study.matrix is not None:
+                analysis.prepared(study)
+            if study.sensitivities is not None:
+                sensitivities.prepared(study)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
@@ -151,14 +160,14 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             studies.append(load_study(path, options))
         except Exception as error:
-            yield book.missing(_failure(path.stem if path else "study", "check", Path(), error))
+            yield book.missing(failure(path.stem if path else "study", "check", Path(), error))
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label
         try:
             claim(owners, study)
         except StudyError as error:
-            yield book.missing(_failure(label, "check", Path(), error, study))
+            yield book.missing(failure(label, "check", Path(), error, study))
             continue
         root = folder(study, "", options, several=len(paths) > 1)
         told: list[Outcome] = []
@@ -175,7 +184,7 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
                     told.append(interrupted(study, command, root / command, error))
                     raise
                 except Exception as error:
-                    given = _failure(label, command, root / command, error, study)
+                    given = failure(label, command, root / command, error, study)
                 told.append(given)
                 yield given
         finally:
@@ -242,7 +251,7 @@ class Book:
             study.label,
             [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
             met=sum(verdict.met for verdict in verdicts),
-            required=len(study.requirements),
+            required=sum(len(judged_by(study, command)) for command in questions(study)),
             warnings=len({warning for given in told for warning in given.warnings}),
             drawing="" if self.options.no_plots else thumbnail(study),
             link=f"{study.label}/{pages.REPORT}",
@@ -253,7 +262,8 @@ class Book:
         self.exit_code = max(self.exit_code, explained(error)[0])
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+    """Say why a question has no answer; returns that as its outcome."""
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))
@@ -288,7 +298,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     return Table("summary", tuple(columns), meaning="what became of each question")
 
 
-def _junit(answers: Sequence[Outcome]) -> str:
+def junit(answers: Sequence[Outcome]) -> str:
     """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
 
     A requirement that is not met is a failure; whatever kept a command from its result is an error.

@@ -17,6 +17,7 @@ import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, STYLES, Options
+from mechdesign.commands import SWEEP
 from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
@@ -26,7 +27,7 @@ from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
@@ -43,6 +44,10 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
+
+
+# Commands that an interrupted run need not begin anew.
+_RESUMED = ("optimize", SWEEP.name)
 
 
 @dataclass(frozen=True)
@@ -122,7 +127,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, directory, options) if command == "optimize" else None
+    journal = _journal(study, command, directory, options) if command in _RESUMED else None
     if journal is not None:
         more["journal"] = journal
     try:
@@ -146,7 +151,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     if journal is not None:
         journal.discard()
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
-    code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
+    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, result=result,
@@ -181,23 +186,24 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        rows = len(_main_table(directory, content))
+        table = _main_table(directory, content)
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+    if len(verdicts) != len(judged_by(study, command)):
         return None
     settle(directory)
-    code = _exit_code(failed, verdicts)
+    code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, rows, warnings, failed, verdicts, kept=True, written=True
+        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True
     )  # fmt: skip
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
-    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
-    return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
+def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
+    cases: list[int] = table["exit_code"].tolist() if "exit_code" in table else []
+    return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
 def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
@@ -230,12 +236,12 @@ def _judged_and_written(
     return verdicts, writer.write(directory, study, result, verdicts, asked, progress, jobs)
 
 
-def _journal(study: Study, directory: Path, options: Options) -> Journal:
-    """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
-    journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
+def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
+    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study.label}: optimize: {there}; begins anew", quiet=options.quiet)
+        terminal.say(f"{study.label}: {command}: {there}; begins anew", quiet=options.quiet)
     return journal
 
 
@@ -247,7 +253,9 @@ def tell(given: Outcome, options: Options) -> None:
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{who} {given.failed}")
+        from mechdesign.cli.docs import look_up
+
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
@@ -285,8 +293,8 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 
 @one_thread()
-def ask(command: str, path: Path | None, options: Options) -> int:
-    """One command from end to end; returns its exit code."""
+def ask(command: str, path: Path | None, options: Options) -> Outcome:
+    """One command from end to end."""
     study = load_study(path, options)
     directory = folder(study, command, options)
     writer.check_writable(directory)
@@ -305,4 +313,4 @@ def ask(command: str, path: Path | None, options: Options) -> int:
             table = _main_table(directory, manifest.read(directory) or {})
         terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
     tell(given, options)
-    return given.exit_code
+    return given

@@ -106,6 +106,33 @@ RESUME = _flag(
 RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
+VARY = _text(
+    "vary",
+    list[str],
+    "--vary",
+    "A.B.C=VALUES",
+    "An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of "
+    "a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.",
+)
+METHOD = _text(
+    "method", str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid."
+)
+SAMPLES = _text("samples", int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
+CASES = _text(
+    "cases",
+    Path,
+    "--cases",
+    "FILE",
+    "CSV file of cases instead of --vary: its first line names entries of the study, each line below is a case.",
+)
+RESULTS = _text(
+    "results",
+    list[str],
+    "--results",
+    "LIST",
+    "Results that are listed besides the requirements, with commas between, e.g. kinematics.mu.min,GII. Repeatable; in "
+    "place of those of the study's matrix.",
+)
 VERIFY = _text(
     "verify",
     Path,

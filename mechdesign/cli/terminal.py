@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -57,6 +57,14 @@ def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
             emit_all(iter(partial(stream.read, _PIECE), ""))
     else:
         emit_all(csv_blocks(table))
+
+
+def show_lines(lines: Sequence[str]) -> None:
+    """The first of many lines to a terminal, and how many are left."""
+    more = len(lines) - _ROWS
+    emit("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
+    if more > 0:
+        emit(f"... {more} more; --out DIR writes all of them\n")
 
 
 def _show_to_people(table: Table, rest: Path | None) -> None:

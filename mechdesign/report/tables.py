@@ -111,7 +111,7 @@ def plain(value: Any) -> Any:
     """Anything a study or a table holds, as JSON can say it.
 
     Floats keep 12 significant digits; nan and infinities, which JSON does not know, become None; booleans of a
-    table's column are the business of `to_json`.
+    table's column are the business of `json_blocks`.
     """
     if isinstance(value, np.generic):
         value = value.item()

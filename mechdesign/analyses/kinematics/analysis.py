@@ -279,7 +279,7 @@ def _marks(motion: Motion) -> dict[str, Flags]:
         found[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
     if "inverse_condition" in arrays:
         found[_REGULAR] = valid & steady
-        found[_NEAR] = valid & steady & ~(arrays["inverse_condition"] >= SINGULAR)
+        found[_NEAR] = valid & steady & _near(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
         found[f"{output}{_WITHOUT_TARGET}"] = where
     for centre in question.centres:
@@ -298,16 +298,29 @@ def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
     return f"{above or '1'}/{below}" if below else above
 
 
+def _near(motion: Motion) -> Flags:
+    """Poses at or near a singularity of the Jacobian."""
+    question, arrays = motion.question, motion.arrays
+    if len(question.drives) > 1:
+        return ~(arrays["inverse_condition"] >= SINGULAR)
+    # A Jacobian of one entry has no condition: it is compared with a whole size of the mechanism a radian.
+    (output,), (drive,) = question.listed, question.drives
+    size = {"length": question.study.mechanism.size}
+    still = np.abs(arrays["det_J"]) * size.get(drive.quantity, 1.0) / size.get(output.quantity, 1.0)
+    return np.asarray(still < SINGULAR)
+
+
 def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
     if _REGULAR not in marks:
         return []
     if marks[_REGULAR].number and question.mixed:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
     count = marks[_NEAR].number
-    if count:
-        poses = "1 pose is" if count == 1 else f"{count} poses are"
-        return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
-    return []
+    poses = "1 pose is" if count == 1 else f"{count} poses are"
+    if len(question.drives) == 1:
+        (output,) = question.listed
+        return [f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"] if count else []
+    return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"] if count else []
 
 
 def _astray(question: MotionQuestion) -> list[str]:
