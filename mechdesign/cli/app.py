@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from inspect import Parameter, Signature
 from typing import Annotated, Any
 
@@ -13,7 +13,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import BUILT_IN, Options
-from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
+from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -73,26 +73,44 @@ def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
                 from mechdesign.cli.compare import compare
 
                 raise typer.Exit(compare(**said))
-            chosen = {key: said.pop(key) for key in ("vary", "method", "samples", "cases", "results") if key in said}
-            study, options = said.pop("study"), Options(**said)
-            if name in COMMANDS or name == SENSITIVITIES.name:
-                from mechdesign.cli.execution import ask
-
-                raise typer.Exit(ask(name, study, options).exit_code)
-            if name == SWEEP.name:
-                from mechdesign.cli.sweep import Matrix, sweep
-
-                raise typer.Exit(sweep(study, options, Matrix(**chosen)))
-            if options.verify is not None:
-                from mechdesign.cli.compare import verify
-
-                raise typer.Exit(verify(study, options))
-            from mechdesign.cli import batch
-
-            raise typer.Exit((batch.check if name == "check" else batch.run)(study, options))
+            chosen: dict[str, Any] = {
+                key: said.pop(key) for key in ("vary", "method", "samples", "cases", "results") if key in said
+            }
+            study, options = said.pop("study"), Options(command=name, **said)
+            with _placed(options):
+                raise typer.Exit(_called(name, study, options, chosen))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, short_help=short, help=long)(command)
+
+
+def _called(name: str, study: Any, options: Options, chosen: Mapping[str, Any]) -> int:
+    """The exit code of a command that takes studies; `chosen` is what the options say of a sweep's cases."""
+    if name in COMMANDS or name == SENSITIVITIES.name:
+        from mechdesign.cli.execution import ask
+
+        return ask(name, study, options).exit_code
+    if name == SWEEP.name:
+        from mechdesign.cli.sweep import Matrix, sweep
+
+        return sweep(study, options, Matrix(**chosen))
+    if options.verify is not None:
+        from mechdesign.cli.compare import verify
+
+        return verify(study, options)
+    from mechdesign.cli import batch
+
+    return (batch.check if name == "check" else batch.run)(study, options)
+
+
+def _placed(options: Options) -> AbstractContextManager[None]:
+    """Where great work goes."""
+    if options.executor is None:
+        return nullcontext()
+    from mechdesign.executors import named
+    from mechdesign.parallel import on
+
+    return on(named(options.executor, options.jobs))
 
 
 for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
@@ -102,7 +120,7 @@ _add(
     SWEEP.name,
     (
         *given.COMMON[:2], given.VARY, given.METHOD, given.SAMPLES, given.CASES, given.RESULTS, *given.COMMON[2:],
-        given.REPORT, given.JUNIT, given.RESUME_DESIGNS,
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
     ),
     SWEEP.question,
     f"{SWEEP.question} {SWEEP.answer}",
@@ -111,10 +129,20 @@ _add(
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME, given.VERIFY,
+        given.RESUME, given.VERIFY, given.EXECUTOR, given.SHARD,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
+)  # fmt: skip
+_add(
+    MERGE,
+    (
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.EXECUTOR,
+    ),
+    "Put together what runs with --shard computed.",
+    "Put together what runs with --shard computed: what a run without it gives, byte by byte. Options that change "
+    "numbers, such as --set and --seed, and --out are given again.",
 )  # fmt: skip
 _add(
     "check",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechdesign import shards
 from mechdesign.cli import terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.docs import explained
@@ -25,16 +26,18 @@ from mechdesign.cli.execution import (
     folder,
     interrupted,
     load_study,
+    place,
     tell,
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
+from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
 from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
+from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
@@ -164,31 +167,46 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label
+        root = folder(study, "", options, several=len(paths) > 1)
         try:
             claim(owners, study)
+            asked = _places(study, root, options)
         except StudyError as error:
             yield book.missing(failure(label, "check", Path(), error, study))
             continue
-        root = folder(study, "", options, several=len(paths) > 1)
         told: list[Outcome] = []
         try:
-            for command in questions(study):
+            for command, directory in asked:
                 try:
-                    check_writable(root / command)
-                    with owned(root / command):
-                        given = replace(answer(study, command, root / command, options), result=None)
+                    check_writable(directory)
+                    with owned(directory):
+                        given = replace(answer(study, command, directory, options), result=None)
                     tell(given, options)
                     annotate("error", of_verdicts(study, command, given.verdicts))
                     annotate("warning", of_warnings(study, command, given.warnings))
                 except KeyboardInterrupt as error:
-                    told.append(interrupted(study, command, root / command, error))
+                    told.append(interrupted(study, command, directory, error))
                     raise
                 except Exception as error:
-                    given = failure(label, command, root / command, error, study)
+                    given = failure(label, command, directory, error, study)
                 told.append(given)
                 yield given
         finally:
             book.add(study, root, told)
+
+
+def _places(study: Study, root: Path, options: Options) -> list[tuple[str, Path]]:
+    """The questions of a study with their folders; of shards that one command computed, that alone."""
+    found = [(command, place(root / command, options)) for command in questions(study)]
+    if options.command != MERGE:
+        return found
+    if alone := shards.found(root):
+        return [(shards.command_of(alone[0]), root)]
+    if (done := manifest.read(root)) is not None and done.get("command") in COMMANDS:
+        return [(done["command"], root)]
+    begun = [(command, directory) for command, directory in found if shards.found(directory)]
+    given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
+    return found if not begun or "run" in given else begun
 
 
 class Book:
@@ -284,7 +302,7 @@ def _summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),

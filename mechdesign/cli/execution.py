@@ -14,14 +14,15 @@ from pathlib import Path
 from typing import Any
 
 import mechdesign
+from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, STYLES, Options
-from mechdesign.commands import SWEEP
+from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
-from mechdesign.parallel import one_thread
+from mechdesign.parallel import Divided, divided, one_thread
 from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
@@ -30,6 +31,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
+from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
@@ -66,6 +68,7 @@ class Outcome:
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
     result: Result | None = None
+    shard: str = ""  # what became of a part of it, where no more was asked
 
 
 def load_study(path: Path | None, options: Options) -> Study:
@@ -95,6 +98,11 @@ def folder(study: Study, name: str, options: Options, *, several: bool = False) 
     return options.out / study.label if several else options.out
 
 
+def place(directory: Path, options: Options) -> Path:
+    """The folder that a command writes in: of a shard its own, for others write at the same time."""
+    return directory if options.part is None else directory / options.part.folder
+
+
 def claim(owners: dict[str, Path | None], study: Study) -> None:
     """Take the folder of a study's name; `owners` says which file each folder belongs to.
 
@@ -116,14 +124,23 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
+    if options.part is not None:
+        return _shard(study, command, directory, options, options.part)
     begun = time.perf_counter()
     asked = extras(command, options)
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
-    if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
+    share, merging = None, options.command == MERGE and command in DIVIDED
+    if merging and shards.found(directory):
+        share = shards.merge(directory, manifest.computed_from(study, command))
+    elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
+    elif merging:
+        # A mistake of the study is why there are none.
+        requirements.foresee(study, [command])
+        raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
@@ -131,7 +148,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     if journal is not None:
         more["journal"] = journal
     try:
-        with terminal.Bar(quiet=options.quiet) as bar:
+        with terminal.Bar(quiet=options.quiet) as bar, divided(share):
             result: Result = getattr(mechdesign, command)(
                 study, seed=options.seed, jobs=options.jobs, progress=bar, **more
             )
@@ -143,19 +160,47 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         raise
     try:
         with terminal.Bar(quiet=options.quiet) as bar:
-            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar, options.jobs)
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
         raise
     if journal is not None:
         journal.discard()
+    shards.remove(directory)
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, result=result,
     )  # fmt: skip
+
+
+def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard) -> Outcome:
+    """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
+    told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
+    if command not in DIVIDED:
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
+    origin = manifest.computed_from(study, command)
+    if options.resume and shards.is_current(directory, origin):
+        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
+    requirements.foresee(study, [command])
+    taken = shards.Taken(shard)
+    try:
+        with terminal.Bar(quiet=options.quiet) as bar, divided(taken):
+            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
+    except Divided:
+        pass
+    except Interrupted:
+        # A part of a part is nothing.
+        raise KeyboardInterrupt from None
+    except MechdesignError:
+        # Merge comes to the same, and tells it.
+        taken.write(directory, origin, options.command)
+        raise
+    taken.write(directory, origin, options.command)
+    seconds = time.perf_counter() - begun
+    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
@@ -223,7 +268,7 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress, jobs: int | None
+    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -233,7 +278,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked, progress, jobs)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, progress)
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
@@ -256,6 +301,9 @@ def tell(given: Outcome, options: Options) -> None:
         from mechdesign.cli.docs import look_up
 
         terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
+    if given.shard:
+        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        return
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
 
@@ -296,7 +344,7 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 def ask(command: str, path: Path | None, options: Options) -> Outcome:
     """One command from end to end."""
     study = load_study(path, options)
-    directory = folder(study, command, options)
+    directory = place(folder(study, command, options), options)
     writer.check_writable(directory)
     with owned(directory):
         try:
@@ -307,10 +355,13 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
             raise
         if options.report:
             write_report(directory, study, [given], options)
+        if given.shard:
+            tell(given, options)
+            return given
         if given.result is not None:
             table = given.result.main
         else:
             table = _main_table(directory, manifest.read(directory) or {})
-        terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
+    terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
     tell(given, options)
     return given

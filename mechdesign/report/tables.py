@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import printable
-from mechdesign.parallel import map_chunks
-from mechdesign.results import Column, LongTable, Table
+from mechdesign.results import Column, Table
 
 _DIGITS = 12
 _BLOCK = 20_000
@@ -58,20 +57,15 @@ def to_csv(table: Table) -> str:
     return "".join(csv_blocks(table))
 
 
-def csv_blocks(table: Table, jobs: int | None = 1) -> Iterator[str]:
-    """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory.
-
-    That of a long table is made by `jobs` processes.
-    """
+def csv_blocks(table: Table) -> Iterator[str]:
+    """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory."""
     head = io.StringIO()
     csv.writer(head, lineterminator="\n").writerow([_harmless(printable(name)) for name in table.names])
     yield head.getvalue()
-    rows = (
-        [column.values[start : start + _BLOCK] for column in part.columns]
-        for part in table.blocks()
-        for start in range(0, len(part), _BLOCK)
-    )
-    yield from map_chunks(_lines, rows, jobs if isinstance(table, LongTable) else 1, processes=True)
+    for part in table.blocks():
+        columns = [column.values for column in part.columns]
+        for start in range(0, len(part), _BLOCK):
+            yield _lines([values[start : start + _BLOCK] for values in columns])
 
 
 def _lines(columns: Sequence[NDArray[Any]]) -> str:

@@ -57,7 +57,7 @@ def check_writable(directory: Path) -> None:
 
 def write(
     directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras,
-    progress: Progress = NULL, jobs: int | None = 1,
+    progress: Progress = NULL,
 ) -> tuple[str, ...]:  # fmt: skip
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
@@ -71,7 +71,7 @@ def write(
         If the directory or a file cannot be written, or long tables need more room than there is.
     """
     files: dict[str, Iterable[bytes]] = {
-        f"{table.name}.csv": _encoded(table, progress, jobs) for table in result.tables.values()
+        f"{table.name}.csv": _encoded(table, progress) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() | unsettled(directory)
@@ -107,12 +107,12 @@ def write(
     return warnings
 
 
-def _encoded(table: Table, progress: Progress, jobs: int | None) -> Iterator[bytes]:
+def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
     """The bytes of a table's file, block by block; tells how far those of a long one are."""
     long = isinstance(table, LongTable)
     if long:
         progress.start(len(table), f"rows of {table.name}.csv")
-    for block in csv_blocks(table, jobs):
+    for block in csv_blocks(table):
         yield block.encode()
         progress.update(block.count("\n") if long else 0)
 
