@@ -163,7 +163,7 @@ def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Gene
         try:
             studies.append(load_study(path, options))
         except Exception as error:
-            yield book.missing(failure(path.stem if path else "study", "check", Path(), error))
+            yield book.missing(failure(printable(path.stem) if path else "study", "check", Path(), error))
     owners: dict[str, Path | None] = {}
     for study in studies:
         label = study.label

@@ -25,6 +25,7 @@ _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
 _PIECE = 1 << 20  # characters of a file that are copied at once
 _NAMES = 6  # names of columns for which there was no room
+_GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
 _BAR_DELAY = 1.0  # seconds before a bar appears
 
 
@@ -101,6 +102,7 @@ class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
         self._wanted = not quiet and sys.stderr.isatty()
         self._begun = time.monotonic()
         self._bar: Shown | None = None
@@ -118,7 +120,9 @@ class Bar(Progress):
             self._bar.stop()
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage."""
+        """Begin a stage; a great one is said, also where nobody sees a bar."""
+        if total >= _GREAT:
+            say(f"{total} {what} to compute; Ctrl-C ends it", quiet=self._quiet)
         self._total, self._done, self._what = total, 0, what
         if self._bar is not None and self._task is not None:
             self._bar.reset(self._task, total=total, description=what)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import printable
+from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
 
 _DIGITS = 12
@@ -124,6 +124,11 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+def json_text(value: Any, **options: Any) -> str:
+    """A value as JSON: letters stand as they are, what is not printable as an escape, such as ``\\u202e``."""
+    return printable_lines(json.dumps(value, ensure_ascii=False, **options), json.dumps)
+
+
 def json_blocks(table: Table) -> Iterator[str]:
     """The table as a JSON array, an object a row, in blocks; booleans are 1 and 0 as in the CSV file, nan is null."""
     before = "[\n"
@@ -133,6 +138,6 @@ def json_blocks(table: Table) -> Iterator[str]:
             values = np.asarray(column.values)
             lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
         for row in zip(*lists, strict=True):
-            yield before + json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False)
+            yield before + json_text(dict(zip(table.names, row, strict=True)))
             before = ",\n"
     yield "\n]\n" if len(table) else "[]\n"

@@ -78,15 +78,21 @@ def kinematics(
     warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
     warnings += _untargeted(question, marks)
     tables, ends = {"motion": motion_table(motion)}, list[Boundary]()
+    resolved = True
     if swept is not None and not passage.followed:
         warnings.append(
             "the sweep goes round too often to follow the motion between its poses: extremes are those of the poses, "
             "and limits of motion and links in line are not looked for; sweep fewer turns"
         )
     if swept is not None and passage.followed:
-        limits, told, ends = motion_limits(motion, swept)
+        limits, told, ends, resolved = motion_limits(motion, swept)
         warnings += told
-    between, _ = tables_between(motion, ends, every=poses, followed=passage.followed)
+    between, torn = tables_between(motion, ends, every=poses, followed=passage.followed)
+    if torn.any() or not resolved:
+        warnings.append(
+            f"the steps of {swept} are too long for the motion between the poses: limits, extremes and toggles there "
+            "may be missing; sweep in smaller steps, or less far"
+        )
     tables["extremes"] = between["extremes"]
     if swept is not None and passage.followed:
         tables["limits"] = limits
