@@ -34,7 +34,7 @@ _MEBIBYTE = 2**20
 # Option of Linux's prctl, from prctl.h: the signal that a process gets when its parent ends.
 _PR_SET_PDEATHSIG = 1
 # Sent to a whole group of processes, workers too.
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if sys.platform != "win32" else ()
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if sys.platform != "win32" else ()
 # Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
@@ -108,11 +108,25 @@ def workers(
 
 def _fork_all(pool: Executor) -> None:
     """Fork the workers, which the first work does; a signal waits until they know what to do with it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-    try:
+    with undisturbed():
         pool.submit(os.getpid)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Inside, an interrupt waits; also in what is forked there."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def end_with(parent: int) -> None:
+    """However the process that forked this one ends, this one ends with it."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _in_order(pool: Executor, call: Callable[[Item], Value], items: Iterable[Item], ahead: int) -> Iterator[Value]:
@@ -131,15 +145,12 @@ _adopted: Callable[[Any], Any] | None = None
 def _adopt(function: Callable[[Any], Any], parent: int) -> None:
     global _adopted
     _adopted = function
-    # However the parent ends, its workers end with it.
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGKILL)
+    end_with(parent)
     # An interrupt is the parent's to handle: it lets the chunks under way finish.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
 
 
 def _call(item: Any) -> Any:

@@ -16,10 +16,11 @@ import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import BUILT_IN, STYLES, Options
-from mechdesign.errors import Interrupted, MechdesignError, StudyError
+from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import one_thread
+from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
@@ -32,6 +33,7 @@ from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
 RESULTS = Path("results")  # where no other folder is asked for
+Source = Path | bytes  # of a study: its file or its text
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -57,27 +59,36 @@ class Outcome:
     seconds: float = 0.0
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
-    result: Result | None = None
+    table: Table | None = None  # the main one
 
 
-def load_study(path: Path | None, options: Options) -> Study:
-    """Load a study with the options' overrides and seed; ``-`` is standard input; without a path, say which is taken.
+def source(path: Path | None, options: Options) -> Source:
+    """Where a study comes from: ``-`` is standard input; without a path, say which is taken."""
+    if path is None:
+        here = Path("study.yaml")
+        path = here if here.exists() else template_path(BUILT_IN)
+        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        terminal.say(f"study: {what}", quiet=options.quiet)
+    return sys.stdin.buffer.read(MAX_BYTES + 1) if path == STANDARD_INPUT else path
+
+
+def load_source(source: Source, options: Options) -> Study:
+    """Load a study with the options' overrides and seed.
 
     Raises
     ------
     StudyError
         Every mistake of the study or the overrides.
     """
-    if path is None:
-        here = Path("study.yaml")
-        path = here if here.exists() else template_path(BUILT_IN)
-        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
-        terminal.say(f"study: {what}", quiet=options.quiet)
     overrides = options.overrides or ()
-    if path == STANDARD_INPUT:
-        content = sys.stdin.buffer.read(MAX_BYTES + 1)
-        return load(text=content, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
-    return load(path, overrides, options.seed, allow_files=options.allow_files)
+    if isinstance(source, bytes):
+        return load(text=source, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
+    return load(source, overrides, options.seed, allow_files=options.allow_files)
+
+
+def load_study(path: Path | None, options: Options) -> Study:
+    """Load the study of a path; see `source` and `load_source`."""
+    return load_source(source(path, options), options)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
@@ -100,7 +111,7 @@ def claim(owners: dict[str, Path | None], study: Study) -> None:
         raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
 
 
-def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
+def answer(study: Study, command: str, directory: Path, options: Options, progress: Progress) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
@@ -123,9 +134,9 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     if journal is not None:
         more["journal"] = journal
     try:
-        with terminal.Bar(quiet=options.quiet) as bar:
+        with progress:
             result: Result = getattr(mechdesign, command)(
-                study, seed=options.seed, jobs=options.jobs, progress=bar, **more
+                study, seed=options.seed, jobs=options.jobs, progress=progress, **more
             )
             if before is not None:
                 result = laid_under(study, result, before, _earlier(before, command, options))
@@ -134,7 +145,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
-        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
+        verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -145,7 +156,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, result=result,
+        written=True, table=result.main,
     )  # fmt: skip
 
 
@@ -177,7 +188,10 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        rows = len(_main_table(directory))
+        file, about = next(iter(content["tables"].items()))
+        table = from_csv(
+            (directory / file).read_text(encoding="utf-8"), Path(file).stem, about["columns"], about["meaning"]
+        )
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
@@ -187,7 +201,8 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     settle(directory)
     code = _exit_code(failed, verdicts)
     return Outcome(
-        study.label, command, directory, code, rows, warnings, failed, verdicts, kept=True, written=True
+        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
+        table=table,
     )  # fmt: skip
 
 
@@ -196,17 +211,8 @@ def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
     return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
 
 
-def _main_table(directory: Path) -> Table:
-    """The main table of the results that are in a folder."""
-    content = manifest.read(directory)
-    assert content is not None
-    file, about = next(iter(content["tables"].items()))
-    text = (directory / file).read_text(encoding="utf-8")
-    return from_csv(text, Path(file).stem, about["columns"], about["meaning"])
-
-
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras
+    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -216,7 +222,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, jobs)
 
 
 def _journal(study: Study, directory: Path, options: Options) -> Journal:
@@ -238,7 +244,7 @@ def tell(given: Outcome, options: Options) -> None:
     if given.failed:
         terminal.say(f"{who} {given.failed}")
     kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
+    terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
 
 
 def write_report(
@@ -281,14 +287,14 @@ def ask(command: str, path: Path | None, options: Options) -> int:
     writer.check_writable(directory)
     with owned(directory):
         try:
-            given = answer(study, command, directory, options)
+            given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
         except Interrupted as error:
             if options.report:
                 write_report(directory, study, [interrupted(study, command, directory, error)], options)
             raise
         if options.report:
             write_report(directory, study, [given], options)
-        table = given.result.main if given.result is not None else _main_table(directory)
-    terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
+    assert given.table is not None
+    terminal.show(given.table, as_json=options.json, rest=str(directory / f"{given.table.name}.csv"))
     tell(given, options)
     return given.exit_code

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import printable_lines
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
 _NAMES = 6  # names of columns for which there was no room
-_BAR_DELAY = 1.0  # seconds before a bar appears
+DELAY = 1.0  # seconds before it is shown how far something is
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -74,23 +74,24 @@ def _show_to_people(table: Table, rest: str) -> None:
         console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
 
 
+def lively() -> bool:
+    """Whether a person looks at stderr on a terminal that can be drawn on, rather than a CI server keeps it."""
+    ci = os.environ.get("CI", "").lower() not in ("", "0", "false")
+    return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
+
+
 class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
-        self._wanted = not quiet and sys.stderr.isatty()
+        self._wanted = not quiet and lively()
         self._begun = time.monotonic()
         self._bar: Shown | None = None
         self._task: TaskID | None = None
         self._total = self._done = 0
         self._what = ""
 
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
 
@@ -105,7 +106,7 @@ class Bar(Progress):
         self._done += n
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._done)
-        elif self._wanted and time.monotonic() - self._begun > _BAR_DELAY:
+        elif self._wanted and time.monotonic() - self._begun > DELAY:
             self._open()
 
     def _open(self) -> None:

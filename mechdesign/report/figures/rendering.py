@@ -11,7 +11,7 @@ from typing import ParamSpec
 from matplotlib.figure import Figure
 
 from mechdesign.errors import explain
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 
 # To the files of one picture: their bytes by their names.
 Drawing = Callable[[], dict[str, bytes]]
@@ -49,10 +49,11 @@ class Gallery(dict[str, Figure]):
             self.failed |= made.failed
 
 
-def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Call every drawing; on Linux in two forked processes, for Matplotlib draws on one processor only.
+def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Call every drawing; on Linux in two forked processes, if two `jobs` may be done at a time.
 
-    The bytes do not depend on where they are drawn. What a process that was killed left out is drawn in this one.
+    Matplotlib draws on one processor only. The bytes do not depend on where they are drawn. What a process that was
+    killed left out is drawn in this one.
 
     Returns
     -------
@@ -71,8 +72,8 @@ def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str,
     names = list(drawings)
     found: dict[str, dict[str, bytes] | str] = {}
     with suppress(BrokenExecutor):
-        jobs = 2 if sys.platform == "linux" and len(names) >= FEWEST else 1
-        for name, drawn in zip(names, map_chunks(draw, names, jobs, processes=True), strict=True):
+        count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
+        for name, drawn in zip(names, map_chunks(draw, names, count, processes=True), strict=True):
             found[name] = drawn
     found |= {name: draw(name) for name in names if name not in found}
     files = {file: data for name in names if isinstance(drawn := found[name], dict) for file, data in drawn.items()}
