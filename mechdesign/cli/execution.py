@@ -15,7 +15,7 @@ from typing import Any
 import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import BUILT_IN, STYLES, Options
+from mechdesign.cli.options import STYLES, Options
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
@@ -66,7 +66,7 @@ def source(path: Path | None, options: Options) -> Source:
     """Where a study comes from: ``-`` is standard input; without a path, say which is taken."""
     if path is None:
         here = Path("study.yaml")
-        path = here if here.exists() else template_path(BUILT_IN)
+        path = here if here.exists() else template_path()
         what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
         terminal.say(f"study: {what}", quiet=options.quiet)
     return sys.stdin.buffer.read(MAX_BYTES + 1) if path == STANDARD_INPUT else path
