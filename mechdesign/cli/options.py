@@ -85,7 +85,7 @@ JOBS = _text(
     int,
     "--jobs",
     "N",
-    "Threads to compute on; the results do not depend on it. Default: every processor.",
+    "Threads to compute on, or studies at a time; the results do not depend on it. Default: every processor.",
     min=1,
     max=MAX_JOBS,
 )
