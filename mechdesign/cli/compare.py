@@ -15,9 +15,9 @@ from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
 from mechdesign.parallel import one_thread
-from mechdesign.report import compare as comparing
 from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.compare import Comparison, Difference, Tolerance, Tolerances
+from mechdesign.report.comparison import folders
+from mechdesign.report.comparison.differences import OUTCOME, VERDICT, Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
 from mechdesign.report.tables import to_csv
 
@@ -54,10 +54,10 @@ def compare(
     if not (math.isfinite(rtol) and math.isfinite(atol or 0)):
         raise StudyError("--rtol and --atol take numbers from 0 on")
     default = Tolerance(rtol, atol)
-    chosen = Tolerances(default) if tolerances is None else comparing.tolerances_from(tolerances, default)
+    chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if out is not None:
         writer.check_writable(out)
-    found = comparing.compare(old, new, chosen)
+    found = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, found)
     return _tell(found, "compare", junit, as_json=json, quiet=quiet)
@@ -83,7 +83,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--json, --quiet and --allow-files"
         )
     root = path.parent if path.name == manifest.NAME else path
-    recorded = comparing.results(root)
+    recorded = folders.results(root)
     if path != root:
         recorded = {folder: content for folder, content in recorded.items() if folder == "."}
     if not recorded:
@@ -124,9 +124,9 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
 def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> Comparison:
     """Differences of the kept tables and those that were computed again, and of the bytes of all files."""
     # The study that is repeated has its overrides in it.
-    before, after = content | {"overrides": []}, comparing.results(there)["."]
-    found = Comparison(notes=[f"{folder}: {note}" for note in comparing.notes(before, after)])
-    comparing.compare_results(found, folder, (kept, before), (there, after), _EXACTLY)
+    before, after = content | {"overrides": []}, folders.results(there)["."]
+    found = Comparison(notes=[f"{folder}: {note}" for note in folders.notes(before, after)])
+    folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY)
     again = manifest.recorded_files(after)
     told = {each.table for each in found.differences}
     for name, digest in manifest.recorded_files(content).items():
@@ -158,7 +158,7 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
     for note in found.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
     for difference in found.differences:
-        if difference.change in (comparing.VERDICT, comparing.OUTCOME):
+        if difference.change in (VERDICT, OUTCOME):
             terminal.say(f"{command}: {difference}")
     tables, columns = found.compared["tables"], found.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from junitparser import JUnitXml
 
-from mechdesign.report.compare import Tolerance, compare_tables
+from mechdesign.report.comparison.differences import Tolerance
+from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.results import Column, Table
 
 from .conftest import SLIDER, answer

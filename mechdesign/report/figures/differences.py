@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mechdesign.report.compare import Moved
+from mechdesign.report.comparison.differences import Moved
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS
 

@@ -1,0 +1,1 @@
+"""Two folders of results: what moved, what is missing and what is new."""

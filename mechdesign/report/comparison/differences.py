@@ -1,0 +1,111 @@
+"""What two folders of results differ in, and by how much they may."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from mechdesign.errors import counted
+from mechdesign.numerics.arrays import Floats
+from mechdesign.results import Column, Table
+
+# Kinds of difference.
+MOVED, MISSING, NEW, UNIT, VERDICT, OUTCOME = "moved", "missing", "new", "unit", "verdict", "outcome"
+
+
+class Tolerance(NamedTuple):
+    """A number is as it was within ``atol + rtol * |old|``."""
+
+    rtol: float
+    atol: float | None = None  # None: `tables.ROUNDING` of the largest number of its unit in the table
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Tolerances of columns: of the patterns that fit ``command.table.column`` the last counts.
+
+    A pattern may begin with the folder, ``FOLDER/reliability.*``.
+    """
+
+    default: Tolerance
+    patterns: Mapping[str, Tolerance] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What is otherwise in a column, a table, a folder or a verdict."""
+
+    folder: str
+    table: str  # empty where it is the whole folder
+    column: str  # empty where it is the whole table, or rows of it
+    change: str  # `MOVED`, ...
+    rows: int = 0  # how many
+    largest: float = math.nan  # absolute difference; inf between a number and none; nan of words
+    relative: float = math.nan  # largest difference over the old value, maybe of another row
+    old: str = ""  # where it is largest
+    new: str = ""
+    row: str = ""  # its pose or key
+    unit: str = ""
+
+    def __str__(self) -> str:
+        place = ": ".join(part for part in (self.folder, ".".join(filter(None, (self.table, self.column)))) if part)
+        at = f" at {self.row}" if self.row else ""
+        if self.change in (MISSING, NEW):
+            whole = "column" if self.column else "table" if self.table else "result"
+            what = counted(self.rows, "row") if self.rows else whole
+            return f"{place}: {what} {self.change}{f', the first{at}' if at else ''}"
+        size = "" if math.isnan(self.largest) else f" by {self.largest:.3g} {self.unit}".rstrip()
+        size += "" if math.isnan(self.relative) else f" (relative {self.relative:.2g})"
+        rows = f" ({self.rows} rows)" if self.rows > 1 else ""
+        return f"{place}: {self.change}{size}{at}: {self.old} -> {self.new}{rows}"
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A column of numbers that moved, before and after, for the picture."""
+
+    name: str
+    unit: str
+    old: Floats
+    new: Floats
+    share: float  # largest difference over the largest old value
+    along: Column | None = None  # the pose, where it alone tells the rows apart
+
+
+@dataclass
+class Comparison:
+    """Everything that two folders of results differ in; `compared` counts tables and columns of both."""
+
+    differences: list[Difference] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    moved: list[Moved] = field(default_factory=list)
+    compared: Counter[str] = field(default_factory=Counter)
+    cases: list[tuple[str, str]] = field(default_factory=list)  # folder and table of each that was compared
+
+    @property
+    def table(self) -> Table:
+        """The differences as a table."""
+        meanings = {
+            "folder": "of the result, below those compared",
+            "table": "its table; empty where it is the whole result",
+            "column": "its column; empty where it is the whole table or rows of it",
+            "change": "moved, missing, new; unit, verdict or outcome: another one",
+            "rows": "how many rows",
+            "largest": "largest absolute difference, in `unit`; inf between a number and nan; nan of words",
+            "relative": "largest difference over the old value",
+            "old": "old value where the absolute difference is largest",
+            "new": "new value there",
+            "row": "pose or key of that row, or of the first that is missing or new",
+            "unit": "unit of the column",
+        }
+        kinds: dict[str, type] = {"rows": int, "largest": float, "relative": float}
+        columns = []
+        for name, meaning in meanings.items():
+            values = [getattr(each, name) for each in self.differences]
+            columns.append(Column(name, np.array(values, kinds.get(name, str)), meaning=meaning))
+        return Table("differences", tuple(columns), "what moved, is missing or is new")

@@ -1,0 +1,215 @@
+"""Two folders of results: their manifests, notes, verdicts, and the tables of both."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from mechdesign.errors import StudyError
+from mechdesign.report import manifest
+from mechdesign.report.comparison.differences import (
+    MISSING,
+    NEW,
+    OUTCOME,
+    VERDICT,
+    Comparison,
+    Difference,
+    Tolerance,
+    Tolerances,
+)
+from mechdesign.report.comparison.tables import compare_tables
+from mechdesign.report.tables import from_csv
+from mechdesign.results import Table
+from mechdesign.study.text.document import leaves, read
+
+_POSE_KEYS = ("poses", "sweep", "path")
+_MOST_ENTRIES = 4  # of the study, that a note names
+
+
+def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
+    """Compare two folders of results, of one command or of many, whose folders are matched by their paths.
+
+    Raises
+    ------
+    StudyError
+        If they have no result in common, or what a folder holds is not what mechdesign writes.
+    """
+    before, after = results(old), results(new)
+    if not before.keys() & after.keys():
+        there = [f"{root} has {', '.join(found) or 'none'}" for root, found in ((old, before), (new, after))]
+        raise StudyError(f"nothing to compare: no result stands in both folders; {'; '.join(there)}")
+    found, noted = Comparison(), defaultdict[str, list[str]](list)
+    unused = set(tolerances.patterns)
+    for folder in sorted(before.keys() | after.keys()):
+        if folder not in before or folder not in after:
+            found.differences.append(Difference(folder, "", "", MISSING if folder in before else NEW))
+            continue
+        for note in notes(before[folder], after[folder]):
+            noted[note].append(folder)
+        pair = (old / folder, before[folder]), (new / folder, after[folder])
+        unused -= compare_results(found, folder, *pair, tolerances)
+    everywhere = len(before.keys() & after.keys())
+    found.notes += [
+        note if len(folders) == everywhere else f"{', '.join(folders)}: {note}" for note, folders in noted.items()
+    ]
+    found.notes += [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
+    found.moved.sort(key=lambda each: -each.share)
+    return found
+
+
+def results(root: Path) -> dict[str, dict[str, Any]]:
+    """Manifests in and below a folder by the relative paths of their folders, ``.`` for the folder itself.
+
+    Raises
+    ------
+    StudyError
+        If there is no such folder, or a manifest cannot be read.
+    """
+    if not root.is_dir():
+        raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
+    found = {}
+    for path in sorted(root.rglob(manifest.NAME)):
+        content = manifest.read(path.parent)
+        kinds = {"tables": dict, "study": dict, "requirements": list}
+        if content is None or not all(isinstance(content.get(name), kind) for name, kind in kinds.items()):
+            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again")
+        found[path.parent.relative_to(root).as_posix()] = content
+    return found
+
+
+def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
+    """Read tolerances in YAML, ``reliability.*.sigma: {rtol: 0.05}``; what a pattern leaves out is the `default`.
+
+    Raises
+    ------
+    StudyError
+        With the place of each mistake.
+    """
+    try:
+        document = read(path.read_bytes(), str(path))
+    except OSError as error:
+        raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from None
+    if not isinstance(document.data, dict):
+        raise StudyError([document.values[()].problem("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")])
+    patterns, problems = {}, list(document.problems)
+    for pattern, given in document.data.items():
+        right = isinstance(given, dict) and given and given.keys() <= {"rtol", "atol"}
+        if right and all(type(value) in (int, float) and 0 <= value < math.inf for value in given.values()):
+            patterns[str(pattern)] = default._replace(**{name: float(value) for name, value in given.items()})
+        else:
+            message = "a tolerance is {rtol: 0.05}, {atol: 0.001} or both, numbers from 0 on"
+            problems.append(document.values[(pattern,)].problem(message, str(pattern)))
+    if problems:
+        raise StudyError(problems)
+    return Tolerances(default, patterns)
+
+
+def _fits(pattern: str, folder: str, command: str, table: str, column: str) -> bool:
+    return any(fnmatchcase(f"{where}.{table}.{column}", pattern) for where in (command, folder))
+
+
+def notes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """What two results were computed from that is not the same."""
+    for what in ("tool", "libraries", "inputs"):
+        before, after = old.get(what) or {}, new.get(what) or {}
+        for name in dict.fromkeys((*before, *after)):
+            if before.get(name) != after.get(name):
+                words = f"input {name}: another file" if what == "inputs" else None
+                yield words or f"{what} {name}: {before.get(name, 'none')} -> {after.get(name, 'none')}"
+    for what in ("overrides", "seed"):
+        if old.get(what) != new.get(what):
+            yield f"{what}: {old.get(what)} -> {new.get(what)}"
+    entries = [
+        {".".join(map(str, keys)): value for keys, value in leaves(each["study"].get("resolved") or {})}
+        for each in (old, new)
+    ]
+    changed = [name for name in entries[0] | entries[1] if entries[0].get(name) != entries[1].get(name)]
+    if changed:
+        told = [f"{name} {entries[0].get(name)} -> {entries[1].get(name)}" for name in changed[:_MOST_ENTRIES]]
+        yield f"study: {', '.join(told)}{', ...' * (len(changed) > _MOST_ENTRIES)}"
+
+
+def compare_results(
+    found: Comparison,
+    folder: str,
+    old: tuple[Path, Mapping[str, Any]],
+    new: tuple[Path, Mapping[str, Any]],
+    tolerances: Tolerances,
+) -> set[str]:
+    """Add to what was found how two results of a command, folders and manifests, differ; the patterns that fitted.
+
+    Raises
+    ------
+    StudyError
+        If a table cannot be read.
+    """
+    (_, before), (_, after) = old, new
+    fitted: set[str] = set()
+    command = str(after.get("command"))
+    for name in dict.fromkeys((*before["tables"], *after["tables"])):
+        table = name.removesuffix(".csv")
+        if name not in before["tables"] or name not in after["tables"]:
+            change = MISSING if name in before["tables"] else NEW
+            found.differences.append(Difference(folder, table, "", change))
+            continue
+        pair = _table(*old, name), _table(*new, name)
+        given = [_given(each, command) for each in (before, after)]
+        chosen = {}
+        for column in pair[0].names:
+            fitting = [each for each in tolerances.patterns if _fits(each, folder, command, table, column)]
+            fitted.update(fitting)
+            chosen[column] = tolerances.patterns[fitting[-1]] if fitting else tolerances.default
+        found.compared.update(tables=1, columns=len(chosen))
+        found.cases.append((folder, table))
+        for difference, moved in compare_tables(*pair, chosen, given[1][0], same_poses=given[0] == given[1]):
+            found.differences.append(Difference(folder, table, **difference))
+            if moved is not None:
+                found.moved.append(moved if folder == "." else replace(moved, name=f"{folder}/{moved.name}"))
+    verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
+    for words in verdicts[0] | verdicts[1]:
+        told = [_verdict(each.get(words)) for each in verdicts]
+        if told[0].split(",")[0] != told[1].split(",")[0]:
+            found.differences.append(Difference(folder, "", words, VERDICT, old=told[0], new=told[1]))
+    ends = [str(content.get("interrupted") or content.get("failed") or "done") for content in (before, after)]
+    if ends[0] != ends[1]:
+        found.differences.append(Difference(folder, "", "", OUTCOME, old=ends[0], new=ends[1]))
+    return fitted
+
+
+def _verdict(told: Mapping[str, Any] | None) -> str:
+    if told is None:
+        return "not required"
+    worst = told.get("worst")
+    return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
+
+
+def _table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+    about = content["tables"][name]
+    try:
+        if Path(name).name != name:
+            raise ValueError(name)
+        text = (directory / name).read_text(encoding="utf-8")
+        return from_csv(text, name.removesuffix(".csv"), about["columns"])
+    except OSError as error:
+        raise StudyError(f"{directory / name}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, TypeError, KeyError):
+        message = f"{directory / name}: is not the table that its manifest describes; run the study again"
+        raise StudyError(message) from None
+
+
+def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], Any]:
+    """Coordinates that a study gives for a command's poses, by default those of `kinematics`, and their values."""
+    resolved = content["study"].get("resolved") or {}
+    for section in (resolved.get(command), resolved.get("kinematics")):
+        poses = {key: section[key] for key in _POSE_KEYS if section.get(key)} if isinstance(section, dict) else {}
+        if not poses:
+            continue
+        listed = [pose for pose in poses.get("poses", ()) if isinstance(pose, dict)]
+        names = {f"{point}.{axis}" for point in poses.get("path", ()) for axis in "xy"}
+        return frozenset(names.union(poses.get("sweep", ()), *listed)), poses
+    return frozenset(), None

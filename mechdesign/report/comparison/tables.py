@@ -1,0 +1,211 @@
+"""Two tables: rows matched by their poses and keys, and the columns that moved."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.report.comparison.differences import MISSING, MOVED, NEW, UNIT, Moved, Tolerance
+from mechdesign.results import Column, Table
+
+# Of the largest number of a unit in a table: what rounding leaves of zero there, on one machine or another.
+ROUNDING = 1e-12
+_MOST_COLUMNS = 6  # that name a row
+
+Rows = NDArray[np.intp]
+
+
+def compare_tables(
+    old: Table, new: Table, tolerances: Mapping[str, Tolerance], given: Iterable[str] = (), *, same_poses: bool = True
+) -> Iterator[tuple[dict[str, Any], Moved | None]]:
+    """Differences of two tables (fields of `Difference`), and the numbers of columns that moved.
+
+    Rows are the same where their keys are: coordinates that are `given`, and then as many of the leading columns as
+    tell the rows apart; numbers among them within their tolerance. Where a limit or a boundary lies is found, not
+    given: of studies with the `same_poses`, rows that are left over are matched in their order where the words of
+    their keys are the same and there are as many in both.
+    """
+    for name in old.names:
+        if name not in new:
+            yield {"column": name, "change": MISSING, "unit": old.column(name).unit}, None
+    for name in new.names:
+        if name not in old:
+            yield {"column": name, "change": NEW, "unit": new.column(name).unit}, None
+    keys = _keys(old, new, given)
+    widths = {name: _width(old, new, name, tolerances[name]) for name in old.names if name in new}
+    first, second = _matched(old, new, keys, {name: (tolerances[name].rtol, widths[name]) for name in keys}, same_poses)
+    for table, rows, change in ((old, first, MISSING), (new, second, NEW)):
+        left = np.setdiff1d(np.arange(len(table)), rows)
+        if left.size:
+            yield {"column": "", "change": change, "rows": left.size, "row": _words(table, keys, left[0])}, None
+    along = old.column(keys[0]) if len(keys) == 1 else None
+    if along is not None and along.numeric:
+        along = Column(along.name, along.values[first], along.unit)
+    for name in widths:
+        before, after = old.column(name), new.column(name)
+        if before.unit != after.unit:
+            yield {"column": name, "change": UNIT, "old": before.unit, "new": after.unit}, None
+        if not (before.numeric and after.numeric):
+            apart = np.flatnonzero([a != b for a, b in zip(_text(before, first), _text(after, second), strict=True)])
+            if apart.size:
+                row = apart[0]
+                told = {"old": _text(before, first)[row], "new": _text(after, second)[row]}
+                place = _words(old, keys, first[row])
+                yield {"column": name, "change": MOVED, "rows": apart.size, "row": place, **told}, None
+            continue
+        a, b = before.values[first].astype(float), after.values[second].astype(float)
+        size = _apart(a, b)
+        beyond = np.flatnonzero(size > widths[name] + tolerances[name].rtol * np.where(np.isfinite(a), np.abs(a), 0))
+        if beyond.size:
+            row = beyond[np.argmax(size[beyond])]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                relative = float(np.max(size[beyond] / np.where(np.isfinite(a[beyond]), np.abs(a[beyond]), 1)))
+            largest = np.abs(a[np.isfinite(a)]).max(initial=0.0)
+            share = float(size[row] / largest) if largest else math.inf
+            told = {"old": f"{a[row]:.12g}", "new": f"{b[row]:.12g}", "unit": before.unit}
+            sizes = {"rows": beyond.size, "largest": float(size[row]), "relative": relative}
+            yield (
+                {"column": name, "change": MOVED, "row": _words(old, keys, first[row]), **told, **sizes},
+                Moved(f"{old.name}: {name}", before.unit, a, b, share, along if along and along.numeric else None),
+            )
+
+
+def _apart(old: Floats, new: Floats) -> Floats:
+    """How far numbers are apart: none where both are nan or the same infinity, infinitely where one of them is."""
+    with np.errstate(invalid="ignore"):
+        size = np.abs(new - old)
+    same: Flags = (old == new) | (np.isnan(old) & np.isnan(new))
+    return np.where(same, 0.0, np.where(np.isfinite(size), size, np.inf))
+
+
+def _width(old: Table, new: Table, name: str, tolerance: Tolerance) -> float:
+    """The absolute tolerance of a column."""
+    column = old.column(name)
+    if tolerance.atol is not None:
+        return tolerance.atol
+    if not column.numeric:
+        return 0.0
+    scale = 0.0
+    for table in (old, new):
+        for each in table.columns:
+            if each.numeric and (each.name == name or (column.unit and each.unit == column.unit)):
+                values = np.abs(each.values.astype(float))
+                scale = max(scale, float(values[np.isfinite(values)].max(initial=0.0)))
+    return ROUNDING * scale
+
+
+def _text(column: Column, rows: Rows) -> list[str]:
+    return [str(value) for value in column.values[rows].tolist()]
+
+
+def _words(table: Table, keys: Sequence[str], row: int) -> str:
+    """A row in words."""
+    parts = []
+    for name in keys[:_MOST_COLUMNS]:
+        column = table.column(name)
+        parts.append(f"{name} {column.values[row]:.6g}" if column.numeric else f"{name} {column.values[row]}")
+    return ", ".join(parts)
+
+
+def _keys(old: Table, new: Table, given: Iterable[str]) -> tuple[str, ...]:
+    """Columns that tell the rows of both tables apart: given coordinates, then the leading ones, as few as do."""
+    known = set(given)
+    names = sorted((name for name in old.names if name in new), key=lambda name: name not in known)
+    tables = [table for table in (old, new) if len(table) > 1]
+    codes = [{name: np.unique(table[name], return_inverse=True)[1] for name in names} for table in tables]
+
+    def apart(chosen: Sequence[str]) -> bool:
+        for table, code in zip(tables, codes, strict=True):
+            groups = np.zeros(len(table), dtype=np.intp)
+            for name in chosen:
+                groups = np.unique(groups * len(table) + code[name], return_inverse=True)[1]
+            if groups.max() + 1 < len(table):
+                return False
+        return True
+
+    keys = next((names[:count] for count in range(len(names)) if apart(names[:count])), names)
+    # Of results that stand between, such as those at the nodes of rays, none is needed.
+    for name in [name for name in keys if name not in known and old.column(name).numeric]:
+        if apart([key for key in keys if key != name]):
+            keys = [key for key in keys if key != name]
+    return tuple(keys)
+
+
+def _matched(
+    old: Table, new: Table, keys: Sequence[str], tolerances: Mapping[str, tuple[float, float]], same_poses: bool
+) -> tuple[Rows, Rows]:
+    """Rows of both tables that are the same, in the order of the old."""
+    # Equal rows are told apart by their order.
+    known = {key: row for row, key in enumerate(_numbered(_texts(old, keys)))}
+    pairs = [(known[key], row) for row, key in enumerate(_numbered(_texts(new, keys))) if key in known]
+    numbers = [name for name in keys if old.column(name).numeric and new.column(name).numeric]
+    words = [name for name in keys if name not in numbers]
+    left: dict[Any, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
+    for side, table in enumerate((old, new)):
+        taken = {pair[side] for pair in pairs}
+        for row, key in enumerate(_texts(table, words)):
+            if row not in taken:
+                left[key][side].append(row)
+    for rows in left.values():
+        if numbers and all(rows):
+            close = _nearest(old, new, rows, numbers, tolerances)
+            pairs += close
+            for side in (0, 1):
+                taken = {pair[side] for pair in close}
+                rows[side][:] = [row for row in rows[side] if row not in taken]
+        if same_poses and len(rows[0]) == len(rows[1]):
+            pairs += zip(*rows, strict=True)
+    found = np.array(sorted(pairs), dtype=np.intp).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
+
+
+def _texts(table: Table, names: Sequence[str]) -> Iterable[tuple[str, ...]]:
+    columns = [_text(Column(name, _plain(table[name])), np.arange(len(table))) for name in names]
+    return zip(*columns, strict=True) if columns else [()] * len(table)
+
+
+def _plain(values: NDArray[Any]) -> NDArray[Any]:
+    """Numbers as floats: a column whose numbers are all whole reads as integers."""
+    return values.astype(float) if values.dtype.kind in "iub" else values
+
+
+def _numbered(keys: Iterable[tuple[str, ...]]) -> Iterator[tuple[tuple[str, ...], int]]:
+    seen: Counter[tuple[str, ...]] = Counter()
+    for key in keys:
+        yield key, seen[key]
+        seen[key] += 1
+
+
+def _nearest(
+    old: Table,
+    new: Table,
+    rows: tuple[list[int], list[int]],
+    numbers: Sequence[str],
+    tolerances: Mapping[str, tuple[float, float]],
+) -> list[tuple[int, int]]:
+    """Rows whose numbers are the same within their tolerance, the nearest first."""
+    from scipy.spatial import cKDTree
+
+    places: list[list[Floats]] = [[], []]
+    for name in numbers:
+        values = [table[name][chosen].astype(float) for table, chosen in zip((old, new), rows, strict=True)]
+        rtol, atol = tolerances[name]
+        largest = max(np.abs(each[np.isfinite(each)]).max(initial=0.0) for each in values)
+        width = (atol + rtol * largest) or np.finfo(float).tiny ** 0.5
+        for side in (0, 1):
+            # Nan and infinities stand further away than numbers do from each other.
+            far = {"nan": 3 * largest + 1, "posinf": 5 * largest + 2, "neginf": -5 * largest - 2}
+            places[side].append(np.nan_to_num(values[side], **far) / width)
+    tree = cKDTree(np.stack(places[0], axis=-1))
+    distances, nearest = map(np.asarray, tree.query(np.stack(places[1], axis=-1), p=np.inf, distance_upper_bound=1.0))
+    pairs: dict[int, int] = {}
+    for index in np.argsort(distances, kind="stable"):
+        if np.isfinite(distances[index]):
+            pairs.setdefault(rows[0][nearest[index]], rows[1][index])
+    return list(pairs.items())
