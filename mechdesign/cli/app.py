@@ -15,7 +15,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -82,7 +82,14 @@ def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], shor
 def _ask(command: str, study: Path | None, **said: Any) -> int:
     from mechdesign.cli.execution import ask
 
-    return ask(command, study, Options(**said))
+    return ask(command, study, Options(**said)).exit_code
+
+
+def _sweep(study: Path | None, **said: Any) -> int:
+    from mechdesign.cli.sweep import Matrix, sweep
+
+    matrix = Matrix(**{each.name: said.pop(each.name) for each in given.MATRIX})
+    return sweep(study, Options(**said), matrix)
 
 
 def _run(study: Sequence[Path] | None, **said: Any) -> int:
@@ -110,9 +117,19 @@ def _compare(**said: Any) -> int:
     return compare(**said)
 
 
-for _name, _asked in COMMANDS.items():
+for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
     _add(partial(_ask, _name), _name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+_add(
+    _sweep,
+    SWEEP.name,
+    (
+        *given.COMMON[:2], *given.MATRIX, *given.COMMON[2:],
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS,
+    ),
+    SWEEP.question,
+    f"{SWEEP.question} {SWEEP.answer}",
+)  # fmt: skip
 _add(
     _run,
     "run",
@@ -143,7 +160,7 @@ _add(
     _watch,
     "watch",
     (
-        given.FILE, given.QUESTIONS, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET,
+        given.FILE, given.ASKED, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET,
         given.NO_PLOTS, given.FORMAT, given.STYLE, given.REPORT, given.ANIMATE, given.ALLOW_FILES,
     ),
     "Answer a study's questions again whenever it is saved.",

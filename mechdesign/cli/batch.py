@@ -36,13 +36,14 @@ from mechdesign.cli.execution import (
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import COMMANDS, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable
+from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import command_of, foresee
+from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import FIGURES, check_writable, write_file, write_sketch
 from mechdesign.study import Study
@@ -81,10 +82,14 @@ class End:
 
 
 def questions(study: Study) -> tuple[str, ...]:
-    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing."""
+    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
+
+    Last what is asked of cases of the whole study.
+    """
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
-    return tuple(asked) or ("kinematics",)
+    cases = [each.name for each in (SWEEP, SENSITIVITIES) if getattr(study, each.section or each.name) is not None]
+    return (*(asked or ["kinematics"]), *cases)
 
 
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
@@ -147,6 +152,10 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
             foresee(study, COMMANDS, goals=True)
+            if study.matrix is not None:
+                analysis.prepared(study)
+            if study.sensitivities is not None:
+                sensitivities.prepared(study)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
@@ -173,7 +182,7 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
             root = folder(study, "", options, several=len(paths) > 1)
             tasks.append(Task(number, origin, label, root, tuple(only) or questions(study)))
         except Exception as error:
-            ledger.missing(number, _failure(label, "check", Path(), error, study))
+            ledger.missing(number, failure(label, "check", Path(), error, study))
             if ledger.stopped:
                 break
     return tasks
@@ -222,7 +231,7 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
 def _import(tasks: Sequence[Task], options: Options) -> None:
     """Import what answers the questions, once for all processes that are forked."""
     for command in {command for task in tasks for command in task.commands}:
-        import_module(COMMANDS[command].module)
+        import_module(QUESTIONS[command].module)
         if not options.no_plots:
             import_module(f"{FIGURES}.{command}")
 
@@ -242,7 +251,7 @@ def _study(options: Options, several: bool, task: Task, hear: Tell) -> End:
         try:
             study = load_source(task.source, options)
         except Exception as error:
-            say(_failure(task.label, "check", Path(), error))
+            say(failure(task.label, "check", Path(), error))
             return ended
         try:
             for command in task.commands:
@@ -274,7 +283,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
         annotate("error", of_verdicts(study, command, given.verdicts))
         annotate("warning", of_warnings(study, command, given.warnings))
     except Exception as error:
-        return _failure(study.label, command, directory, error, study)
+        return failure(study.label, command, directory, error, study)
     return given
 
 
@@ -295,7 +304,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], options: Options, *
         study.label,
         [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
         met=sum(verdict.met for verdict in verdicts),
-        required=len(study.requirements),
+        required=sum(len(judged_by(study, command)) for command in task.commands),
         warnings=len({warning for given in told for warning in given.warnings}),
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
@@ -359,7 +368,7 @@ class Ledger:
         if end is None:
             if not self.stopped:
                 with redirect_stderr(io.StringIO()) as words:
-                    given = _failure(self._tasks[index].label, "run", Path(), BrokenExecutor())
+                    given = failure(self._tasks[index].label, "run", Path(), BrokenExecutor())
                 self._words[index].append(words.getvalue())
                 self.missing(number, given)
         else:
@@ -415,7 +424,8 @@ class Ledger:
         return True
 
 
-def _failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+    """Say why a question has no answer; returns that as its outcome."""
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))

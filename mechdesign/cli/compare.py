@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +27,8 @@ _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 # Of `Difference.change`: a file whose bytes are others.
 _BYTES = "bytes"
+# Differences that are told beside the table.
+_SAID = (VERDICT, OUTCOME)
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
 
@@ -104,7 +107,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
 def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
     """Compute again what a manifest describes and write its tables."""
     command = content.get("command")
-    if command not in mechdesign.commands.COMMANDS:
+    if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
     if content.get("interrupted"):
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
@@ -158,12 +161,15 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
     for note in found.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
     for difference in found.differences:
-        if difference.change in (VERDICT, OUTCOME):
+        if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
     tables, columns = found.compared["tables"], found.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
     terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
-    terminal.show(found.table, as_json=as_json)
+    if as_json or not sys.stdout.isatty():
+        terminal.show(found.table, as_json=as_json)
+    else:
+        terminal.show_lines([str(each) for each in found.differences if each.change not in _SAID])
     if junit is not None:
         writer.write_file(junit, _junit(found, command).encode())
     return 1 if found.differences else 0

@@ -16,6 +16,7 @@ import mechdesign
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import STYLES, Options
+from mechdesign.commands import SWEEP
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
@@ -25,7 +26,7 @@ from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
 from mechdesign.study import Study, load, template_path
@@ -42,6 +43,10 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
+
+
+# Commands that an interrupted run need not begin anew.
+_RESUMED = ("optimize", SWEEP.name)
 
 
 @dataclass(frozen=True)
@@ -130,7 +135,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, directory, options) if command == "optimize" else None
+    journal = _journal(study, command, directory, options) if command in _RESUMED else None
     if journal is not None:
         more["journal"] = journal
     try:
@@ -153,7 +158,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         journal.discard()
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
-    code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
+    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, table=result.main,
@@ -196,19 +201,20 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+    if len(verdicts) != len(judged_by(study, command)):
         return None
     settle(directory)
-    code = _exit_code(failed, verdicts)
+    code = _exit_code(failed, verdicts, table)
     return Outcome(
         study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
         table=table,
     )  # fmt: skip
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
-    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
-    return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
+def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
+    cases: list[int] = table["exit_code"].tolist() if "exit_code" in table else []
+    return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
 def _judged_and_written(
@@ -225,12 +231,12 @@ def _judged_and_written(
     return verdicts, writer.write(directory, study, result, verdicts, asked, jobs)
 
 
-def _journal(study: Study, directory: Path, options: Options) -> Journal:
-    """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
-    journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
+def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
+    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study.label}: optimize: {there}; begins anew", quiet=options.quiet)
+        terminal.say(f"{study.label}: {command}: {there}; begins anew", quiet=options.quiet)
     return journal
 
 
@@ -242,7 +248,9 @@ def tell(given: Outcome, options: Options) -> None:
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{who} {given.failed}")
+        from mechdesign.cli.docs import look_up
+
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
 
@@ -280,8 +288,8 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 
 @one_thread()
-def ask(command: str, path: Path | None, options: Options) -> int:
-    """One command from end to end; returns its exit code."""
+def ask(command: str, path: Path | None, options: Options) -> Outcome:
+    """One command from end to end."""
     study = load_study(path, options)
     directory = folder(study, command, options)
     writer.check_writable(directory)
@@ -297,4 +305,4 @@ def ask(command: str, path: Path | None, options: Options) -> int:
     assert given.table is not None
     terminal.show(given.table, as_json=options.json, rest=str(directory / f"{given.table.name}.csv"))
     tell(given, options)
-    return given.exit_code
+    return given

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from mechdesign.commands import COMMANDS, MAX_JOBS
+from mechdesign.commands import MAX_JOBS, QUESTIONS
 from mechdesign.errors import StudyError
 from mechdesign.files import FORMATS, formats_of
 
@@ -135,6 +135,33 @@ RESUME = _flag(
 RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
+VARY = _text(
+    "vary",
+    list[str],
+    "--vary",
+    "A.B.C=VALUES",
+    "An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of "
+    "a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.",
+)
+METHOD = _text(
+    "method", str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid."
+)
+SAMPLES = _text("samples", int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
+CASES = _text(
+    "cases",
+    Path,
+    "--cases",
+    "FILE",
+    "CSV file of cases instead of --vary: its first line names entries of the study, each line below is a case.",
+)
+RESULTS = _text(
+    "results",
+    list[str],
+    "--results",
+    "LIST",
+    "Results that are listed besides the requirements, with commas between, e.g. kinematics.mu.min,GII. Repeatable; in "
+    "place of those of the study's matrix.",
+)
 VERIFY = _text(
     "verify",
     Path,
@@ -152,7 +179,7 @@ def _folder(name: str, meaning: str) -> Parameter:
 FILE = _parameter(
     "file", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
 )
-QUESTIONS = _parameter(
+ASKED = _parameter(
     "commands",
     list[str] | None,
     None,
@@ -160,7 +187,7 @@ QUESTIONS = _parameter(
         metavar="[COMMAND]...",
         help="Questions; left out: all that the study asks.",
         show_default=False,
-        autocompletion=_one_of(COMMANDS),
+        autocompletion=_one_of(QUESTIONS),
     ),
 )
 TEMPLATE = typer.Argument(
@@ -195,6 +222,8 @@ TOLERANCES = _text(
     "that fits counts, --rtol and --atol where none does.",
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
+# Of the cases of a sweep.
+MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS)
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import printable_lines
@@ -42,6 +43,14 @@ def show(table: Table, *, as_json: bool, rest: str = "") -> None:
         _show_to_people(table, rest)
     else:
         emit(to_csv(table))
+
+
+def show_lines(lines: Sequence[str]) -> None:
+    """The first of many lines to a terminal, and how many are left."""
+    more = len(lines) - _ROWS
+    emit("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
+    if more > 0:
+        emit(f"... {more} more; --out DIR writes all of them\n")
 
 
 def _show_to_people(table: Table, rest: str) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from mechdesign.cli import batch, terminal
 from mechdesign.cli.execution import STANDARD_INPUT, load_source
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggestion
 from mechdesign.study.text.inputs import FILES
 
@@ -30,9 +30,9 @@ def watch(path: Path, commands: Sequence[str], options: Options) -> int:
         If there is no such question, or the study is no file.
     """
     for command in commands:
-        if command not in COMMANDS:
-            known = ", ".join(COMMANDS)
-            raise StudyError(f"{command!r} is no question{suggestion(command, COMMANDS)}; there are {known}")
+        if command not in QUESTIONS:
+            known = ", ".join(QUESTIONS)
+            raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {known}")
     if path == STANDARD_INPUT or path.is_dir():
         raise StudyError(f"{path}: is no file that could be watched")
     files = {path}

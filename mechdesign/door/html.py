@@ -12,10 +12,10 @@ import numpy as np
 from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import counted
+from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_words
 from mechdesign.mechanism.diagnosis import joints_in_words
-from mechdesign.mechanism.model import Drive, Link
 from mechdesign.report.figures.style import printed
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.requirements import Verdict
@@ -47,9 +47,9 @@ def study_html(study: Study, picture: bytes | None) -> str:
     """A study: its drawing, a PNG if it has one, and what it says in words."""
     description = study.mechanism.description
     facts = {
-        "links": [_link(study, link) for link in description.links.values()],
+        "links": [_link(link, study.units.label("length")) for link in links_in_words(description)],
         "joints": joints_in_words(description, study.mechanism.graph),
-        "drives": [_drive(drive) for drive in description.drives.values()],
+        "drives": drives_in_words(description),
         "mobility": [str(study.mechanism.mobility)],
         "questions": list(study.questions),
         "changed": list(study.overrides),
@@ -80,7 +80,7 @@ def answer_html(
         "answer.html.j2",
         command=answer.command,
         study=study.name,
-        question=COMMANDS[answer.command].question,
+        question=QUESTIONS[answer.command].question,
         counts=[f"{what}: {count:,}" for what, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
         verdicts=shown,
@@ -126,21 +126,11 @@ def _inline(picture: bytes | None) -> str:
     return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
-def _link(study: Study, link: Link) -> str:
-    """A link with its points, and its length where it has two ends."""
-    words = f"{link.name} ({', '.join(link.points)}"
-    if link.telescopic and link.ends is not None:
-        return f"{link.name} ({'-'.join(link.ends)}, telescopic)"
-    if link.ends is not None:
-        length = link.points[link.ends[1]][0]
-        number = study.mechanism.description.places[length].nominal if isinstance(length, str) else length
-        words += f"; {number:.{_DIGITS}g} {study.units.label('length')}".rstrip()
-    return f"{words})"
-
-
-def _drive(drive: Drive) -> str:
-    reference = "" if drive.kind != "angle" or drive.reference == "ground" else f" from {drive.reference}"
-    return f"{drive.name} ({drive.kind} of {drive.target}{reference})"
+def _link(link: LinkWords, unit: str) -> str:
+    length = "; telescopic" if link.telescopic else ""
+    if link.length is not None:
+        length = f"; {link.length:.{_DIGITS}g} {unit}".rstrip()
+    return f"{link.name} ({', '.join(link.points)}{length})"
 
 
 def _largest(columns: Sequence[Column], unit: str) -> float:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError, few_comparisons
+from mechdesign.commands import SWEEP
+from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import Result, Table
 from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
 from mechdesign.study import Study
@@ -34,6 +35,11 @@ class Verdict:
 def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
+
+
+def judged_by(study: Study, command: str) -> list[int]:
+    """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
+    return [k for k, each in enumerate(study.requirements) if command in (command_of(each), SWEEP.name)]
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
@@ -110,6 +116,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ...     print(verdict)
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
     """
+    if "cases" in result.drawn:
+        return tuple(over_cases(result.drawn["cases"].verdicts))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -135,7 +143,7 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     path = requirement.result.partition(".")[2]
     chosen = choose(result, path, requirement.where, absolute=requirement.abs)
     table, name, values = chosen.table, chosen.column, chosen.values
-    words = _words(requirement)
+    words = in_words(requirement)
     rows = np.flatnonzero(chosen.counts)
     if chosen.missing and whole:
         raise UnknownColumnError(chosen.missing)
@@ -154,6 +162,20 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     )  # fmt: skip
 
 
+def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
+    """Verdicts on each requirement over cases, given by their names in words: the worst, and how many miss it."""
+    for cases in verdicts:
+        names = list(cases)
+        unmet = [k for k, each in enumerate(cases.values()) if not each.met]
+        margins = [-np.inf if np.isnan(each.margin) else each.margin for each in cases.values()]
+        k = int(np.argmin(margins))
+        worst = cases[names[k]]
+        place = ", ".join(filter(None, (names[k], worst.place)))
+        if unmet:
+            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first is case {unmet[0] + 1}"
+        yield replace(worst, met=not unmet, place=place)
+
+
 def margin_of(requirement: Requirement, value: float) -> float:
     """How far a value is from the nearer limit, negative beyond it."""
     room = [value - requirement.at_least] if requirement.at_least is not None else []
@@ -166,7 +188,8 @@ def unit_of(table: Table, name: str, row: int) -> str:
     return str(table["unit"][row]) if IN_UNIT in column.meaning and "unit" in table else column.unit
 
 
-def _words(requirement: Requirement) -> str:
+def in_words(requirement: Requirement) -> str:
+    """What is required: the result, the rows that count, the bounds."""
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))

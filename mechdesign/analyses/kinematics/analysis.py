@@ -242,12 +242,17 @@ def _conditioning(motion: Motion) -> list[str]:
     regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
     if regular.any() and motion.question.mixed:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
-    near = regular & ~(values >= SINGULAR)
-    if near.any():
-        count = np.count_nonzero(near)
+    if len(motion.question.drives) == 1:
+        # A Jacobian of one entry has no condition: it is compared with a whole size of the mechanism a radian.
+        (output,), (drive,) = motion.question.listed, motion.question.drives
+        size = {"length": motion.question.study.mechanism.size}
+        still = np.abs(motion.arrays["det_J"]) * size.get(drive.quantity, 1.0) / size.get(output.quantity, 1.0)
+        count = np.count_nonzero(regular & (still < SINGULAR))
         poses = "1 pose is" if count == 1 else f"{count} poses are"
-        return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
-    return []
+        return [f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"] if count else []
+    count = np.count_nonzero(regular & ~(values >= SINGULAR))
+    poses = "1 pose is" if count == 1 else f"{count} poses are"
+    return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"] if count else []
 
 
 def _astray(motion: Motion) -> list[str]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
+from mechdesign.analyses.columns import power_of_length, shared
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
@@ -130,11 +130,11 @@ class MotionQuestion:
         points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
         rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
         given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
-        told = f"{given} for {counted(len(drives), 'drive')}; name as many"
+        words = f"{given} for {counted(len(drives), 'drive')}; name as many"
         if not named:
-            told = f"no outputs are named; name as many as there are drives, {len(drives)},"
-        told += f" by kinematics.jacobian: [{', '.join(rows)}]"
-        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), told)
+            words = f"no outputs are named; name as many as there are drives, {len(drives)},"
+        words += f" by kinematics.jacobian: [{', '.join(rows)}]"
+        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), words)
 
 
 def motion_question(study: Study) -> MotionQuestion:
@@ -300,14 +300,16 @@ class Motion:
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
         rows = ", ".join(output.name for output in question.listed)
-        for name, meaning in (
-            ("det_J", f"determinant of the Jacobian of {rows} by the drives, per radian"),
-            ("inverse_condition", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
-            ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle "
-             "between two links that meet"),
+        lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
+        area = power_of_length(question.study.units, lengths[0] - lengths[1])
+        for name, unit, meaning in (
+            ("det_J", area, f"determinant of the Jacobian of {rows} by the drives, per radian"),
+            ("inverse_condition", "", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
+            ("conditioning", "", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the "
+             "angle between two links that meet"),
         ):  # fmt: skip
             if name in arrays:
-                columns.append(Column(name, arrays[name], "", meaning))
+                columns.append(Column(name, arrays[name], unit, meaning))
         for drive in question.drives:
             name = f"{drive.name}_effort"
             if name in arrays:

@@ -271,10 +271,10 @@ def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
         factor, pose, one, other = max(cases, key=lambda case: case[0])
         times_apart = f"{factor:.3g} times" if factor < 1e6 else "many orders of magnitude"
         several = task.poses.count > 1
-        rest = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
+        others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
         sentences.append(
             f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is {one.failure:.3g} by "
-            f"the one and {other.failure:.3g} by the other, {times_apart} apart{rest}"
+            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}"
         )
     return sentences
 

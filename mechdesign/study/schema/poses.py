@@ -259,7 +259,8 @@ class KinematicsSection(MotionSection):
     they are as many. Example: [C]
     """
     loads: tuple[Load, ...] = ()
-    """Forces and moments that act on the mechanism; the efforts of the drives that balance them are reported. Example:
+    """Forces and moments that act on the mechanism; the efforts of the drives (torque of a motor,
+    force of a cylinder) that balance them are reported. The same in all poses. Example:
     [{at: T, force: [0, -20]}, {link: boom, moment: 3}]
     """
     characteristic_length: fields.PositiveLength | None = None

@@ -194,9 +194,9 @@ class ReliabilitySection(MotionSection):
     independent. Example: [[r1, r2, 0.5]]
     """
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
-    """What errors may be, by coordinate or point; of velocities and accelerations C.x_velocity and so on. The
-    reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]} Example: {P: {radius:
-    0.05}}
+    """What errors may be in each pose, by coordinate, measure or point; of velocities and accelerations C.x_velocity
+    and so on. The reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]}
+    Example: {P: {radius: 0.05}}
     """
     load: tuple[fields.Number, ...] | None = None
     """Mean load [fx, fy, mz] on the stiffness section's point, whose deflection is part of the errors; it varies by
