@@ -198,8 +198,6 @@ def explain(error: Exception) -> tuple[int, str]:
         return error.exit_code, printable_lines(str(error))
     if isinstance(error, MemoryError):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
-    if "BrokenExecutor" in [kind.__name__ for kind in type(error).__mro__]:
-        return 4, "a process that computed was killed, as where memory runs out; use fewer --jobs"
     frames = [
         frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
     ]

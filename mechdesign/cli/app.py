@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -15,7 +15,7 @@ import typer
 from mechdesign.cli import options as given
 from mechdesign.cli import process
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
+from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
@@ -82,39 +82,54 @@ def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], shor
 def _ask(command: str, study: Path | None, **said: Any) -> int:
     from mechdesign.cli.execution import ask
 
-    return ask(command, study, Options(**said)).exit_code
+    options = Options(command=command, **said)
+    with _placed(options):
+        return ask(command, study, options).exit_code
 
 
 def _sweep(study: Path | None, **said: Any) -> int:
     from mechdesign.cli.sweep import Matrix, sweep
 
     matrix = Matrix(**{each.name: said.pop(each.name) for each in given.MATRIX})
-    return sweep(study, Options(**said), matrix)
+    return sweep(study, Options(command=SWEEP.name, **said), matrix)
 
 
-def _run(study: Sequence[Path] | None, **said: Any) -> int:
+def _run(command: str, study: Sequence[Path] | None, **said: Any) -> int:
     from mechdesign.cli import batch, compare
 
-    options = Options(**said)
-    return batch.run(study, options) if options.verify is None else compare.verify(study, options)
+    options = Options(command=command, **said)
+    if options.verify is not None:
+        return compare.verify(study, options)
+    with _placed(options):
+        return batch.run(study, options)
 
 
 def _check(study: Sequence[Path] | None, **said: Any) -> int:
     from mechdesign.cli import batch
 
-    return batch.check(study, Options(**said))
+    return batch.check(study, Options(command="check", **said))
 
 
 def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
     from mechdesign.cli.watch import watch
 
-    return watch(file, commands or (), Options(**said))
+    return watch(file, commands or (), Options(command="watch", **said))
 
 
 def _compare(**said: Any) -> int:
     from mechdesign.cli.compare import compare
 
     return compare(**said)
+
+
+def _placed(options: Options) -> AbstractContextManager[None]:
+    """Where great work goes."""
+    if options.executor is None:
+        return nullcontext()
+    from mechdesign.executors import named
+    from mechdesign.parallel import on
+
+    return on(named(options.executor, options.jobs))
 
 
 for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
@@ -131,14 +146,25 @@ _add(
     f"{SWEEP.question} {SWEEP.answer}",
 )  # fmt: skip
 _add(
-    _run,
+    partial(_run, "run"),
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
-        given.RESUME, given.VERIFY,
+        given.RESUME, given.VERIFY, given.EXECUTOR, given.SHARD,
     ),
     "Answer every question that each study asks.",
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
+)  # fmt: skip
+_add(
+    partial(_run, MERGE),
+    MERGE,
+    (
+        given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
+        given.EXECUTOR,
+    ),
+    "Put together what runs with --shard computed.",
+    "Put together what runs with --shard computed: what a run without it gives, byte by byte. Options that change "
+    "numbers, such as --set and --seed, and --out are given again.",
 )  # fmt: skip
 _add(
     _check,

@@ -6,7 +6,6 @@ import glob
 import io
 import sys
 from collections.abc import Sequence
-from concurrent.futures import BrokenExecutor
 from contextlib import redirect_stderr
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,6 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mechdesign import shards
 from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.board import Board, Far, Reported
@@ -31,17 +31,20 @@ from mechdesign.cli.execution import (
     interrupted,
     load_source,
     load_study,
+    place,
     source,
     tell,
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS, QUESTIONS, SENSITIVITIES, SWEEP
+from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
+from mechdesign.courier import LostWorkerError
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable
 from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread, worker_count
+from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
@@ -52,6 +55,8 @@ from mechdesign.study.schema.reliability import in_words
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
+_KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
+
 
 @dataclass(frozen=True)
 class Task:
@@ -61,7 +66,7 @@ class Task:
     source: Source
     label: str
     root: Path  # of the folders of its questions
-    commands: tuple[str, ...]
+    questions: tuple[tuple[str, Path], ...]  # commands, and the folders of their results
 
 
 @dataclass(frozen=True)
@@ -180,12 +185,26 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
             label = study.label
             claim(owners, study)
             root = folder(study, "", options, several=len(paths) > 1)
-            tasks.append(Task(number, origin, label, root, tuple(only) or questions(study)))
+            tasks.append(Task(number, origin, label, root, _places(only or questions(study), root, options)))
         except Exception as error:
             ledger.missing(number, failure(label, "check", Path(), error, study))
             if ledger.stopped:
                 break
     return tasks
+
+
+def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
+    """The questions of a study with their folders; of shards that one command computed, that alone."""
+    found = tuple((command, place(root / command, options)) for command in commands)
+    if options.command != MERGE:
+        return found
+    if alone := shards.found(root):
+        return ((shards.command_of(alone[0]), root),)
+    if (done := manifest.read(root)) is not None and done.get("command") in COMMANDS:
+        return ((done["command"], root),)
+    begun = tuple((command, directory) for command, directory in found if shards.found(directory))
+    given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
+    return found if not begun or "run" in given else begun
 
 
 def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
@@ -197,7 +216,8 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
         When what an interrupt has left is told.
     """
     jobs = worker_count(options.jobs)
-    count = min(jobs, len(tasks)) if sys.platform == "linux" else 1
+    # Work that goes elsewhere goes from this process.
+    count = min(jobs, len(tasks)) if sys.platform == "linux" and options.executor is None else 1
     if count > 1:
         options = replace(options, jobs=jobs // count)
         if not options.resume:
@@ -230,7 +250,7 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
 
 def _import(tasks: Sequence[Task], options: Options) -> None:
     """Import what answers the questions, once for all processes that are forked."""
-    for command in {command for task in tasks for command in task.commands}:
+    for command in {command for task in tasks for command, _ in task.questions}:
         import_module(QUESTIONS[command].module)
         if not options.no_plots:
             import_module(f"{FIGURES}.{command}")
@@ -254,14 +274,14 @@ def _study(options: Options, several: bool, task: Task, hear: Tell) -> End:
             say(failure(task.label, "check", Path(), error))
             return ended
         try:
-            for command in task.commands:
-                given = _question(study, command, task.root / command, options, Reported(command, hear))
+            for command, directory in task.questions:
+                given = _question(study, command, directory, options, Reported(command, hear))
                 told.append(given)
                 say(given)
                 if given.exit_code and options.fail_fast:
                     break
         except KeyboardInterrupt as error:
-            told.append(interrupted(study, command, task.root / command, error))
+            told.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
             ended = replace(ended, entry=_page(study, task, told, options, several=several))
@@ -292,7 +312,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], options: Options, *
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None
-    left = [command for command in task.commands if command not in {given.command for given in told}]
+    left = [command for command, _ in task.questions if command not in {given.command for given in told}]
     write_report(task.root, study, told, options, left)
     if not several:
         return None
@@ -304,7 +324,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], options: Options, *
         study.label,
         [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
         met=sum(verdict.met for verdict in verdicts),
-        required=sum(len(judged_by(study, command)) for command in task.commands),
+        required=sum(len(judged_by(study, command)) for command, _ in task.questions),
         warnings=len({warning for given in told for warning in given.warnings}),
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
@@ -368,7 +388,7 @@ class Ledger:
         if end is None:
             if not self.stopped:
                 with redirect_stderr(io.StringIO()) as words:
-                    given = failure(self._tasks[index].label, "run", Path(), BrokenExecutor())
+                    given = failure(self._tasks[index].label, "run", Path(), LostWorkerError(_KILLED))
                 self._words[index].append(words.getvalue())
                 self.missing(number, given)
         else:

@@ -78,7 +78,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     """
     assert options.verify is not None
     path = options.verify
-    beside = {name: getattr(options, name) for name in ("jobs", "json", "quiet", "junit", "allow_files")}
+    beside = {name: getattr(options, name) for name in ("command", "jobs", "json", "quiet", "junit", "allow_files")}
     alone = Options(verify=path, **beside)
     if studies or dataclasses.replace(options, overrides=options.overrides or ()) != alone:
         raise StudyError(

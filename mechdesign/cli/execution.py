@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import mechdesign
+from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
 from mechdesign.cli.options import STYLES, Options
-from mechdesign.commands import SWEEP
+from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
-from mechdesign.parallel import one_thread
+from mechdesign.parallel import Divided, divided, one_thread
 from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
@@ -29,6 +30,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
 from mechdesign.results import Result, Table
+from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
@@ -65,6 +67,7 @@ class Outcome:
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
     table: Table | None = None  # the main one
+    shard: str = ""  # what became of a part of it, where no more was asked
 
 
 def source(path: Path | None, options: Options) -> Source:
@@ -103,6 +106,11 @@ def folder(study: Study, name: str, options: Options, *, several: bool = False) 
     return options.out / study.label if several else options.out
 
 
+def place(directory: Path, options: Options) -> Path:
+    """The folder that a command writes in: of a shard its own, for others write at the same time."""
+    return directory if options.part is None else directory / options.part.folder
+
+
 def claim(owners: dict[str, Path | None], study: Study) -> None:
     """Take the folder of a study's name; `owners` says which file each folder belongs to.
 
@@ -124,14 +132,23 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
+    if options.part is not None:
+        return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
     asked = extras(command, options)
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
-    if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
+    share, merging = None, options.command == MERGE and command in DIVIDED
+    if merging and shards.found(directory):
+        share = shards.merge(directory, manifest.computed_from(study, command))
+    elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
+    elif merging:
+        # A mistake of the study is why there are none.
+        requirements.foresee(study, [command])
+        raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
@@ -139,7 +156,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         more["journal"] = journal
     try:
-        with progress:
+        with progress, divided(share):
             result: Result = getattr(mechdesign, command)(
                 study, seed=options.seed, jobs=options.jobs, progress=progress, **more
             )
@@ -157,12 +174,40 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         raise
     if journal is not None:
         journal.discard()
+    shards.remove(directory)
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
         written=True, table=result.main,
     )  # fmt: skip
+
+
+def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
+    """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
+    told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
+    if command not in DIVIDED:
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
+    origin = manifest.computed_from(study, command)
+    if options.resume and shards.is_current(directory, origin):
+        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
+    requirements.foresee(study, [command])
+    taken = shards.Taken(shard)
+    try:
+        with progress, divided(taken):
+            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
+    except Divided:
+        pass
+    except Interrupted:
+        # A part of a part is nothing.
+        raise KeyboardInterrupt from None
+    except MechdesignError:
+        # Merge comes to the same, and tells it.
+        taken.write(directory, origin, options.command)
+        raise
+    taken.write(directory, origin, options.command)
+    seconds = time.perf_counter() - begun
+    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
@@ -251,6 +296,9 @@ def tell(given: Outcome, options: Options) -> None:
         from mechdesign.cli.docs import look_up
 
         terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
+    if given.shard:
+        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        return
     kept = "; they are whole, and not computed again" if given.kept else ""
     terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
 
@@ -291,7 +339,7 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 def ask(command: str, path: Path | None, options: Options) -> Outcome:
     """One command from end to end."""
     study = load_study(path, options)
-    directory = folder(study, command, options)
+    directory = place(folder(study, command, options), options)
     writer.check_writable(directory)
     with owned(directory):
         try:
@@ -302,6 +350,9 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
             raise
         if options.report:
             write_report(directory, study, [given], options)
+    if given.shard:
+        tell(given, options)
+        return given
     assert given.table is not None
     terminal.show(given.table, as_json=options.json, rest=str(directory / f"{given.table.name}.csv"))
     tell(given, options)

@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from inspect import Parameter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mechdesign.commands import MAX_JOBS, QUESTIONS
 from mechdesign.errors import StudyError
 from mechdesign.files import FORMATS, formats_of
+
+if TYPE_CHECKING:
+    from mechdesign.shards import Shard
 
 # Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
@@ -88,6 +91,22 @@ JOBS = _text(
     "Threads to compute on, or studies at a time; the results do not depend on it. Default: every processor.",
     min=1,
     max=MAX_JOBS,
+)
+EXECUTOR = _text(
+    "executor",
+    str,
+    "--executor",
+    "NAME",
+    "Where great work is computed: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
+    "concurrent.futures.Executor. The results do not depend on it. Default: here.",
+)
+SHARD = _text(
+    "shard",
+    str,
+    "--shard",
+    "I/N",
+    "Compute the I-th of N parts of the great work alone, from 1 on, and keep it in the folder of the results; "
+    "`mechdesign merge` puts the parts together.",
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
@@ -226,7 +245,12 @@ OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default:
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS)
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
-OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
+OWN = {
+    "kinematics": (ANIMATE, ALL_MODES, BEFORE),
+    "workspace": (BEFORE,),
+    "optimize": (RESUME_DESIGNS, EXECUTOR, SHARD),
+    "reliability": (EXECUTOR, SHARD),
+}
 
 
 @dataclass(frozen=True)
@@ -243,6 +267,9 @@ class Options:
     overrides: tuple[str, ...] | None = ()
     seed: int | None = None
     jobs: int | None = None
+    executor: str | None = None
+    shard: str | None = None
+    command: str = ""  # that was given
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
@@ -264,9 +291,18 @@ class Options:
         for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
             if value is not None and self.no_plots:
                 raise StudyError(f"{option} and --no-plots contradict each other")
+        if self.shard is not None and self.report:
+            raise StudyError("--shard and --report contradict each other; merge takes --report")
         if self.style is not None and self.style not in STYLES:
             raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         formats_of(self.formats, "--format")
+
+    @property
+    def part(self) -> Shard | None:
+        """The shard that is to be computed."""
+        from mechdesign.shards import Shard
+
+        return None if self.shard is None else Shard.of(self.shard)
 
     @property
     def kinds(self) -> str:

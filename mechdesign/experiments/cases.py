@@ -142,7 +142,7 @@ def answers(
     Every question that one of them needs is answered once a case, with the study's seed. What cannot be loaded or
     answered says why in `Answered.failed`.
     """
-    yield from map_chunks(Answer(study, tuple(wanted)), cases, jobs, processes=True)
+    yield from map_chunks(Answer(study, tuple(wanted)), cases, jobs, processes=True, travels=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,7 +84,7 @@ def test_the_study_that_ends_its_process_is_the_only_one_lost(studies, analysis,
     done = invoke("run", "a.yaml", "b.yaml", "c.yaml", "--no-plots", "--jobs", 2)
     assert done.exit_code == 4
     assert rows(done) == [("a", "kinematics", "done"), ("b", "run", "failed"), ("c", "kinematics", "done")]
-    assert "b: run: a process that computed was killed" in done.stderr
+    assert "b: run: the process that computed it was killed" in done.stderr
     # Nothing of it is in the way of the next run.
     analysis(lambda study, **options: answer())
     assert invoke("run", "b.yaml", "--no-plots").exit_code == 1

@@ -79,7 +79,7 @@ def optimize(
         else searching.allowance(len(section.variables), len(weights), len(goals), slow=evaluator.slow)
     )
     evaluator.limit_rows(MAX_KEPT_ROWS // budget)
-    with workers(evaluator, jobs, processes=True) as compute:
+    with workers(evaluator, jobs, processes=True, travels=True) as compute:
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
             doubts = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)

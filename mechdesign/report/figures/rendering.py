@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor
 from contextlib import suppress
+from functools import partial
 from typing import ParamSpec
 
 from matplotlib.figure import Figure
 
+from mechdesign.courier import LostWorkerError
 from mechdesign.errors import explain
 from mechdesign.parallel import map_chunks, worker_count
 
@@ -49,6 +50,17 @@ class Gallery(dict[str, Figure]):
             self.failed |= made.failed
 
 
+# Drawings under way, which a forked process has as well: figures do not travel.
+_here: dict[int, Mapping[str, Drawing]] = {}
+
+
+def _draw(key: int, name: str) -> dict[str, bytes] | str:
+    try:
+        return _here[key][name]()
+    except Exception as error:
+        return explain(error)[1]
+
+
 def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[dict[str, bytes], dict[str, str]]:
     """Call every drawing; on Linux in two forked processes, if two `jobs` may be done at a time.
 
@@ -63,18 +75,17 @@ def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[di
         Why there are none, by the names of drawings.
     """
 
-    def draw(name: str) -> dict[str, bytes] | str:
-        try:
-            return drawings[name]()
-        except Exception as error:
-            return explain(error)[1]
-
     names = list(drawings)
     found: dict[str, dict[str, bytes] | str] = {}
-    with suppress(BrokenExecutor):
-        count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
-        for name, drawn in zip(names, map_chunks(draw, names, count, processes=True), strict=True):
-            found[name] = drawn
-    found |= {name: draw(name) for name in names if name not in found}
+    key = id(drawings)
+    _here[key] = drawings
+    try:
+        with suppress(LostWorkerError):
+            count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
+            for name, drawn in zip(names, map_chunks(partial(_draw, key), names, count, processes=True), strict=True):
+                found[name] = drawn
+        found |= {name: _draw(key, name) for name in names if name not in found}
+    finally:
+        del _here[key]
     files = {file: data for name in names if isinstance(drawn := found[name], dict) for file, data in drawn.items()}
     return files, {name: why for name in names if isinstance(why := found[name], str)}
