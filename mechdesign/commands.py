@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 MAX_JOBS = 512  # threads or processes of one command
 MERGE = "merge"  # the command that puts shards together
-DIVIDED = ("optimize", "reliability", "sweep")  # commands whose work can be divided into shards
+DIVIDED = ("optimize", "reliability", "sweep", "sensitivities")  # commands whose work can be divided into shards
 
 
 @dataclass(frozen=True)

@@ -95,7 +95,10 @@ class _Dask(Pool):
             if address == LOCAL:
                 with _deaf(), importlib.import_module("dask").config.set(_CALM):
                     self._cluster = distributed.LocalCluster(
-                        n_workers=worker_count(jobs), threads_per_worker=1, dashboard_address=None, silence_logs=50
+                        n_workers=worker_count(jobs),
+                        threads_per_worker=1,
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=50,
                     )
             else:
                 _knock(address)

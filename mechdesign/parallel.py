@@ -39,7 +39,7 @@ _MEBIBYTE = 2**20
 # Option of Linux's prctl, from prctl.h: the signal that a process gets when its parent ends.
 _PR_SET_PDEATHSIG = 1
 # Sent to a whole group of processes, workers too.
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if sys.platform != "win32" else ()
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if sys.platform != "win32" else ()
 # Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
@@ -223,7 +223,7 @@ def _forked(count: int) -> Executor:
 @contextmanager
 def undisturbed() -> Iterator[None]:
     """Inside, an interrupt waits; also in what is forked there."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
         yield
     finally:
@@ -246,7 +246,7 @@ def _settle_in(parent: int) -> None:
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
 
 @cache

@@ -1,7 +1,7 @@
 """Hypothesis: no deadlines, for machines are noisy; in CI the same examples at every run, to repeat it by.
 
 Linear algebra keeps to one thread: the matrices are small, and several workers share the processors.
-`--budget 30m` is how long the random searches of `tests/hunt` go on.
+`--budget 30m` is how long the random searches of `tests/hunt` go on, `--cases` how many each looks at.
 What is imported and collected is never garbage: the collector need not go through it at every study.
 """
 
@@ -33,6 +33,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--budget", type=seconds_of, default=None, help="time for the random searches of tests/hunt: 90s, 30m, 2h"
     )
+    parser.addoption("--cases", type=int, default=None, help="cases of each random search of tests/hunt")
+    parser.addoption("--first", type=int, default=0, help="seed of the first case")
 
 
 def pytest_collection_finish() -> None:

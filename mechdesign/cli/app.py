@@ -91,7 +91,9 @@ def _sweep(study: Path | None, **said: Any) -> int:
     from mechdesign.cli.sweep import Matrix, sweep
 
     matrix = Matrix(**{each.name: said.pop(each.name) for each in given.MATRIX})
-    return sweep(study, Options(command=SWEEP.name, **said), matrix)
+    options = Options(command=SWEEP.name, **said)
+    with _placed(options):
+        return sweep(study, options, matrix)
 
 
 def _run(command: str, study: Sequence[Path] | None, **said: Any) -> int:
@@ -140,7 +142,7 @@ _add(
     SWEEP.name,
     (
         *given.COMMON[:2], *given.MATRIX, *given.COMMON[2:],
-        given.REPORT, given.JUNIT, given.RESUME_DESIGNS,
+        given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
     ),
     SWEEP.question,
     f"{SWEEP.question} {SWEEP.answer}",

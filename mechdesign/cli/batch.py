@@ -178,7 +178,7 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
-        label, study = path.stem if path else "study", None
+        label, study = printable(path.stem) if path else "study", None
         try:
             origin = source(path, options)
             study = load_source(origin, options)
@@ -367,12 +367,14 @@ class Ledger:
 
     def note(self, index: int, note: Far | Said) -> None:
         """Hear of a task how far it is, or a question's outcome."""
+        task = self._tasks[index]
         if isinstance(note, Far):
             self.board.far(index, note)
-            return
+            great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
+            note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
         self._words[index].append(note.words)
         if note.given is not None:
-            self._answers[self._tasks[index].number].append(note.given)
+            self._answers[task.number].append(note.given)
             self.board.done(index, note.given)
             self.stopped |= self.options.fail_fast and note.given.exit_code > 0
         if index == self._first:

@@ -21,6 +21,8 @@ from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import OUTCOME, VERDICT, Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
 from mechdesign.report.tables import to_csv
+from mechdesign.study.loading import load_data
+from mechdesign.study.text.inputs import Folder
 
 # Files in the folder of differences.
 _TABLE = "differences.csv"
@@ -112,7 +114,8 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     if content.get("interrupted"):
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
     try:
-        study = mechdesign.load(content["study"]["resolved"], seed=content["seed"], allow_files=options.allow_files)
+        inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
+        study = load_data(content["study"]["resolved"], (), content["seed"], inputs)
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:

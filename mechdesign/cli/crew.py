@@ -14,7 +14,7 @@ from types import FrameType
 from typing import Any, Generic, TypeVar
 
 from mechdesign.cli.process import Signals
-from mechdesign.parallel import SIGNALS, end_with, undisturbed
+from mechdesign.parallel import end_with, undisturbed
 
 Task = TypeVar("Task")
 Value = TypeVar("Value")
@@ -204,7 +204,7 @@ def _serve(work: Callable[[Any, Tell], Any], tasks: Sequence[Any], connection: C
     """Do the tasks that one is told to do, until it is none."""
     end_with(parent)
     signals = _Interrupts()
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    signals.hear()
 
     def send(*said: Any) -> None:
         with undisturbed():

@@ -295,7 +295,7 @@ def tell(given: Outcome, options: Options) -> None:
     if given.failed:
         from mechdesign.cli.docs import look_up
 
-        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}")
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}".rstrip("\n"))
     if given.shard:
         terminal.say(f"{who} {given.shard}", quiet=options.quiet)
         return

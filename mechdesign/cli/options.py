@@ -250,6 +250,7 @@ OWN = {
     "workspace": (BEFORE,),
     "optimize": (RESUME_DESIGNS, EXECUTOR, SHARD),
     "reliability": (EXECUTOR, SHARD),
+    "sensitivities": (EXECUTOR, SHARD),
 }
 
 

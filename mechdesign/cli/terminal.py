@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
 _NAMES = 6  # names of columns for which there was no room
+_GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
 DELAY = 1.0  # seconds before it is shown how far something is
 
 
@@ -89,10 +90,16 @@ def lively() -> bool:
     return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
 
 
+def announced(total: int, what: str) -> str:
+    """What is said of a great stage when it begins; empty of others."""
+    return f"{total} {what} to compute; Ctrl-C ends it" if total >= _GREAT else ""
+
+
 class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
         self._wanted = not quiet and lively()
         self._begun = time.monotonic()
         self._bar: Shown | None = None
@@ -105,7 +112,9 @@ class Bar(Progress):
             self._bar.stop()
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage."""
+        """Begin a stage; a great one is said, also where nobody sees a bar."""
+        if great := announced(total, what):
+            say(great, quiet=self._quiet)
         self._total, self._done, self._what = total, 0, what
         if self._bar is not None and self._task is not None:
             self._bar.reset(self._task, total=total, description=what)

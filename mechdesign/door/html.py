@@ -18,6 +18,7 @@ from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_w
 from mechdesign.mechanism.diagnosis import joints_in_words
 from mechdesign.report.figures.style import printed
 from mechdesign.report.page.headlines import headlines
+from mechdesign.report.page.pages import harmless
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import cells
 from mechdesign.results import Column, Result, Table
@@ -103,7 +104,13 @@ def _render(template: str, **said: object) -> str:
 
 @cache
 def _environment() -> Environment:
-    made = Environment(loader=PackageLoader("mechdesign.door"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(
+        loader=PackageLoader("mechdesign.door"),
+        autoescape=True,
+        finalize=harmless,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters |= {"few": _few, "short": _short, "printed": printed}
     return made
 

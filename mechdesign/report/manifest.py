@@ -15,11 +15,12 @@ from typing import Any
 
 from mechdesign.files import proper
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import plain
+from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
 
 NAME = "manifest.json"
+_INPUTS_IN = "inputs_in"
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
 
 
@@ -67,12 +68,32 @@ def shown_before(study: Study) -> dict[str, Any]:
     return {key: about[key] for key in ("study", "inputs", "overrides") if key in about}
 
 
+def _way_to_inputs(study: Study, directory: Path) -> dict[str, str]:
+    """The folder of a study that names files, as seen from its results: `inputs_in`, by which they are found again."""
+    if not any(True for _ in study.inputs()):
+        return {}
+    return {_INPUTS_IN: Path(os.path.relpath(study.folder.path, directory)).as_posix()}
+
+
+def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
+    """Where the files lie that a study names: beside the study if it is known where that is, else its results."""
+    beside = directory / str(content.get(_INPUTS_IN, "."))
+    names = content.get("inputs") or {}
+    return beside if all((beside / name).is_file() for name in names) else directory
+
+
 def compose(
-    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Extras
+    directory: Path,
+    study: Study,
+    result: Result,
+    verdicts: Sequence[Verdict],
+    files: Mapping[str, str],
+    asked: Extras,
 ) -> bytes:
-    """The manifest of a result whose files have these SHA-256."""
+    """The manifest of a result in a folder, whose files have these SHA-256."""
     content = (
         computed_from(study, result.command)
+        | _way_to_inputs(study, directory)
         | asdict(asked)
         | {
             "counts": plain(dict(result.counts)),
@@ -94,7 +115,7 @@ def compose(
             "files": dict(files),
         }
     )
-    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+    return (json_text(content, indent=2) + "\n").encode()
 
 
 def read(directory: Path) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import printable
+from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
 
 _DIGITS = 12
@@ -113,13 +113,16 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
+def json_text(value: Any, **options: Any) -> str:
+    """A value as JSON: letters stand as they are, what is not printable as an escape, such as ``\\u202e``."""
+    return printable_lines(json.dumps(value, ensure_ascii=False, **options), json.dumps)
+
+
 def to_json(table: Table) -> str:
     """The table as a JSON array with an object a row; booleans are 1 and 0 as in the CSV file, nan is null."""
     lists = []
     for column in table.columns:
         values = np.asarray(column.values)
         lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
-    lines = [
-        json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False) for row in zip(*lists, strict=True)
-    ]
+    lines = [json_text(dict(zip(table.names, row, strict=True))) for row in zip(*lists, strict=True)]
     return "[\n" + ",\n".join(lines) + "\n]\n" if lines else "[]\n"

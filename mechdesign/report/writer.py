@@ -83,7 +83,7 @@ def write(
         tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
         with Transaction(directory) as written:
             digests = {name: written.stage(name, blocks) for name, blocks in files.items()}
-            written.stage(manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
+            written.stage(manifest.NAME, [manifest.compose(directory, study, result, verdicts, digests, tables)])
             written.commit(stale, voucher=manifest.NAME)
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
@@ -100,7 +100,7 @@ def write(
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
-                written.stage(manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
+                written.stage(manifest.NAME, [manifest.compose(directory, study, told, verdicts, digests, asked)])
                 written.commit(voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -97,7 +97,9 @@ class Study:
     @property
     def label(self) -> str:
         """The name of its folder of results, that of its file or else its own."""
-        return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        return (
+            printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        )
 
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"
@@ -158,11 +160,7 @@ def load(
         content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
         return load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
     if isinstance(source, Mapping):
-        data = _plain_data(source, "the study")
-        document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
-        override(document, changes)
-        sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, Folder(anywhere=allow_files), b"", sha256, changes, seed)
+        return load_data(source, overrides, seed, Folder(anywhere=allow_files))
     assert source is not None
     file = pathlib.Path(source)
     try:
@@ -172,6 +170,17 @@ def load(
         why = getattr(error, "strerror", None) or error
         raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
     return load_bytes(whole, file, overrides, seed, Folder(file.parent, allow_files))
+
+
+def load_data(
+    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder
+) -> Study:
+    """Load a study from a mapping; files that it names lie in a folder. See `load`."""
+    data = _plain_data(source, "the study")
+    document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
+    override(document, changes)
+    sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
+    return load_document(document, None, folder, b"", sha256, changes, seed)
 
 
 @one_thread()

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Variant
@@ -222,7 +222,7 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
     text = _edited(study, data)
     if text is None:
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
-    return f"# {heading}\n{text}", files
+    return f"# {printable(heading)}\n{text}", files
 
 
 def _edited(study: Study, data: Mapping[str, Any]) -> str | None:

@@ -14,6 +14,7 @@ from helpers.pages import faults
 from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
+from mechdesign.cli.batch import questions
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
@@ -62,7 +63,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
     done = invoke("run", config, "--out", tmp_path, "--jobs", 1, *fewer)
     assert done.exit_code == 0, done.output
     study = load(config)
-    for command in study.questions:
+    for command in questions(study):
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]

@@ -72,11 +72,16 @@ def kinematics(
         + _astray(motion)
         + targets.gaps(study, motion.errors, poses, motion.valid)
     )
-    tables, swept, ends = {"motion": motion_table(motion)}, swept_of(poses), list[Boundary]()
+    tables, swept, ends, resolved = {"motion": motion_table(motion)}, swept_of(poses), list[Boundary](), True
     if swept is not None:
-        limits, told, ends = motion_limits(motion, swept)
+        limits, told, ends, resolved = motion_limits(motion, swept)
         warnings += told
-    between, _ = tables_between(motion, ends)
+    between, torn = tables_between(motion, ends)
+    if torn.any() or not resolved:
+        warnings.append(
+            f"the steps of {swept} are too long for the motion between the poses: limits, extremes and toggles there "
+            "may be missing; sweep in smaller steps, or less far"
+        )
     tables["extremes"] = between["extremes"]
     if swept is not None:
         tables["limits"] = limits

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
 
 from mechdesign.errors import counted, cut
 from mechdesign.numerics.arrays import Flags, Floats
@@ -18,9 +18,10 @@ from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Inches.
-_MARGINS = {"left": 1.05, "right": 0.15, "bottom": 0.75}
+_MARGINS = {"left": 1.1, "right": 0.15, "bottom": 0.75}
 _LEGEND = 0.25  # a line of it
 _GAP = 0.1
+_LETTER = 0.09
 _NARROWEST = 0.9  # of a panel
 _ACROSS, _DOWN = 0.22, 0.22
 _TALL, _FLAT = 2.6, 1.5  # of a panel of main effects, in one row and in many
@@ -33,8 +34,10 @@ MOST_SCATTERED = 7
 MOST_VALUES = 12
 CLASSES = 8
 MOST_LETTERS = 10  # of a word at an axis
+MOST_LINES = 3  # of a name
 FEW_VALUES = 4  # whose ticks are the values themselves
 _NAME, _TITLE = 9.0, 10.0  # points
+_APART = 0.22  # part of the range between values whose numbers do not touch
 _ROOM_AROUND = 0.08  # part of the range beyond the values
 # Cases by how they ended: what is said of them, colour and marker.
 _MET = ("meets every requirement", style.BLUE, "o")
@@ -52,13 +55,14 @@ class _Axis:
     words: tuple[str, ...] = ()
     low: float | None = None
     high: float | None = None
+    varied: bool = True
 
     @classmethod
-    def of(cls, column: Column, low: float | None = None, high: float | None = None) -> _Axis:
+    def of(cls, column: Column, low: float | None = None, high: float | None = None, *, varied: bool = True) -> _Axis:
         """The axis of a column."""
         name = column.name.removeprefix("mechanism.parameters.").removeprefix("mechanism.")
         if column.numeric:
-            return cls(name, column.unit, column.values.astype(float), (), low, high)
+            return cls(name, column.unit, column.values.astype(float), (), low, high, varied)
         words = tuple(dict.fromkeys(map(str, column.values)))
         return cls(name, "", np.array([words.index(str(word)) for word in column.values], dtype=float), words)
 
@@ -68,9 +72,14 @@ class _Axis:
         return [limit for limit in (self.low, self.high) if limit is not None]
 
     def label(self, room: float) -> str:
-        """Name and unit in lines of so many inches; a long name is broken after its points."""
-        text = style.axis_label(self.name.replace(".", ". "), self.unit)
-        return "\n".join(line.replace(". ", ".") for line in style.folded(text, _NAME, room).split("\n"))
+        """Name and unit in lines of so many inches; a long name is broken after its points, or cut in front."""
+        bar, plain = self.name[: self.name.startswith("|")], self.name.lstrip("|")
+        for name in (self.name, bar + (plain.partition(".")[2] or plain)):
+            text = style.axis_label(name.replace(".", ". "), self.unit)
+            lines = [line.replace(". ", ".") for line in style.folded(text, _NAME, room).split("\n")]
+            if len(lines) < MOST_LINES:
+                break
+        return "\n".join(lines[:MOST_LINES])
 
     def span(self) -> tuple[float, float]:
         """From the lowest to the highest value or limit, and some room."""
@@ -94,7 +103,7 @@ def figures(study: Study, result: Result) -> Gallery:
     table, found = result.main, Gallery()
     entries = [_Axis.of(table.column(name)) for name in result.drawn["entries"]]
     entries = [each for each in entries if len(np.unique(each.values)) > 1]
-    results = [_Axis.of(table.column(name), *limits) for name, limits in result.drawn["results"].items()]
+    results = [_Axis.of(table.column(name), *limits, varied=False) for name, limits in result.drawn["results"].items()]
     if entries and results:
         found.add("main_effects", main_effects, entries, results, len(table))
         found.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
@@ -135,7 +144,7 @@ def main_effects(entries: Sequence[_Axis], results: Sequence[_Axis], count: int)
             continue
         named = len(blocks) > 1 or row == len(down) - 1
         _effect(axes, block[column], number)
-        _ticks(axes, block[column], number, outer_x=named, outer_y=column == 0)
+        _ticks(axes, block[column], number, room, outer_x=named, outer_y=column == 0)
         if named:
             axes.set_xlabel(block[column].label(room + _ACROSS / 2), fontsize=_NAME)
         if column == 0:
@@ -200,7 +209,7 @@ def scatter(entries: Sequence[_Axis], results: Sequence[_Axis], table: Table, *,
             )  # fmt: skip
         axes.set_xlim(*x.span())
         axes.set_ylim(*y.span())
-        _ticks(axes, x, y, outer_x=row == size - 1, outer_y=column == 0)
+        _ticks(axes, x, y, room, outer_x=row == size - 1, outer_y=column == 0)
         if row == size - 1:
             axes.set_xlabel(x.label(room + _ACROSS / 2), fontsize=_NAME)
         if column == 0:
@@ -224,17 +233,23 @@ def _limits(axes: Axes, of: _Axis, *, upright: bool) -> None:
             span(min(limit, end), max(limit, end), color=style.FAINT, alpha=0.18, linewidth=0, zorder=0.5)
 
 
-def _ticks(axes: Axes, x: _Axis, y: _Axis, *, outer_x: bool, outer_y: bool) -> None:
-    """Few ticks, words where there are words, numbers at the outer edges only."""
+def _ticks(axes: Axes, x: _Axis, y: _Axis, room: float, *, outer_x: bool, outer_y: bool) -> None:
+    """Few ticks, words where there are words, at the outer edges only; `room` is the width of the panel."""
     for axis, of, outer in ((axes.xaxis, x, outer_x), (axes.yaxis, y, outer_y)):
         if of.words:
-            axis.set_ticks(range(len(of.words)), [cut(word, MOST_LETTERS) if outer else "" for word in of.words])
-        else:
-            values = np.unique(of.values[np.isfinite(of.values)])
-            few = 1 < len(values) <= FEW_VALUES and not of.limits
-            round_ones = MaxNLocator(2 if style.narrow() else 4, steps=[1, 2, 2.5, 5, 10])
-            axis.set_major_locator(FixedLocator(values.tolist()) if few else round_ones)
-            axis.set_tick_params(labelbottom=outer, labelleft=outer)
+            letters = MOST_LETTERS if of is y else max(3, int(room / len(of.words) / _LETTER))
+            axis.set_ticks(range(len(of.words)), [cut(word, letters) if outer else "" for word in of.words])
+            continue
+        axis.set_major_locator(MaxNLocator(2 if style.narrow() else 4, steps=[1, 2, 2.5, 5, 10]))
+        values = np.unique(of.values)
+        if of.varied and len(values) <= FEW_VALUES and np.diff(values).min() > _APART * np.ptp(values):
+            axis.set_major_locator(FixedLocator(values.tolist()))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value)))
+        axis.set_tick_params(labelbottom=outer, labelleft=outer)
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
 
 
 def _title(words: str) -> tuple[str, float]:

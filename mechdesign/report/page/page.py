@@ -28,7 +28,7 @@ from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
-from mechdesign.report.page.pages import GENERATOR
+from mechdesign.report.page.pages import GENERATOR, harmless
 from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
@@ -140,7 +140,7 @@ def thumbnail(study: Study) -> str:
 
 def _page(template: str, *, moving: bool, **content: Any) -> bytes:
     environment = Environment(
-        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
+        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
