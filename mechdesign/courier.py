@@ -32,8 +32,6 @@ _GROWTH = 8
 # Bytes of a function that go along with every task, and longer functions that a worker keeps.
 _SHORT = 20_000
 _MOST_KEPT = 4
-# Times that workers are lost before chunks go one by one.
-_LOSSES = 1
 
 
 class LostWorkerError(MechdesignError):
@@ -42,6 +40,8 @@ class LostWorkerError(MechdesignError):
 
 class Pool:
     """`width` workers of an executor; `open_` gives one, and another where workers were lost."""
+
+    losses = 1  #: times that workers are lost before chunks go one by one
 
     def __init__(self, open_: Callable[[], Executor], width: int) -> None:
         self._open, self._width = open_, width
@@ -123,11 +123,11 @@ class Courier(Generic[Item, Value]):
                         raise
                     losses += 1
                     self._pool.renew()
-                    while losses > _LOSSES and tasks:
+                    while losses > self._pool.losses and tasks:
                         yield from self._one_by_one(tasks[0])
                         done = tasks[0].first + len(tasks[0].items)
                         tasks.popleft()
-                    losses %= _LOSSES + 1
+                    losses %= self._pool.losses + 1
                     for task in tasks:
                         if task.lost:
                             task.future = self._send(task.items)

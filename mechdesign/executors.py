@@ -8,9 +8,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from itertools import chain
 from typing import Any
 from urllib.parse import urlsplit
@@ -25,7 +23,8 @@ _PORT = 8786  # of a scheduler, where none is said
 _ANSWERS = 10
 _FIRST_WORKER = 60
 # Of a scheduler that is started here: its clocks and profiles would take a twentieth of each processor.
-_CALM = {
+_OWN = {
+    "distributed.scheduler.allowed-failures": 0,  # a chunk that ends its worker is found here
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.tick.cycle": "10s",
     "distributed.worker.profile.enabled": False,
@@ -93,19 +92,21 @@ class _Dask(Pool):
         self._cluster: Any = None
         try:
             if address == LOCAL:
-                with _deaf(), importlib.import_module("dask").config.set(_CALM):
+                with importlib.import_module("dask").config.set(_OWN):
                     self._cluster = distributed.LocalCluster(
                         n_workers=worker_count(jobs),
                         threads_per_worker=1,
                         dashboard_address="127.0.0.1:0",
                         silence_logs=50,
+                        preload=[__name__],
                     )
             else:
                 _knock(address)
             self._client: Any = distributed.Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
         except (OSError, ValueError, RuntimeError) as error:
             self._end()
-            raise StudyError(f"--executor {name}: no scheduler answers there: {error}") from None
+            what = "no cluster starts" if address == LOCAL else "no scheduler answers there"
+            raise StudyError(f"--executor {name}: {what}: {error}") from None
         try:
             self._client.wait_for_workers(1, timeout=_FIRST_WORKER)
         except TimeoutError:
@@ -113,6 +114,9 @@ class _Dask(Pool):
             message = f"the scheduler has no workers after {counted(_FIRST_WORKER, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
         self._counted, self._threads = -_RECOUNT, 1
+        if address != LOCAL:
+            # It has tried several workers.
+            self.losses = 0
         self.executor = self._client.get_executor(pure=False)
 
     @property
@@ -145,14 +149,6 @@ def _knock(address: str) -> None:
             raise OSError("it does not answer as one")
 
 
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Threads and processes that begin inside hear no interrupt: it is this one's to handle."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+def dask_setup(worker: object) -> None:
+    """In a worker of a scheduler that was started here: an interrupt is the command's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -31,7 +31,7 @@ from mechdesign.cli.execution import (
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
-from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
+from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
 from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
@@ -202,7 +202,7 @@ def _places(study: Study, root: Path, options: Options) -> list[tuple[str, Path]
         return found
     if alone := shards.found(root):
         return [(shards.command_of(alone[0]), root)]
-    if (done := manifest.read(root)) is not None and done.get("command") in COMMANDS:
+    if (done := manifest.read(root)) is not None and done.get("command") in QUESTIONS:
         return [(done["command"], root)]
     begun = [(command, directory) for command, directory in found if shards.found(directory)]
     given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}

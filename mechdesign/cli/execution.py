@@ -7,8 +7,9 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +23,20 @@ from mechdesign.errors import Interrupted, MechdesignError, StudyError
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import Divided, divided, one_thread
+from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
-from mechdesign.results import Result, Table
+from mechdesign.results import LongTable, Result, Table
 from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
+_ROWS_AT_ONCE = 20_000  # of a table that is read from its file
 RESULTS = Path("results")  # where no other folder is asked for
 OUTCOMES = {
     0: "done",
@@ -136,7 +139,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         return kept
     elif merging:
         # A mistake of the study is why there are none.
-        requirements.foresee(study, [command])
+        requirements.foresee(study, [command] if command in LONG else [])
         raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
@@ -156,7 +159,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
-        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
+        with terminal.Bar(quiet=options.quiet) as bar:
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -180,7 +184,8 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
         return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
-    requirements.foresee(study, [command])
+    if command in LONG:
+        requirements.foresee(study, [command])
     taken = shards.Taken(shard)
     try:
         with terminal.Bar(quiet=options.quiet) as bar, divided(taken):
@@ -227,7 +232,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        table = _main_table(directory)
+        table = _main_table(directory, content)
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
@@ -247,17 +252,24 @@ def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
-def _main_table(directory: Path) -> Table:
-    """The main table of the results that are in a folder."""
-    content = manifest.read(directory)
-    assert content is not None
+def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
+    """The main table of the results in a folder with this manifest, read from its file where its rows are wanted."""
     file, about = next(iter(content["tables"].items()))
-    text = (directory / file).read_text(encoding="utf-8")
-    return from_csv(text, Path(file).stem, about["columns"], about["meaning"])
+
+    def blocks() -> Iterator[Table]:
+        with (directory / file).open(encoding="utf-8") as stream:
+            head = stream.readline()
+            lines = list(islice(stream, _ROWS_AT_ONCE))
+            while True:
+                yield from_csv(head + "".join(lines), Path(file).stem, about["columns"], about["meaning"])
+                if not (lines := list(islice(stream, _ROWS_AT_ONCE))):
+                    return
+
+    return LongTable(next(blocks()), int(about["rows"]), blocks)
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras
+    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -267,7 +279,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, progress)
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
@@ -347,7 +359,10 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
         if given.shard:
             tell(given, options)
             return given
-        table = given.result.main if given.result is not None else _main_table(directory)
-    terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
+        if given.result is not None:
+            table = given.result.main
+        else:
+            table = _main_table(directory, manifest.read(directory) or {})
+    terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
     tell(given, options)
     return given

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from mechdesign.errors import printable_lines
 from mechdesign.progress import Progress
-from mechdesign.report.tables import cells, to_csv, to_json
+from mechdesign.report.tables import cells, csv_blocks, json_blocks
 from mechdesign.results import Table
 
 if TYPE_CHECKING:
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
+_PIECE = 1 << 20  # characters of a file that are copied at once
 _NAMES = 6  # names of columns for which there was no room
 _GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
 _BAR_DELAY = 1.0  # seconds before a bar appears
@@ -32,18 +37,27 @@ def say(text: str, *, quiet: bool = False) -> None:
 
 def emit(text: str) -> None:
     """Data to stdout."""
-    sys.stdout.write(text)
+    emit_all([text])
+
+
+def emit_all(texts: Iterable[str]) -> None:
+    """Data to stdout, piece by piece."""
+    for text in texts:
+        sys.stdout.write(text)
     sys.stdout.flush()
 
 
-def show(table: Table, *, as_json: bool, rest: str = "") -> None:
-    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and where the `rest` is."""
+def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
+    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and the file of the `rest`."""
     if as_json:
-        emit(to_json(table))
+        emit_all(json_blocks(table))
     elif sys.stdout.isatty():
         _show_to_people(table, rest)
+    elif rest is not None:
+        with rest.open(encoding="utf-8", newline="") as stream:
+            emit_all(iter(partial(stream.read, _PIECE), ""))
     else:
-        emit(to_csv(table))
+        emit_all(csv_blocks(table))
 
 
 def show_lines(lines: Sequence[str]) -> None:
@@ -54,13 +68,13 @@ def show_lines(lines: Sequence[str]) -> None:
         emit(f"... {more} more; --out DIR writes all of them\n")
 
 
-def _show_to_people(table: Table, rest: str) -> None:
+def _show_to_people(table: Table, rest: Path | None) -> None:
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text
 
     console = Console()
-    columns = [column[:_ROWS] for column in cells(table, _DIGITS)]
+    columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
     heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
     room = console.width
@@ -81,7 +95,7 @@ def _show_to_people(table: Table, rest: str) -> None:
         names = [*table.names[shown : shown + _NAMES], *(["..."] if len(columns) > shown + _NAMES else [])]
         left.append(f"{len(columns) - shown} more columns ({', '.join(names)})")
     if left:
-        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
+        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"), style="dim")
 
 
 class Bar(Progress):

@@ -6,11 +6,10 @@ import base64
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader
-from numpy.typing import NDArray
 
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import counted
@@ -88,11 +87,11 @@ def answer_html(
         met=sum(verdict.met for verdict in judged),
         required=len(judged),
         unjudged=verdicts if isinstance(verdicts, str) else "",
-        headlines=headlines(answer),
+        headlines=headlines(answer.seen),
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,
-        beginning=None if main is None else _beginning(main),
+        beginning=None if main is None else _beginning(main, answer.seen.main),
         others=others,
         also={"pictures": figures, "files": list(answer.files)},
     )
@@ -146,21 +145,21 @@ def _largest(columns: Sequence[Column], unit: str) -> float:
     return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in floats), default=0.0)
 
 
-def _rounded(column: Column, largest: float, rows: NDArray[Any]) -> Column:
-    """Some rows of a column without numbers that would be zero but for rounding."""
-    values = column.values[rows]
+def _rounded(column: Column, largest: float) -> Column:
+    """A column without numbers that would be zero but for rounding."""
+    values = column.values
     if values.dtype.kind == "f" and column.unit:
         values = np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
     return replace(column, values=values)
 
 
-def _beginning(table: Table) -> _Beginning:
+def _beginning(table: Table, seen: Table) -> _Beginning:
     # The units of rows of several quantities are never left out.
     first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
     columns = [column for column in table.columns if column in first or column.name == _UNIT]
-    some = np.arange(min(ROWS, len(table)))
-    largest = {column.unit: _largest(table.columns, column.unit) for column in columns}
-    shown = Table(table.name, tuple(_rounded(column, largest[column.unit], some) for column in columns))
+    largest = {column.unit: _largest(seen.columns, column.unit) for column in columns}
+    first_rows = table.take(np.arange(min(ROWS, len(table))))
+    shown = Table(table.name, tuple(_rounded(first_rows.column(c.name), largest[c.unit]) for c in columns))
     left = []
     if len(table) > ROWS:
         left.append(counted(len(table) - ROWS, "more row"))

@@ -94,7 +94,9 @@ def kinematics(
         Tables ``motion`` (a row a pose) and ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and
         ``toggles`` of four-bars and slider-cranks; ``targets`` where there are some; ``jacobian`` where as many outputs
         as drives are asked; ``modes`` with `all_modes`. Lengths, angles and times are in the study's units, Jacobians
-        per radian. A pose that cannot be assembled is a row of nan with ``valid`` False.
+        per radian. A pose that cannot be assembled is a row of nan with ``valid`` False. Of more than 65,536
+        poses the tables with a row a pose are in memory only once the values of a column are asked for; ``blocks()``
+        gives their rows in parts.
 
     Raises
     ------

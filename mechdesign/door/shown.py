@@ -208,7 +208,7 @@ class Answer(Result):
             return Gallery()
         with style.context():
             drawn = writer.figures(self.study, self)
-            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self)
+            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import Result, Table
-from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
+from mechdesign.rows import IN_UNIT, Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 
@@ -141,25 +141,41 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         See `requirements`.
     """
     path = requirement.result.partition(".")[2]
-    chosen = choose(result, path, requirement.where, absolute=requirement.abs)
-    table, name, values = chosen.table, chosen.column, chosen.values
-    words = in_words(requirement)
-    rows = np.flatnonzero(chosen.counts)
-    if chosen.missing and whole:
-        raise UnknownColumnError(chosen.missing)
+    table, column, rows = located(result, path)
+    found, begin = None, 0
+    # A word that names the rows may be in a few blocks only.
+    for part in table.blocks() if rows.all() else [table]:
+        chosen = choose(
+            replace(result, tables={**result.tables, table.name: part}), path, requirement.where,
+            absolute=requirement.abs,
+        )  # fmt: skip
+        row = _worst_row(chosen, requirement)
+        if row is not None:
+            value = float(chosen.values[row])
+            verdict = Verdict(
+                in_words(requirement), margin_of(requirement, value) >= 0, value,
+                "" if len(table) == 1 else place_of(part, row, column, freedom, begin), margin_of(requirement, value),
+                unit_of(part, column, row),
+            )  # fmt: skip
+            if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
+                found = verdict
+        begin += len(part)
+    if found is None and whole and (missing := choose(result, path, requirement.where).missing):
+        raise UnknownColumnError(missing)
+    none = "no row of " + table.name
+    return found or Verdict(in_words(requirement), met=False, worst=float("nan"), place=none)
+
+
+def _worst_row(chosen: Chosen, requirement: Requirement) -> int | None:
+    """The row that is worst: one without a value, or else the farthest beyond a limit; None where none counts."""
+    rows, values = np.flatnonzero(chosen.counts), chosen.values
     if not rows.size:
-        return Verdict(words, met=False, worst=float("nan"), place="no row of " + table.name)
+        return None
     undefined = rows[np.isnan(values[rows])]
     if undefined.size:
-        worst, met = undefined[0], False
-    else:
-        ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
-        worst = min(ends, key=lambda row: margin_of(requirement, float(values[row])))
-        met = margin_of(requirement, float(values[worst])) >= 0
-    return Verdict(
-        words, met, float(values[worst]), place_of(table, int(worst), name, freedom),
-        margin_of(requirement, float(values[worst])), unit_of(table, name, int(worst)),
-    )  # fmt: skip
+        return int(undefined[0])
+    ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
+    return int(min(ends, key=lambda row: margin_of(requirement, float(values[row]))))
 
 
 def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
@@ -197,10 +213,11 @@ def in_words(requirement: Requirement) -> str:
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 
-def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method; an only row has none."""
-    if len(table) == 1:
-        return ""
+def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) -> str:
+    """The row in words: its leading columns, which are the pose and words such as the method.
+
+    `begin` is the number of rows before the table, where it is a part of a long one.
+    """
     parts: list[str] = []
     for column in table.columns:
         if column.numeric:
@@ -210,4 +227,4 @@ def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
             parts.append(f"{column.name} {column.values[row]:.6g}")
         else:
             parts.append(f"{column.name} {column.values[row]}")
-    return ", ".join(parts) or f"row {row + 1}"
+    return ", ".join(parts) or f"row {begin + row + 1}"

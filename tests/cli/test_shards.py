@@ -12,15 +12,15 @@ from mechdesign import shards
 from mechdesign.shards import FILE, Shard
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-# Two methods and Sobol' indices are divided each; the second chunk of samples is not whole.
+# The second chunk of samples is not whole.
 ARM = ["--set", "reliability.samples=30000", "--set", "reliability.methods=[analytic, monte_carlo, form]"]
-DESIGNS = ["--set", "optimize.evaluations=400"]
 
 
 @pytest.fixture
 def studies(folder):
     (folder / "slider.yaml").unlink()
-    for name in ("two_link_arm", "gallery/slider_crank_tolerances", "gallery/straight_line_synthesis"):
+    for name in ("two_link_arm", "gallery/slider_crank_tolerances", "gallery/straight_line_synthesis",
+                 "gallery/offset_slider_crank"):  # fmt: skip
         (folder / Path(name).name).with_suffix(".yaml").write_text((CONFIGS / f"{name}.yaml").read_text())
     return folder
 
@@ -32,16 +32,17 @@ def content(folder):
 
 
 def test_four_shards_merged_are_one_run(studies, invoke):
-    names = ["two_link_arm.yaml", "straight_line_synthesis.yaml"]
+    names = ["two_link_arm.yaml", "straight_line_synthesis.yaml", "offset_slider_crank.yaml"]
     common = ["--no-plots", "--set", "seed=3"]
     assert invoke("run", *names, *common, "--out", "whole").exit_code == 0
     for k in (3, 1, 4, 2):
         told = invoke("run", *names, *common, "--out", "parts", "--shard", f"{k}/4", "--jobs", 1 + k % 2)
         assert told.exit_code == 0
+        assert f"sweep: shard {k}/4 is kept" in told.stderr
         assert f"optimize: shard {k}/4 is kept in parts/straight_line_synthesis/optimize/shard_{k}_of_4" in told.stderr
         assert not [*Path("parts").rglob("*.csv")]
     kept = shards._read(studies / "parts/two_link_arm/reliability/shard_2_of_4" / FILE)[1]
-    # Of 2 chunks of 100 000 samples at each of three poses, and of replicates of Sobol' indices at each.
+    # Chunks of samples at three poses, and replicates of Sobol' indices.
     counts = [len(each.values) for each in pickle.loads(kept).values()]
     assert len(counts) == 2
     assert all(counts)

@@ -174,24 +174,23 @@ def texts(command, study, **options):
 METHODS = "[analytic, second_order, monte_carlo, form, importance_sampling, quasi_monte_carlo, auto]"
 
 
-@pytest.mark.parametrize(
-    ("command", "name", "changes"),
-    [
-        (
-            "reliability",
-            "gallery/slider_crank_tolerances",
-            [f"reliability.methods={METHODS}", "reliability.samples=45000", "reliability.sobol=300"],
-        ),
-        ("optimize", "gallery/path_synthesis", ["optimize.evaluations=60"]),
-        ("optimize", "two_rpr", []),
-    ],
-)
-def test_the_same_bytes_wherever_it_is_computed(command, name, changes):
-    study = mechdesign.load(CONFIGS / f"{name}.yaml", changes)
-    expected = texts(command, study)
-    assert texts(command, pickle.loads(pickle.dumps(study))) == expected
-    assert texts(command, study, jobs=2) == expected
+CASES = [
+    (
+        "reliability",
+        "gallery/slider_crank_tolerances",
+        [f"reliability.methods={METHODS}", "reliability.samples=45000", "reliability.sobol=300"],
+    ),
+    ("optimize", "gallery/path_synthesis", ["optimize.evaluations=60"]),
+    ("optimize", "two_rpr", []),
+]
+
+
+def test_the_same_bytes_wherever_it_is_computed():
+    asked = [(command, mechdesign.load(CONFIGS / f"{name}.yaml", changes)) for command, name, changes in CASES]
+    expected = [texts(*each) for each in asked]
+    assert [texts(command, pickle.loads(pickle.dumps(study))) for command, study in asked] == expected
+    assert [texts(*each, jobs=2) for each in asked] == expected
     fresh = multiprocessing.get_context("spawn")
     for open_ in (lambda: ThreadPoolExecutor(2), lambda: ProcessPoolExecutor(1, mp_context=fresh)):
         with on(Pool(open_, 2)):
-            assert texts(command, study) == expected
+            assert [texts(*each) for each in asked] == expected

@@ -294,6 +294,6 @@ def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study,
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
         if any(each.command == "kinematics" for each in designs.goals):
-            return made, kinematics(made)
+            return made, kinematics(made).seen
         return made, Result("kinematics", {}, drawn={"motion": solve_shown(made)})
     return made, Result("kinematics", {})

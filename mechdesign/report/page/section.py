@@ -45,14 +45,14 @@ def section(
     part, warnings = None, tuple(undrawn)
     if plots and not result.interrupted:
         try:
-            part = moving(study, result)
+            part = moving(study, result.seen)
         except Exception as error:
             warnings = (*warnings, f"the mechanism cannot be shown moving: {explain(error)[1]}")
     doubled = CURVES if part is not None and part.beside else ""
     shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
         "command": result.command,
-        "headlines": [dataclasses.asdict(each) for each in headlines(result)],
+        "headlines": [dataclasses.asdict(each) for each in headlines(result.seen)],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
