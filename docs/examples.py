@@ -35,6 +35,8 @@ from mechdesign.errors import MechdesignError
 
 ROOT = Path(__file__).parent
 FOLDERS = ("tutorials", "howto", "theory", "reference", "contributing")
+# Made pages, whose examples are parts of a study; tests/unit/test_reference.py reads them.
+PARTS = ROOT / "reference" / "study"
 # Where the examples of a page were run: its pictures come from there.
 RUN = ROOT / "_run"
 ANY = "..."
@@ -222,7 +224,7 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
     """Pages with examples: those named, or all."""
     return [Path(name).resolve() for name in names] or [
         *sorted(ROOT.glob("*.md")),
-        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md"))),
+        *(path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.md")) if PARTS not in path.parents),
     ]
 
 

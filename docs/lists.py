@@ -8,10 +8,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import groupby
 
+import yaml
+
 from mechdesign.reference import Entry, entries, tables
-from mechdesign.reference.messages import meaning, messages
+from mechdesign.reference.messages import PART, messages
 from mechdesign.reference.tables import TableText
 
 # Sections of the study with a page each, in the order of the format; keys that stand alone share one.
@@ -32,6 +35,15 @@ LISTS = {
     ),
     "exit_codes": ("Exit codes", "What a command ends with; of several questions the largest.", ("exit code",)),
 }
+# Parts of a group of messages: title, and exit codes.
+MESSAGES: dict[str, tuple[int | None, ...]] = {
+    "Errors in the study or the command (exit code 2)": (2,),
+    "The mechanism cannot do it (exit code 3)": (3,),
+    "Failures (exit code 4)": (4,),
+    "Warnings: the results are there": (None,),
+    "Parts of these messages": (PART,),
+}
+LINE = 80  # characters of a line of an example
 _APART = ("key", "table", "column", "local index", "result of workspace", "exit code")
 _SPECIAL = re.compile(r"([\\*_<>\[\]$|#])")
 _CODE = re.compile(r"(`[^`]+`)")
@@ -63,9 +75,55 @@ def _told(entry: Entry) -> Iterator[str]:
     }
     lines = [f"- {what}: {text}" for what, text in facts.items() if text]
     lines += [f"- {code(word)}: {markdown(text)}" for word, text in entry.words]
-    lines += [f"- Example: {code(f'{entry.last}: {example}')}" for example in entry.examples]
     if lines:
         yield "\n".join(lines)
+    if entry.examples:
+        yield f"```yaml\n{in_place(entry)}\n```"
+
+
+@cache
+def _examples() -> dict[str, tuple[str, ...]]:
+    return {entry.word: entry.examples for entry in entries() if entry.kind == "key"}
+
+
+def in_place(entry: Entry) -> str:
+    """The examples of a key where they stand in a study, each further one as a comment."""
+    *above, last = entry.word.split(".")
+    lines: list[str] = []
+    indent = dash = ""
+    for k, part in enumerate(above):
+        name = _example_name(".".join(above[:k]), [*above, last][k + 1]) if part == "*" else part
+        if not name:
+            dash = "- "
+            continue
+        lines.append(f"{indent}{dash}{name}:")
+        indent, dash = indent + " " * (2 + len(dash)), ""
+    first, *others = entry.examples
+    lines += _written(f"{indent}{dash}{last}:", first, indent + " " * (2 + len(dash)))
+    return "\n".join([*lines, *(f"{indent}{' ' * len(dash)}# or {last}: {each}" for each in others)])
+
+
+def _example_name(path: str, inner: str) -> str:
+    """A name that stands in a mapping of names, out of its examples; empty of a list."""
+    for given in map(yaml.safe_load, _examples()[path]):
+        if isinstance(given, dict):
+            names = [name for name in given if name != "ground"]
+            fitting = [name for name in names if isinstance(given[name], dict) and inner in given[name]]
+            return str([*fitting, *names][0])
+    return ""
+
+
+def _written(key: str, example: str, indent: str) -> list[str]:
+    """A key with its example, whose entries have lines of their own where one line would be long."""
+    if len(key) + len(example) < LINE or example[0] not in "{[":
+        return [f"{key} {example}"]
+    parts, depth, begin = [], 0, 1
+    for k, letter in enumerate(example):
+        depth += (letter in "{[") - (letter in "}]")
+        if (letter == "," and depth == 1) or depth == 0:
+            parts.append(example[begin:k].strip())
+            begin = k + 1
+    return [key, *(f"{indent}{'- ' if example[0] == '[' else ''}{part}" for part in parts)]
 
 
 def _page(title: str, parts: Iterable[str]) -> str:
@@ -117,16 +175,22 @@ def table_page(command: str, found: Iterable[TableText]) -> str:
 def messages_page() -> str:
     """The page of errors and warnings."""
     parts = [
-        "Every error and warning, by what it speaks of; `<names>` stand for what differs. `mechdesign docs TEXT` finds "
-        'those that contain a text, for example `mechdesign docs "singular position"`. A message about a key of the '
-        "study begins with the file, the line and the key."
+        "Every error and warning, in the order in which one meets them; `<words>` stand for what differs. Behind an "
+        "arrow stands what mends it, where the message does not say so itself. `mechdesign docs TEXT` finds those that "
+        'contain a text, for example `mechdesign docs "singular position"`, or a whole message as it was printed.',
+        "An error of a study begins with the file, the line, the column and the key. Exit codes are those of "
+        "[](exit_codes.md): with 2 nothing was computed.",
     ]
-    for subject, about in groupby(messages(), key=lambda message: message.subject):
-        parts.append(f"## {subject[0].upper()}{subject[1:]}")
-        of_subject = sorted(about, key=lambda message: (message.code is None, message.code or 0))
-        for number, same in groupby(of_subject, key=lambda message: message.code):
-            said = meaning(number)
-            parts += [f"{said[0].upper()}{said[1:]}.", "\n".join(f"- {code(message.text)}" for message in same)]
+    for group, about in groupby(messages(), key=lambda message: message.group):
+        parts += [f"## {group.title}", group.about]
+        told = list(about)
+        for title, codes in MESSAGES.items():
+            lines = [
+                f"- {code(each.text)}" + (f" \N{RIGHTWARDS ARROW} {each.mend}" if each.mend else "")
+                for each in told if each.code in codes
+            ]  # fmt: skip
+            if lines:
+                parts += [f"**{title}**", "\n".join(lines)]
     return _page("Messages", parts)
 
 

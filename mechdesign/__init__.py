@@ -22,14 +22,16 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 
 if TYPE_CHECKING:
     from mechdesign.door.questions import kinematics as kinematics
     from mechdesign.door.questions import load as load
     from mechdesign.door.questions import optimize as optimize
     from mechdesign.door.questions import reliability as reliability
+    from mechdesign.door.questions import sensitivities as sensitivities
     from mechdesign.door.questions import stiffness as stiffness
+    from mechdesign.door.questions import sweep as sweep
     from mechdesign.door.questions import workspace as workspace
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "requirements": "mechdesign.report.requirements",
-    **dict.fromkeys(("load", *COMMANDS), "mechdesign.door.questions"),
+    **dict.fromkeys(("load", *QUESTIONS), "mechdesign.door.questions"),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 

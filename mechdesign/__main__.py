@@ -1,6 +1,4 @@
-"""``python -m mechdesign``, and the command `mechdesign`: signals are heard before anything else is imported."""
-
-from mechdesign.cli import process
+"""The command `mechdesign`: signals wait until they are heard, before anything else is imported."""
 
 
 def _command() -> None:
@@ -11,6 +9,12 @@ def _command() -> None:
 
 def main() -> None:
     """Entry point of the `mechdesign` command."""
+    import signal
+
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    from mechdesign.cli import process
+
     process.run(_command)
 
 

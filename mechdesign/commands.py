@@ -5,22 +5,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 MAX_JOBS = 512  # threads or processes of one command
+MERGE = "merge"  # the command that puts shards together
+DIVIDED = ("optimize", "reliability", "sweep", "sensitivities")  # commands whose work can be divided into shards
 
 
 @dataclass(frozen=True)
 class Command:
-    """One question: a command, a function of the package and a section of the study file, all of its name."""
+    """One question: a command and a function of the package, both of its name."""
 
     name: str
     question: str
     answer: str
+    room: str = ""  # empty: that of the analysis of its name
+    section: str = ""  # of the study; empty: that of its name
 
     @property
     def module(self) -> str:
         """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
-        return f"mechdesign.analyses.{self.name}.analysis"
+        return f"mechdesign.{self.room or f'analyses.{self.name}.analysis'}"
 
 
+# Each has a section of its name in the study file.
 COMMANDS = {
     command.name: command
     for command in (
@@ -39,3 +44,18 @@ COMMANDS = {
         ),
     )
 }
+SWEEP = Command(
+    "sweep",
+    "Which cases meet what is required?",
+    "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
+    room="experiments.analysis",
+    section="matrix",
+)
+SENSITIVITIES = Command(
+    "sensitivities",
+    "What does each number change?",
+    "Derivatives of chosen results with respect to numbers of the study, with error estimates.",
+    room="experiments.sensitivities",
+)
+# Of their cases the questions above are asked.
+QUESTIONS = COMMANDS | {SWEEP.name: SWEEP, SENSITIVITIES.name: SENSITIVITIES}

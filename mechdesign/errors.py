@@ -8,7 +8,8 @@ from __future__ import annotations
 import difflib
 import re
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -62,17 +63,20 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return folded[close[0]] if close else None
 
 
-def printable(text: str) -> str:
+def printable(text: str, escape: Callable[[str], str] = ascii) -> str:
     """A text in one line, without characters that a terminal, an XML or a CSV file would take for more than letters.
 
-    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``.
+    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``; `escape` gives one with
+    a quotation mark on either side.
     """
-    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or unicodedata.category(c) == "Zs" else escape(c)[1:-1] for c in text)
 
 
-def printable_lines(text: str) -> str:
+def printable_lines(text: str, escape: Callable[[str], str] = ascii) -> str:
     """The same of a text of several lines, which it keeps."""
-    return "\n".join(map(printable, text.split("\n")))
+    return "\n".join(printable(line, escape) for line in text.split("\n"))
 
 
 def cut(text: str, most: int = MAX_ECHO) -> str:
@@ -192,14 +196,25 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(result.interrupted)
 
 
+# What libraries say where memory runs out while they are loaded, or begin a thread.
+_NO_MEMORY = ("failed to map segment", "Cannot allocate memory", "can't start new thread")
+
+
+def _out_of_memory(error: BaseException | None) -> bool:
+    """Whether it came of a lack of memory, also where clearing up failed after it."""
+    while error is not None:
+        if isinstance(error, MemoryError) or any(text in str(error) for text in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
 def explain(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; what nobody foresaw asks to be reported."""
     if isinstance(error, MechdesignError):
         return error.exit_code, printable_lines(str(error))
-    if isinstance(error, MemoryError):
+    if _out_of_memory(error):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
-    if "BrokenExecutor" in [kind.__name__ for kind in type(error).__mro__]:
-        return 4, "a process that computed was killed, as where memory runs out; use fewer --jobs"
     frames = [
         frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
     ]

@@ -344,8 +344,9 @@ class _Parser:
             if count == 1:
                 raise ExpressionError(f"{name} compares two numbers or more")
             return
-        if count != arity(name):
-            raise ExpressionError(f"{name} takes {arity(name)} number{'s' * (arity(name) > 1)}, not {count}")
+        wanted = arity(name)
+        if count != wanted:
+            raise ExpressionError(f"{name} takes {wanted} number{'s' * (wanted > 1)}, not {count}")
         self.program.append(("call", name))
 
     def _close(self) -> None:

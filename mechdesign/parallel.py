@@ -1,4 +1,7 @@
-"""Chunks of work on threads or processes, in order, with bounded memory; and linear algebra on one thread.
+"""Chunks of work on threads, processes or any executor, in order, with bounded memory; linear algebra on one thread.
+
+Great work travels: a function that can be pickled, with the study and what is asked of it, goes once to each worker,
+and chunks follow, several in a task where they are short. What comes back does not depend on who computed it.
 
 The last digits of a long sum depend on how many threads share it.
 """
@@ -16,17 +19,19 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import cache
+from contextvars import ContextVar
+from functools import cache, partial
 from itertools import islice
 from typing import Any, TypeVar
 
 from mechdesign.commands import MAX_JOBS
+from mechdesign.courier import LOOK_AHEAD, Courier, Pool
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
+# From the name of what is computed, a map, and the items of that, to values.
+Share = Callable[[str, Callable[[Iterable[Any]], Iterator[Any]], Iterable[Any]], Iterator[Any]]
 
-# Enough waiting chunks that no thread idles while the consumer works; few, because they are all in memory.
-_LOOK_AHEAD = 3
 # Options of glibc's mallopt, from malloc.h.
 _TRIM_THRESHOLD = -1
 _MMAP_THRESHOLD = -3
@@ -41,6 +46,8 @@ _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VE
 _lock = threading.Lock()
 _inside = 0
 _outside = ExitStack()
+_pool: ContextVar[Pool | None] = ContextVar("where great work goes", default=None)
+_division: ContextVar[Share | None] = ContextVar("who computes which chunks", default=None)
 
 
 def worker_count(jobs: int | None) -> int:
@@ -59,21 +66,26 @@ def worker_count(jobs: int | None) -> int:
 
 
 def map_chunks(
-    function: Callable[[Item], Value], items: Iterable[Item], jobs: int | None = 1, *, processes: bool = False
+    function: Callable[[Item], Value],
+    items: Iterable[Item],
+    jobs: int | None = 1,
+    *,
+    processes: bool = False,
+    travels: bool = False,
 ) -> Iterator[Value]:
     """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers; see `workers`."""
-    with workers(function, jobs, processes=processes) as compute:
+    with workers(function, jobs, processes=processes, travels=travels) as compute:
         yield from compute(items)
 
 
 @contextmanager
 def workers(
-    function: Callable[[Item], Value], jobs: int | None = 1, *, processes: bool = False
+    function: Callable[[Item], Value], jobs: int | None = 1, *, processes: bool = False, travels: bool = False
 ) -> Iterator[Callable[[Iterable[Item]], Iterator[Value]]]:
     """Give a map of `function` over items, in their order, whose workers live until the context ends.
 
-    At most ``3 * jobs`` chunks are under way or waiting to be consumed, whatever the number of items. An exception or
-    an interrupt (also of the consumer) drops the chunks not begun and waits for those under way.
+    Few tasks are under way or waiting to be consumed, whatever the number of items. An exception or an interrupt (also
+    of the consumer) drops the chunks not begun and waits for those under way.
 
     Parameters
     ----------
@@ -82,69 +94,159 @@ def workers(
     processes : bool
         Workers are forked processes where the system has them, else threads. NumPy releases the interpreter's lock in
         its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
-        less need processes, whose items and values are pickled.
+        less need processes. The function, items and values are pickled.
+    travels : bool
+        Whether the work is worth going to the executor of `on`, where there is one, and being divided by `divided`. The
+        function, items and values are pickled there.
+
+    Raises
+    ------
+    LostWorkerError
+        If a chunk ends each worker that takes it.
     """
-    count = worker_count(jobs)
-    if count == 1:
-        yield lambda items: map(function, items)
-        return
-    pool: Executor
-    call: Callable[[Item], Value]
-    if processes and sys.platform == "linux":
-        fork = multiprocessing.get_context("fork")
-        pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_adopt, initargs=(function, os.getpid()))
-        call = _call
+    share = _division.get() if travels else None
+    if share is None:
+        with _map_of(function, jobs, processes=processes, travels=travels) as compute:
+            yield compute
     else:
-        pool = ThreadPoolExecutor(count, thread_name_prefix="mechdesign")
-        call = function
-    with pool:
+        with _map_of(partial(_undivided, function), jobs, processes=processes, travels=travels) as compute:
+            yield partial(share, _name(function), compute)
+
+
+@contextmanager
+def _map_of(
+    function: Callable[[Item], Value], jobs: int | None, *, processes: bool, travels: bool
+) -> Iterator[Callable[[Iterable[Item]], Iterator[Value]]]:
+    count = worker_count(jobs)
+    elsewhere = _pool.get() if travels else None
+    if elsewhere is not None:
+        yield Courier(elsewhere, partial(_values, function))
+    elif count == 1:
+        yield lambda items: map(function, items)
+    elif processes and sys.platform == "linux":
+        pool = Pool(lambda: _forked(count), count)
         try:
-            if call is _call:
-                _fork_all(pool)
-            yield lambda items: _in_order(pool, call, items, _LOOK_AHEAD * count)
+            yield Courier(pool, partial(_values, function))
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.close()
+    else:
+        with ThreadPoolExecutor(count, thread_name_prefix="mechdesign") as threads:
+            try:
+                yield lambda items: _in_order(threads, function, items, LOOK_AHEAD * count)
+            finally:
+                threads.shutdown(wait=True, cancel_futures=True)
 
 
-def _fork_all(pool: Executor) -> None:
-    """Fork the workers, which the first work does; a signal waits until they know what to do with it."""
+@contextmanager
+def on(pool: Pool) -> Iterator[None]:
+    """Inside, great work goes to the workers of a pool, which is closed in the end."""
+    before = _pool.set(pool)
+    try:
+        yield
+    finally:
+        _pool.reset(before)
+        pool.close()
+
+
+@contextmanager
+def divided(share: Share | None) -> Iterator[None]:
+    """Inside, the values of great work are what a function gives: from its name, a map, and the items of that."""
+    before = _division.set(share)
+    try:
+        yield
+    finally:
+        _division.reset(before)
+
+
+class Divided(BaseException):
+    """Great work ends without its values, of which others compute a part."""
+
+
+@contextmanager
+def apart(left: list[Divided]) -> Iterator[None]:
+    """Inside, work may be divided without an end to what follows, which does not depend on it; `left` tells of it."""
+    try:
+        yield
+    except Divided as error:
+        left.append(error)
+
+
+@contextmanager
+def here() -> Iterator[None]:
+    """Inside, no work goes elsewhere or is divided."""
+    pool, division = _pool.set(None), _division.set(None)
+    try:
+        yield
+    finally:
+        _pool.reset(pool)
+        _division.reset(division)
+
+
+def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
+    with here():
+        return function(item)
+
+
+def _name(function: Any) -> str:
+    """What a function computes, in the same words in every process."""
+    if isinstance(function, partial):
+        return " ".join(map(_name, (function.func, *filter(callable, function.args))))
+    kind = function if hasattr(function, "__qualname__") else type(function)
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _values(function: Callable[[Item], Value], items: list[Item]) -> list[Value]:
+    keep_freed_memory()
+    with one_thread():
+        return [function(item) for item in items]
+
+
+def _in_order(pool: Executor, function: Callable[[Item], Value], items: Iterable[Item], ahead: int) -> Iterator[Value]:
+    source = iter(items)
+    pending: deque[Future[Value]] = deque(pool.submit(function, item) for item in islice(source, ahead))
+    while pending:
+        value = pending.popleft().result()
+        pending.extend(pool.submit(function, item) for item in islice(source, 1))
+        yield value
+
+
+def _forked(count: int) -> Executor:
+    """Forked workers; a signal waits until they know what to do with it."""
+    fork = multiprocessing.get_context("fork")
+    pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_settle_in, initargs=(os.getpid(),))
+    with undisturbed():
+        # The first work forks all of them.
+        pool.submit(os.getpid)
+    return pool
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Inside, an interrupt waits; also in what is forked there."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
-        pool.submit(os.getpid)
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _in_order(pool: Executor, call: Callable[[Item], Value], items: Iterable[Item], ahead: int) -> Iterator[Value]:
-    source = iter(items)
-    pending: deque[Future[Value]] = deque(pool.submit(call, item) for item in islice(source, ahead))
-    while pending:
-        value = pending.popleft().result()
-        pending.extend(pool.submit(call, item) for item in islice(source, 1))
-        yield value
-
-
-# The function of a forked worker: inherited, not pickled, so that it may close over a whole study.
-_adopted: Callable[[Any], Any] | None = None
-
-
-def _adopt(function: Callable[[Any], Any], parent: int) -> None:
-    global _adopted
-    _adopted = function
-    # However the parent ends, its workers end with it.
+def end_with(parent: int) -> None:
+    """However the process that forked this one ends, this one ends with it."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _settle_in(parent: int) -> None:
+    # Work inside of work stays here.
+    _pool.set(None)
+    _division.set(None)
+    end_with(parent)
     # An interrupt is the parent's to handle: it lets the chunks under way finish.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
-
-
-def _call(item: Any) -> Any:
-    assert _adopted is not None
-    return _adopted(item)
 
 
 @cache

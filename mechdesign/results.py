@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -105,6 +106,10 @@ class Table:
         columns = tuple(replace(column, values=np.asarray(column.values)[rows]) for column in self.columns)
         return replace(self, columns=columns)
 
+    def blocks(self) -> Iterator[Table]:
+        """The table in parts, one after the other, of which each is in memory."""
+        yield self
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns, in order."""
@@ -142,6 +147,81 @@ class Table:
         return f"<Table {self.name}: {len(self)} rows of {shown}>"
 
 
+class LongTable(Table):
+    """A table of so many rows that they are made block by block, where they are written or judged.
+
+    Whoever asks for the values of a column has all columns gathered, once, and then in memory.
+
+    Parameters
+    ----------
+    like : Table
+        A table with the same columns.
+    source : callable
+        Makes the rows, as tables one after the other; each call makes them anew.
+    """
+
+    def __init__(self, like: Table, count: int, source: Callable[[], Iterator[Table]]) -> None:
+        columns = tuple(_LongColumn(column, self._values) for column in like.columns)
+        self.__dict__.update(name=like.name, columns=columns, meaning=like.meaning, _count=count, _source=source)
+
+    def blocks(self) -> Iterator[Table]:
+        """The rows, made anew, as tables one after the other."""
+        found: Iterator[Table] = self.__dict__["_source"]()
+        return found
+
+    def take(self, rows: NDArray[Any]) -> Table:
+        """The table of some rows, by a mask or by their numbers."""
+        wanted = np.arange(len(self))[rows]
+        parts, begin = [], 0
+        for block in self.blocks():
+            here = np.flatnonzero((wanted >= begin) & (wanted < begin + len(block)))
+            parts.append((here, block.take(wanted[here] - begin)))
+            begin += len(block)
+            if begin > wanted.max(initial=-1):
+                break
+        order = np.argsort(np.concatenate([here for here, _ in parts]), kind="stable")
+        return Table(self.name, tuple(
+            replace(column, values=np.concatenate([part.columns[k].values for _, part in parts])[order])
+            for k, column in enumerate(parts[0][1].columns)
+        ), self.meaning)  # fmt: skip
+
+    def __len__(self) -> int:
+        return int(self.__dict__["_count"])
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Iterate over rows as dictionaries of Python scalars."""
+        for block in self.blocks():
+            yield from block
+
+    def _values(self, name: str) -> NDArray[Any]:
+        return self._gathered[name]
+
+    @cached_property
+    def _gathered(self) -> dict[str, NDArray[Any]]:
+        parts: dict[str, list[NDArray[Any]]] = {name: [] for name in self.names}
+        for block in self.blocks():
+            for column in block.columns:
+                parts[column.name].append(column.values)
+        return {name: np.concatenate(parts.pop(name)) for name in self.names}
+
+
+class _LongColumn(Column):
+    """A column of a `LongTable`."""
+
+    def __init__(self, like: Column, values: Callable[[str], NDArray[Any]]) -> None:
+        told = {"name": like.name, "unit": like.unit, "meaning": like.meaning}
+        self.__dict__.update(told, _numeric=like.numeric, _values=values)
+
+    @property
+    def values(self) -> NDArray[Any]:
+        found: NDArray[Any] = self.__dict__["_values"](self.name)
+        return found
+
+    @property
+    def numeric(self) -> bool:
+        return bool(self.__dict__["_numeric"])
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Answer of one command."""
@@ -155,11 +235,17 @@ class Result:
     interrupted: str = ""  #: how far it came, where it is the finished part of an interrupted computation
     drawn: Mapping[str, Any] = field(default_factory=dict)  #: what pictures show besides, by name
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
+    pictured: Result | None = None  #: of a long sweep the result at those of its poses that pictures show
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
         count = len(self.warnings)
         return f"<Result of {self.command}: {tables}; {count or 'no'} warning{'s' * (count != 1)}>"
+
+    @property
+    def seen(self) -> Result:
+        """What pictures show."""
+        return self.pictured or self
 
     @property
     def main(self) -> Table:

@@ -50,7 +50,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     UnknownColumnError
         If there is no such column (why, where the result says so), it holds words, or its rows have several units.
     """
-    table, column, rows = _locate(result, path)
+    table, column, rows = located(result, path)
     counts = rows
     values = table[column]
     if column in result.absent and np.isnan(values).all():
@@ -97,7 +97,8 @@ def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
     return np.where(counts.any(axis=-1), found, np.nan)
 
 
-def _locate(result: Result, path: str) -> tuple[Table, str, Flags]:
+def located(result: Result, path: str) -> tuple[Table, str, Flags]:
+    """The table and the column that a path names, and which rows; see `choose`."""
     name, _, rest = path.partition(".")
     named = result.tables.get(name)
     for table, column in (*((each, path) for each in result.tables.values()), *([(named, rest)] if named else [])):

@@ -1,11 +1,13 @@
 """Hypothesis: no deadlines, for machines are noisy; in CI the same examples at every run, to repeat it by.
 
 Linear algebra keeps to one thread: the matrices are small, and several workers share the processors.
-`--budget 30m` is how long the random searches of `tests/hunt` go on.
+`--budget 30m` is how long the random searches of `tests/hunt` go on, `--cases` how many each looks at.
+What is imported and collected is never garbage: the collector need not go through it at every study.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -18,6 +20,8 @@ settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
+# Of each generation of the garbage collector, in place of 700, 10, 10.
+THRESHOLDS = (20_000, 20, 50)
 
 
 def seconds_of(text: str) -> float:
@@ -29,3 +33,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--budget", type=seconds_of, default=None, help="time for the random searches of tests/hunt: 90s, 30m, 2h"
     )
+    parser.addoption("--cases", type=int, default=None, help="cases of each random search of tests/hunt")
+    parser.addoption("--first", type=int, default=0, help="seed of the first case")
+
+
+def pytest_collection_finish() -> None:
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*THRESHOLDS)

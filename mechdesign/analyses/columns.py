@@ -39,3 +39,10 @@ def shared(units: Units, **values: ArrayLike) -> list[Column]:
         Column(name, np.asarray(column), units.label(SHARED[name][0]), SHARED[name][1])
         for name, column in values.items()
     ]
+
+
+def power_of_length(units: Units, power: int) -> str:
+    """The study's unit of length to a power."""
+    name = "" if units.length == "dimensionless" else units.length
+    text = name if abs(power) == 1 else f"{name}^{abs(power)}"
+    return "" if power == 0 or not name else text if power > 0 else f"1/{text}"

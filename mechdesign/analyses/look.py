@@ -6,6 +6,7 @@ import dataclasses
 from importlib import import_module
 
 from mechdesign.commands import COMMANDS
+from mechdesign.parallel import here
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import Precision
@@ -39,4 +40,5 @@ def look(study: Study, command: str) -> Result:
     if optimize is not None:
         method = "search" if optimize.method == "grid" else optimize.method
         optimize = optimize.model_copy(update={"method": method, "evaluations": DESIGNS, "subject_to": ()})
-    return ask(dataclasses.replace(study, reliability=reliability, optimize=optimize), command)
+    with here():
+        return ask(dataclasses.replace(study, reliability=reliability, optimize=optimize), command)

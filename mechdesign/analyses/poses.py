@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, default, expand
@@ -26,6 +27,8 @@ from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 POSES_AT_ONCE = 65536
+# Threads that solve poses of a long motion: what is made of them is one thread's work, and more would fill the memory.
+_MOST_SOLVERS = 4
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
 # What an angle may turn between neighbouring poses so that the way round is certain.
@@ -109,35 +112,82 @@ def _solve_group(
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     mechanism: Mechanism = study.mechanism
     plan = mechanism.plan(group.names)
-    coordinates = plan.structure.given
-    given = [np.asarray(radians(study, c, v), dtype=float) for c, v in zip(coordinates, group.columns(), strict=True)]
+    jobs = min(worker_count(jobs), _MOST_SOLVERS)
+    pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
+
+    def given(piece: slice = slice(None)) -> list[Floats]:
+        columns = zip(plan.structure.given, group.columns(), strict=True)
+        return [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
 
     def solve(values: Sequence[Floats], rows: Ints) -> Configuration:
         """Poses at or near some rows, not yet judged by the limits."""
         start = starts(mechanism, poses, rows) if plan.iterative else None
         return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
 
-    pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
-
     def at(piece: slice) -> Configuration:
-        return solve([v[piece] for v in given], group.rows[piece])
+        return solve(given(piece), group.rows[piece])
 
-    only = [at(piece) for piece in pieces] if len(pieces) == 1 else None
-    near: dict[str, Floats] = {}
+    def judged(piece: slice, configuration: Configuration, near: Mapping[str, Floats]) -> SolvedPoses:
+        known = {**configuration.near, **near}
+        configuration = replace(configuration, near=known, counted=configuration.counted | near.keys())
+        plan.judge(configuration)
+        return SolvedPoses(group.rows[piece], group.names, configuration)
+
     angles = [] if poses.listed else _followed(mechanism, plan, wanted)
+    names = [angle.name for angle in angles]
+    bounded = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
+    if poses.designs == 1 and len(poses.grid) == 1 and not bounded.intersection(names):
+        way, begun = _Way(plan, angles, solve), dict[str, float]()
+        for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
+            near = dict(zip(names, way.follow(piece.start, given(piece), configuration) if angles else (), strict=True))
+            for name in mechanism.drives:
+                if name in near and (known := np.isfinite(near[name])).any():
+                    begin = begun.setdefault(name, float(near[name][known.argmax()]))
+                    near[name] = _begun(study, poses, name, near[name], begin)
+            yield judged(piece, configuration, near)
+        return
+    only = [at(piece) for piece in pieces] if len(pieces) == 1 else None
+    near = {}
     if angles:
         values = np.empty((len(angles), len(group.rows)))
         for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
-            for row, angle in zip(values, angles, strict=True):
-                row[piece] = configuration.value(angle)
-        values = continuous(poses, plan, given, angles, values, solve)
-        near = {angle.name: row for angle, row in zip(angles, values, strict=True)}
+            values[:, piece] = _values_of(angles, configuration)
+        lines = continuous(poses.grid[-1], plan, given(), angles, values, solve)
+        near = dict(zip(names, (_across(row, poses.grid) for row in lines), strict=True))
         near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
     for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
-        followed = {**configuration.near, **{name: values[piece] for name, values in near.items()}}
-        configuration = replace(configuration, near=followed, counted=configuration.counted | near.keys())
-        plan.judge(configuration)
-        yield SolvedPoses(group.rows[piece], group.names, configuration)
+        yield judged(piece, configuration, {name: values[piece] for name, values in near.items()})
+
+
+def _values_of(angles: Sequence[Coordinate], configuration: Configuration) -> Floats:
+    """Values of some angles, shape (angles, ...)."""
+    return np.stack([np.broadcast_to(configuration.value(angle), configuration.shape) for angle in angles])
+
+
+@dataclass
+class _Way:
+    """Angles along a motion that comes piece by piece; `last` is the pose from which the next piece goes on."""
+
+    plan: Plan
+    angles: Sequence[Coordinate]
+    solve: Solve
+    last: tuple[int, Floats, Floats, Floats] | None = None  # row, what is given, angles, and their whole turns
+
+    def follow(self, begin: int, given: Sequence[Floats], configuration: Configuration) -> Floats:
+        """The angles without jumps at the poses of the next piece, whose first row is `begin`."""
+        values = _values_of(self.angles, configuration)
+        rows, turns = begin + np.arange(values.shape[1]), None
+        if self.last is not None:
+            row, places, before, turns = self.last
+            rows, values = np.append(row, rows), np.concatenate([before[:, None], values], axis=1)
+            given = [np.append(place, column) for place, column in zip(places, given, strict=True)]
+        found = continuous(values.shape[1], self.plan, given, self.angles, values, self.solve, rows, turns)
+        known = np.flatnonzero(np.isfinite(values).all(axis=0))
+        if len(known):
+            k = known[-1]
+            turned = np.round((found[:, k] - values[:, k]) / TURN)
+            self.last = int(rows[k]), np.array([column[k] for column in given]), values[:, k], turned
+        return found[:, len(rows) - configuration.shape[0] :]
 
 
 def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
@@ -148,13 +198,18 @@ def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) ->
     return [angle for name, angle in found.items() if name not in plan.counted | settled]
 
 
-def _begun(study: Study, poses: Poses, drive: str, values: Floats) -> Floats:
-    """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value."""
+def _begun(study: Study, poses: Poses, drive: str, values: Floats, first: float | None = None) -> Floats:
+    """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value.
+
+    `first` is where the motion began of which the values are a later piece.
+    """
     mechanism = study.mechanism
     drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
     lines = values.reshape(poses.designs, -1)
     known = np.isfinite(lines)
     begin = np.take_along_axis(lines, known.argmax(axis=1)[:, None], axis=1)[:, 0]
+    if first is not None:
+        begin = np.array([first])
     smallest, largest = (f(np.where(known, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
     turns = np.round((drawn - begin) / TURN)
     sizes = mechanism.nominal | {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
@@ -243,9 +298,10 @@ def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
 
 
 def continuous(
-    poses: Poses, plan: Plan, given: Sequence[Floats], angles: Sequence[Coordinate], values: Floats, solve: Solve
-) -> Floats:
-    """Angles without jumps along a sweep, a path or the last axis of a grid; its other axes after it.
+    line: int, plan: Plan, given: Sequence[Floats], angles: Sequence[Coordinate], values: Floats, solve: Solve,
+    rows: Ints | None = None, begun: Floats | None = None,
+) -> Floats:  # fmt: skip
+    """Angles without jumps along a sweep, a path or each line of a grid, which has as many poses as `line`.
 
     Between poses that are far apart the mechanism is solved on the way, twice as finely until no angle turns by a
     right angle or more in one step. Poses without a value are stepped over.
@@ -256,20 +312,24 @@ def continuous(
         Values of the plan's coordinates (radians, lengths).
     values : ndarray, shape (angles, poses)
         The angles at the poses (radians), nan where a pose has none.
+    rows : ndarray of int, shape (poses,), optional
+        Places of the poses along the motion; one after the other where left out.
+    begun : ndarray, shape (angles,), optional
+        Whole turns with which the first pose begins; by default its angles begin in (-pi, pi].
     """
-    line = poses.grid[-1]
     known = np.flatnonzero(np.isfinite(values).all(axis=0))
     if not len(known):
         return values
     seen = values if len(known) == values.shape[1] else values[:, known]
-    starts = known // line != np.append(-1, known[:-1]) // line
+    starts = known // line != np.append(-1, known[:-1] // line)
     rises = np.diff(seen, axis=1)
     far = ~starts[1:] & (np.abs(rises) >= SURE_TURN).any(axis=0)
     parts = _parts(plan, given, known)
     at = np.flatnonzero(far | (parts > 1) & ~starts[1:])
     moved = wrap(rises[:, at])
+    place = known if rows is None else rows[known]
     coarse = np.flatnonzero(
-        (known[at + 1] == known[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE_TURN).any(axis=0))
+        (place[at + 1] == place[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE_TURN).any(axis=0))
     )
     if len(coarse):
         begins = known[at[coarse]]
@@ -281,12 +341,13 @@ def continuous(
     more = np.concatenate([np.zeros((len(values), len(heads))), np.round((moved - rises[:, at]) / TURN)], axis=1)
     total = np.cumsum(more[:, order], axis=1)
     line_of = np.cumsum(order < len(heads)) - 1
-    total += ((seen[:, heads] < ON_THE_CUT - np.pi) - total[:, order < len(heads)])[:, line_of]
-    found = values
-    if total.any():
-        found = values.copy()
-        found[:, known] += TURN * np.repeat(total, np.diff(np.append(begins[order], len(known))), axis=1)
-    return found if len(poses.grid) == 1 else np.stack([_across(row, poses.grid) for row in found])
+    first = (seen[:, heads] < ON_THE_CUT - np.pi) if begun is None else begun[:, None]
+    total += (first - total[:, order < len(heads)])[:, line_of]
+    if not total.any():
+        return values
+    found = values.copy()
+    found[:, known] += TURN * np.repeat(total, np.diff(np.append(begins[order], len(known))), axis=1)
+    return found
 
 
 def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
@@ -366,19 +427,24 @@ class Keeper:
     poses: Poses
     _parts: list[Configuration] = field(default_factory=list)
 
+    @cached_property
+    def rows(self) -> Ints:
+        """Which poses are shown."""
+        return _rows(self.poses, MAX_SHOWN_POSES)
+
     def keep(self, solved: SolvedPoses) -> None:
         """Take over the shown ones of some solved poses."""
-        index = np.flatnonzero(np.isin(solved.rows, _rows(self.poses, MAX_SHOWN_POSES)))
+        index = np.flatnonzero(np.isin(solved.rows, self.rows))
         if len(index):
             self._parts.append(solved.configuration.take(index))
 
     @property
     def shown(self) -> Shown:
         """All that was kept."""
-        rows, whole = _rows(self.poses, MAX_SHOWN_POSES), self._parts[0]
+        whole = self._parts[0]
         if len(self._parts) > 1:
-            whole = joined(self._parts, rows.shape, whole.take(0).vectors, {})
-        return Shown(self.study, self.poses, rows, whole)
+            whole = joined(self._parts, self.rows.shape, whole.take(0).vectors, {})
+        return Shown(self.study, self.poses, self.rows, whole)
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from mechdesign.cli import terminal
 from mechdesign.errors import MechdesignError, Problem, StudyError
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.study import Study
 
 # https://docs.github.com/en/actions/reference/workflow-commands-for-github-actions
@@ -38,8 +38,7 @@ def of_error(error: Exception, message: str, study: Study | None = None) -> Sequ
 
 def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iterator[Problem]:
     """The requirements of a command that are not met, with their places in the study."""
-    own = [index for index, each in enumerate(study.requirements) if command_of(each) == command]
-    for index, verdict in zip(own, verdicts, strict=True):
+    for index, verdict in zip(judged_by(study, command), verdicts, strict=True):
         if not verdict.met:
             yield study.problem(f"requirement: {verdict}", "requirements", index)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,8 +12,8 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cli import terminal
-from mechdesign.cli.batch import junit_text
 from mechdesign.cli.options import Options
+from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
@@ -20,12 +21,16 @@ from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import OUTCOME, VERDICT, Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
 from mechdesign.report.tables import to_csv
+from mechdesign.study.loading import load_data
+from mechdesign.study.text.inputs import Folder
 
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 # Of `Difference.change`: a file whose bytes are others.
 _BYTES = "bytes"
+# Differences that are told beside the table.
+_SAID = (VERDICT, OUTCOME)
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
 
@@ -75,7 +80,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
     """
     assert options.verify is not None
     path = options.verify
-    beside = {name: getattr(options, name) for name in ("jobs", "json", "quiet", "junit", "allow_files")}
+    beside = {name: getattr(options, name) for name in ("command", "jobs", "json", "quiet", "junit", "allow_files")}
     alone = Options(verify=path, **beside)
     if studies or dataclasses.replace(options, overrides=options.overrides or ()) != alone:
         raise StudyError(
@@ -104,12 +109,13 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
 def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
     """Compute again what a manifest describes and write its tables."""
     command = content.get("command")
-    if command not in mechdesign.commands.COMMANDS:
+    if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
     if content.get("interrupted"):
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
     try:
-        study = mechdesign.load(content["study"]["resolved"], seed=content["seed"], allow_files=options.allow_files)
+        inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
+        study = load_data(content["study"]["resolved"], (), content["seed"], inputs)
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:
@@ -158,12 +164,15 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
     for note in found.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
     for difference in found.differences:
-        if difference.change in (VERDICT, OUTCOME):
+        if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
     tables, columns = found.compared["tables"], found.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
     terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
-    terminal.show(found.table, as_json=as_json)
+    if as_json or not sys.stdout.isatty():
+        terminal.show(found.table, as_json=as_json)
+    else:
+        terminal.show_lines([str(each) for each in found.differences if each.change not in _SAID])
     if junit is not None:
         writer.write_file(junit, _junit(found, command).encode())
     return 1 if found.differences else 0

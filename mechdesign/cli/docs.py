@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 import textwrap
@@ -13,12 +14,14 @@ from typing import Any
 import typer
 
 from mechdesign.cli.terminal import emit
-from mechdesign.errors import StudyError, explain
+from mechdesign.errors import AssemblyError, StudyError, explain
 from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
 
 _INDENT = "  "
 # Words of mistakes that are named to be looked up.
 _NAMED = 3
+# Three words or more without a name or a number.
+_WORDS = re.compile(r"(?<![\w.])[a-z]+(?: [a-z]+){2,}(?![\w.])")
 _NO_WRAPPING = 10_000
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
@@ -49,9 +52,17 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
 def explained(error: Exception) -> tuple[int, str]:
     """Exit code and message of an exception; after the mistakes of a study how to look up what they are about."""
     code, message = explain(error)
+    if isinstance(error, AssemblyError):
+        return code, f"{message}\n{look_up(message)}".rstrip("\n")
     keys = [problem.key for problem in error.problems] if isinstance(error, StudyError) else []
     words = list(dict.fromkeys(filter(None, map(place, keys))))[:_NAMED]
     return code, f"{message}\n(mechdesign docs {' '.join(words)})" if words else message
+
+
+def look_up(message: str) -> str:
+    """The command that tells more of a message: by the first of its words that are the same in every such message."""
+    words = _WORDS.search(message)
+    return f"(mechdesign docs {words[0]!r})" if words else ""
 
 
 def commands(group: Mapping[str, Any]) -> Iterator[Entry]:

@@ -7,31 +7,38 @@ import json
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import mechdesign
+from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import BUILT_IN, STYLES, Options
-from mechdesign.errors import Interrupted, MechdesignError, StudyError
+from mechdesign.cli.options import STYLES, Options
+from mechdesign.commands import DIVIDED, MERGE, SWEEP
+from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
-from mechdesign.parallel import one_thread
+from mechdesign.parallel import Divided, divided, one_thread
+from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.report.tables import from_csv
-from mechdesign.results import Result, Table
+from mechdesign.results import LongTable, Result, Table
+from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.text.document import MAX_BYTES
 
 STANDARD_INPUT = Path("-")
+_ROWS_AT_ONCE = 20_000  # of a table that is read from its file
 RESULTS = Path("results")  # where no other folder is asked for
+Source = Path | bytes  # of a study: its file or its text
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -40,6 +47,10 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
+
+
+# Commands that an interrupted run need not begin anew.
+_RESUMED = ("optimize", SWEEP.name)
 
 
 @dataclass(frozen=True)
@@ -57,27 +68,37 @@ class Outcome:
     seconds: float = 0.0
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
-    result: Result | None = None
+    table: Table | None = None  # the main one
+    shard: str = ""  # what became of a part of it, where no more was asked
 
 
-def load_study(path: Path | None, options: Options) -> Study:
-    """Load a study with the options' overrides and seed; ``-`` is standard input; without a path, say which is taken.
+def source(path: Path | None, options: Options) -> Source:
+    """Where a study comes from: ``-`` is standard input; without a path, say which is taken."""
+    if path is None:
+        here = Path("study.yaml")
+        path = here if here.exists() else template_path()
+        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        terminal.say(f"study: {what}", quiet=options.quiet)
+    return sys.stdin.buffer.read(MAX_BYTES + 1) if path == STANDARD_INPUT else path
+
+
+def load_source(source: Source, options: Options) -> Study:
+    """Load a study with the options' overrides and seed.
 
     Raises
     ------
     StudyError
         Every mistake of the study or the overrides.
     """
-    if path is None:
-        here = Path("study.yaml")
-        path = here if here.exists() else template_path(BUILT_IN)
-        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
-        terminal.say(f"study: {what}", quiet=options.quiet)
     overrides = options.overrides or ()
-    if path == STANDARD_INPUT:
-        content = sys.stdin.buffer.read(MAX_BYTES + 1)
-        return load(text=content, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
-    return load(path, overrides, options.seed, allow_files=options.allow_files)
+    if isinstance(source, bytes):
+        return load(text=source, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
+    return load(source, overrides, options.seed, allow_files=options.allow_files)
+
+
+def load_study(path: Path | None, options: Options) -> Study:
+    """Load the study of a path; see `source` and `load_source`."""
+    return load_source(source(path, options), options)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
@@ -85,6 +106,11 @@ def folder(study: Study, name: str, options: Options, *, several: bool = False) 
     if options.out is None:
         return RESULTS / study.label / name
     return options.out / study.label if several else options.out
+
+
+def place(directory: Path, options: Options) -> Path:
+    """The folder that a command writes in: of a shard its own, for others write at the same time."""
+    return directory if options.part is None else directory / options.part.folder
 
 
 def claim(owners: dict[str, Path | None], study: Study) -> None:
@@ -100,7 +126,7 @@ def claim(owners: dict[str, Path | None], study: Study) -> None:
         raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
 
 
-def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
+def answer(study: Study, command: str, directory: Path, options: Options, progress: Progress) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
@@ -108,24 +134,33 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
+    if options.part is not None:
+        return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
     asked = extras(command, options)
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
-    if options.resume and (kept := _finished(study, command, directory, asked)) is not None:
+    share, merging = None, options.command == MERGE and command in DIVIDED
+    if merging and shards.found(directory):
+        share = shards.merge(directory, manifest.computed_from(study, command))
+    elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
+    elif merging:
+        # A mistake of the study is why there are none.
+        requirements.foresee(study, [command] if command in LONG else [])
+        raise shards.missing(directory)
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, directory, options) if command == "optimize" else None
+    journal = _journal(study, command, directory, options) if command in _RESUMED else None
     if journal is not None:
         more["journal"] = journal
     try:
-        with terminal.Bar(quiet=options.quiet) as bar:
+        with progress, divided(share):
             result: Result = getattr(mechdesign, command)(
-                study, seed=options.seed, jobs=options.jobs, progress=bar, **more
+                study, seed=options.seed, jobs=options.jobs, progress=progress, **more
             )
             if before is not None:
                 result = laid_under(study, result, before, _earlier(before, command, options))
@@ -134,19 +169,49 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
-        verdicts, undrawn = _judged_and_written(directory, study, result, asked)
+        with progress:
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
         raise
     if journal is not None:
         journal.discard()
+    shards.remove(directory)
     warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
-    code, seconds = _exit_code(result.failed, verdicts), time.perf_counter() - begun
+    code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, result=result,
+        written=True, table=result.main,
     )  # fmt: skip
+
+
+def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
+    """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
+    told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
+    if command not in DIVIDED:
+        return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
+    origin = manifest.computed_from(study, command)
+    if options.resume and shards.is_current(directory, origin):
+        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
+    if command in LONG:
+        requirements.foresee(study, [command])
+    taken = shards.Taken(shard)
+    try:
+        with progress, divided(taken):
+            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
+    except Divided:
+        pass
+    except Interrupted:
+        # A part of a part is nothing.
+        raise KeyboardInterrupt from None
+    except MechdesignError:
+        # Merge comes to the same, and tells it.
+        taken.write(directory, origin, options.command)
+        raise
+    taken.write(directory, origin, options.command)
+    seconds = time.perf_counter() - begun
+    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
@@ -177,36 +242,45 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
             for entry in content["requirements"]
         ]
-        rows = len(_main_table(directory))
+        table = _main_table(directory, content)
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    if len(verdicts) != sum(command_of(requirement) == command for requirement in study.requirements):
+    if len(verdicts) != len(judged_by(study, command)):
         return None
     settle(directory)
-    code = _exit_code(failed, verdicts)
+    code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, rows, warnings, failed, verdicts, kept=True, written=True
+        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
+        table=table,
     )  # fmt: skip
 
 
-def _exit_code(failed: str, verdicts: Sequence[Verdict]) -> int:
-    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met."""
-    return 3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1
+def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
+    """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
+    cases: list[int] = table["exit_code"].tolist() if "exit_code" in table else []
+    return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
-def _main_table(directory: Path) -> Table:
-    """The main table of the results that are in a folder."""
-    content = manifest.read(directory)
-    assert content is not None
+def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
+    """The main table of the results in a folder with this manifest, read from its file where its rows are wanted."""
     file, about = next(iter(content["tables"].items()))
-    text = (directory / file).read_text(encoding="utf-8")
-    return from_csv(text, Path(file).stem, about["columns"], about["meaning"])
+
+    def blocks() -> Iterator[Table]:
+        with (directory / file).open(encoding="utf-8") as stream:
+            head = stream.readline()
+            lines = list(islice(stream, _ROWS_AT_ONCE))
+            while True:
+                yield from_csv(head + "".join(lines), Path(file).stem, about["columns"], about["meaning"])
+                if not (lines := list(islice(stream, _ROWS_AT_ONCE))):
+                    return
+
+    return LongTable(next(blocks()), int(about["rows"]), blocks)
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras
+    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -216,15 +290,15 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, jobs, progress)
 
 
-def _journal(study: Study, directory: Path, options: Options) -> Journal:
-    """Where finished designs are kept, with those of an earlier run if this one is to go on from there."""
-    journal = Journal(directory / NAME, manifest.computed_from(study, "optimize"), resume=options.resume)
+def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
+    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
-        terminal.say(f"{study.label}: optimize: {there}; begins anew", quiet=options.quiet)
+        terminal.say(f"{study.label}: {command}: {there}; begins anew", quiet=options.quiet)
     return journal
 
 
@@ -236,9 +310,14 @@ def tell(given: Outcome, options: Options) -> None:
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.failed:
-        terminal.say(f"{who} {given.failed}")
+        from mechdesign.cli.docs import look_up
+
+        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}".rstrip("\n"))
+    if given.shard:
+        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        return
     kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
+    terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
 
 
 def write_report(
@@ -274,21 +353,24 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 
 @one_thread()
-def ask(command: str, path: Path | None, options: Options) -> int:
-    """One command from end to end; returns its exit code."""
+def ask(command: str, path: Path | None, options: Options) -> Outcome:
+    """One command from end to end."""
     study = load_study(path, options)
-    directory = folder(study, command, options)
+    directory = place(folder(study, command, options), options)
     writer.check_writable(directory)
     with owned(directory):
         try:
-            given = answer(study, command, directory, options)
+            given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
         except Interrupted as error:
             if options.report:
                 write_report(directory, study, [interrupted(study, command, directory, error)], options)
             raise
         if options.report:
             write_report(directory, study, [given], options)
-        table = given.result.main if given.result is not None else _main_table(directory)
-    terminal.show(table, as_json=options.json, rest=str(directory / f"{table.name}.csv"))
+    if given.shard:
+        tell(given, options)
+        return given
+    assert given.table is not None
+    terminal.show(given.table, as_json=options.json, rest=directory / f"{given.table.name}.csv")
     tell(given, options)
-    return given.exit_code
+    return given

@@ -2,24 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from inspect import Parameter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mechdesign.commands import MAX_JOBS
+from mechdesign.commands import MAX_JOBS, QUESTIONS
 from mechdesign.errors import StudyError
-from mechdesign.files import formats_of
+from mechdesign.files import FORMATS, formats_of
 
-# Template of the study that is taken where there is none.
-BUILT_IN = "two_link_arm"
+if TYPE_CHECKING:
+    from mechdesign.shards import Shard
+
 # Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
 # Relative tolerance of `compare`: more than machines differ by, less than anything that matters.
 RELATIVE = 1e-9
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
+
+
+def _studies(incomplete: str) -> list[str]:
+    """Files of studies that a word may become; a shell completes the names of folders where there are none."""
+    folder, slash, start = incomplete.rpartition("/")
+    try:
+        found = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
+    except OSError:
+        return []
+    return [f"{folder}{slash}{name}" for name in found if name.startswith(start)]
+
+
+def _templates(incomplete: str) -> list[str]:
+    folder = Path(__file__).parents[1] / "study" / "templates"
+    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
+def _one_of(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """Completes a word to those known."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
 def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
@@ -28,7 +50,8 @@ def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
 
 
 def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
-    argument = typer.Argument(metavar=metavar, help=f"{meaning} {_LEFT_OUT}", show_default=False)
+    told = f"{meaning} {_LEFT_OUT}"
+    argument = typer.Argument(metavar=metavar, help=told, show_default=False, autocompletion=_studies)
     return _parameter("study", kind | None, None, argument)
 
 
@@ -65,9 +88,25 @@ JOBS = _text(
     int,
     "--jobs",
     "N",
-    "Threads to compute on; the results do not depend on it. Default: every processor.",
+    "Threads to compute on, or studies at a time; the results do not depend on it. Default: every processor.",
     min=1,
     max=MAX_JOBS,
+)
+EXECUTOR = _text(
+    "executor",
+    str,
+    "--executor",
+    "NAME",
+    "Where great work is computed: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
+    "concurrent.futures.Executor. The results do not depend on it. Default: here.",
+)
+SHARD = _text(
+    "shard",
+    str,
+    "--shard",
+    "I/N",
+    "Compute the I-th of N parts of the great work alone, from 1 on, and keep it in the folder of the results; "
+    "`mechdesign merge` puts the parts together.",
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
@@ -76,13 +115,21 @@ NO_PLOTS = _flag(
     "--no-plots",
     "Draw no pictures; those of a run before are removed, as they would not fit the new tables.",
 )
-FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
+FORMAT = _text(
+    "formats",
+    str,
+    "--format",
+    "LIST",
+    "Formats of the pictures, e.g. png,svg,pdf. Default: png.",
+    autocompletion=_one_of(FORMATS),
+)
 STYLE = _text(
     "style",
     str,
     "--style",
     "NAME",
     "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
+    autocompletion=_one_of(STYLES),
 )
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
@@ -99,6 +146,7 @@ BEFORE = _text(
     "--before",
     "STUDY",
     "Also draw this study, without the overrides of --set, in dashes under the other: before and after a change.",
+    autocompletion=_studies,
 )
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
@@ -110,13 +158,40 @@ RESUME = _flag(
 RESUME_DESIGNS = _flag(
     "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
 )
+VARY = _text(
+    "vary",
+    list[str],
+    "--vary",
+    "A.B.C=VALUES",
+    "An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of "
+    "a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.",
+)
+METHOD = _text(
+    "method", str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid."
+)
+SAMPLES = _text("samples", int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
+CASES = _text(
+    "cases",
+    Path,
+    "--cases",
+    "FILE",
+    "CSV file of cases instead of --vary: its first line names entries of the study, each line below is a case.",
+)
+RESULTS = _text(
+    "results",
+    list[str],
+    "--results",
+    "LIST",
+    "Results that are listed besides the requirements, with commas between, e.g. kinematics.mu.min,GII. Repeatable; in "
+    "place of those of the study's matrix.",
+)
 VERIFY = _text(
     "verify",
     Path,
     "--verify",
     "PATH",
     "Instead of studies: repeat what a manifest.json, or those in a folder, say was computed, and compare the bytes of "
-    "the tables; 1 where they are others. Files that a study names are looked for in the working directory.",
+    "the tables; 1 where they are others. Files that a study names are looked for beside it, else beside the manifest.",
 )
 
 
@@ -124,6 +199,26 @@ def _folder(name: str, meaning: str) -> Parameter:
     return _parameter(name, Path, Parameter.empty, typer.Argument(metavar=name.upper(), help=meaning))
 
 
+FILE = _parameter(
+    "file", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
+)
+ASKED = _parameter(
+    "commands",
+    list[str] | None,
+    None,
+    typer.Argument(
+        metavar="[COMMAND]...",
+        help="Questions; left out: all that the study asks.",
+        show_default=False,
+        autocompletion=_one_of(QUESTIONS),
+    ),
+)
+TEMPLATE = typer.Argument(
+    metavar="[TEMPLATE]",
+    help="Name of a template; a wrong name lists them.",
+    show_default=False,
+    autocompletion=_templates,
+)
 OLD = _folder("old", "Folder of the results that are the baseline.")
 NEW = _folder("new", "Folder of the results that are compared with it.")
 RTOL = _parameter(
@@ -150,9 +245,17 @@ TOLERANCES = _text(
     "that fits counts, --rtol and --atol where none does.",
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
+# Of the cases of a sweep.
+MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS)
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
-OWN = {"kinematics": (ANIMATE, ALL_MODES, BEFORE), "workspace": (BEFORE,), "optimize": (RESUME_DESIGNS,)}
+OWN = {
+    "kinematics": (ANIMATE, ALL_MODES, BEFORE),
+    "workspace": (BEFORE,),
+    "optimize": (RESUME_DESIGNS, EXECUTOR, SHARD),
+    "reliability": (EXECUTOR, SHARD),
+    "sensitivities": (EXECUTOR, SHARD),
+}
 
 
 @dataclass(frozen=True)
@@ -169,6 +272,9 @@ class Options:
     overrides: tuple[str, ...] | None = ()
     seed: int | None = None
     jobs: int | None = None
+    executor: str | None = None
+    shard: str | None = None
+    command: str = ""  # that was given
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
@@ -190,9 +296,18 @@ class Options:
         for option, value in (("--format", self.formats), ("--style", self.style), ("--before", self.before)):
             if value is not None and self.no_plots:
                 raise StudyError(f"{option} and --no-plots contradict each other")
+        if self.shard is not None and self.report:
+            raise StudyError("--shard and --report contradict each other; merge takes --report")
         if self.style is not None and self.style not in STYLES:
             raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         formats_of(self.formats, "--format")
+
+    @property
+    def part(self) -> Shard | None:
+        """The shard that is to be computed."""
+        from mechdesign.shards import Shard
+
+        return None if self.shard is None else Shard.of(self.shard)
 
     @property
     def kinds(self) -> str:

@@ -12,20 +12,25 @@ from typing import Any, TextIO
 
 # Of interrupts, on systems that have them.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_NOT_WRITTEN = 4  # exit code where results could not be written
 _BY_SIGNAL = 128  # exit code of a process that a signal ended, less the signal's number
+# Files of Python's that hold locks for an instant, and functions of `threading` that wait without.
+_LOCKING = tuple(part.replace("/", os.sep) for part in ("/threading.py", "/queue.py", "/concurrent/futures/"))
+_WAITS = ("wait", "_wait_for_tstate_lock")
 _RETRY = 0.02  # seconds until an interrupt that came amiss is tried again
 
 
 def run(command: Callable[[], Any]) -> None:
-    """Call a command and exit with its code; a signal's is 128 and its number.
+    """Call a command and exit with its code; a signal's is 128 and its number, that of a table that was lost 4.
 
     Not in a library's process: signals and streams become the command's.
     """
-    _open_streams()
+    output = _open_streams()
     signals = Signals()
     code: Any = 0
     try:
         try:
+            signals.hear()
             command()
         finally:
             signals.ignore()
@@ -39,15 +44,18 @@ def run(command: Callable[[], Any]) -> None:
         code = _BY_SIGNAL + signals.number
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
+    if output.lost and (code is None or isinstance(code, int)):
+        code = max(code or 0, _NOT_WRITTEN)
     sys.exit(code)
 
 
 class Signals:
     """Interrupts, terminations and hang-ups are all a KeyboardInterrupt, at the first place that is fit for one.
 
-    Inside an import or a finaliser it would be lost or become another error. A signal that was ignored from the start
-    (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of ``timeout``, which
-    sends it to the process and to its group.
+    Inside an import or a finaliser it would be lost or become another error, and what blocks signals is not to be
+    disturbed though another thread lets them in; one that is lost in a library is tried again. A signal that was
+    ignored from the start (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of
+    ``timeout``, which sends it to the process and to its group.
     """
 
     def __init__(self) -> None:
@@ -57,6 +65,12 @@ class Signals:
             signal.signal(each, self._hear)
         if hasattr(signal, "SIGALRM"):
             signal.signal(signal.SIGALRM, self._interrupt)
+            sys.unraisablehook = self._lost
+
+    def hear(self) -> None:
+        """Let through what has waited since the process began."""
+        if hasattr(signal, "pthread_sigmask"):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, self._heard)
 
     def ignore(self) -> None:
         """The command is done: what comes now changes nothing."""
@@ -70,27 +84,44 @@ class Signals:
             self.number = self.number or number
             self._interrupt(number, frame)
 
+    def _lost(self, error: sys.UnraisableHookArgs) -> None:
+        if isinstance(error.exc_value, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, _RETRY)
+        else:
+            sys.__unraisablehook__(error)
+
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        if hasattr(signal, "SIGALRM") and _unfit(frame):
+        if hasattr(signal, "SIGALRM") and (_blocked() or _unfit(frame)):
             signal.setitimer(signal.ITIMER_REAL, _RETRY)
         else:
             raise KeyboardInterrupt
 
 
+def _blocked() -> bool:
+    return not signal.pthread_sigmask(signal.SIG_BLOCK, ()).isdisjoint(SIGNALS)
+
+
 def _unfit(frame: FrameType | None) -> bool:
+    """Whether an interrupt in a frame would be lost, or leave a lock of threads or workers held for ever."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_code.co_name == "__del__":
+        file, name = frame.f_code.co_filename, frame.f_code.co_name
+        if name in _WAITS and file.endswith("threading.py"):
+            return False
+        if file.startswith("<frozen importlib") or name == "__del__" or any(part in file for part in _LOCKING):
             return True
         frame = frame.f_back
     return False
 
 
 class _Unfailing(io.FileIO):
-    """A stream whose reader may have gone, or whose disk may be full; the first error but a closed pipe is told."""
+    """A stream whose reader may have gone, or whose disk may be full.
+
+    A reader that goes has read enough. Other errors of standard output are told, and what it should hold is `lost`.
+    """
 
     def __init__(self, number: int) -> None:
         super().__init__(number, "w", closefd=False)
-        self._failed = False
+        self._failed = self.lost = False
 
     def write(self, data: Any) -> int:
         if not self._failed:
@@ -99,14 +130,15 @@ class _Unfailing(io.FileIO):
             except OSError as error:
                 self._failed = True
                 if self.fileno() == 1 and not isinstance(error, BrokenPipeError):
-                    print(f"warning: standard output is not whole: {error.strerror}", file=sys.stderr)
+                    self.lost = True
+                    print(f"standard output is not whole: {error.strerror}", file=sys.stderr)
         return memoryview(data).nbytes
 
 
-def _open_streams() -> None:
-    """Put streams that cannot fail in place of the standard ones; a closed one leads nowhere.
+def _open_streams() -> _Unfailing:
+    """Put streams that cannot fail in place of the standard ones, and give that of the output.
 
-    A name in a study must not fail either, on a terminal that lacks its letters.
+    A closed one leads nowhere. A name in a study must not fail either, on a terminal that lacks its letters.
     """
     for number in range(3):
         try:
@@ -115,11 +147,13 @@ def _open_streams() -> None:
             # Else the next file that is opened would be this stream.
             os.open(os.devnull, os.O_RDWR)
     sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115
-    sys.stdout, sys.stderr = _stream(1, sys.stdout), _stream(2, sys.stderr)
+    output, errors = _Unfailing(1), _Unfailing(2)
+    sys.stdout, sys.stderr = _stream(output, sys.stdout), _stream(errors, sys.stderr)
+    return output
 
 
-def _stream(number: int, old: TextIO | None) -> TextIO:
+def _stream(raw: _Unfailing, old: TextIO | None) -> TextIO:
     encoding = old.encoding if old is not None else "utf-8"
-    buffer = io.BufferedWriter(_Unfailing(number))
-    at_once = number == 2 or buffer.isatty()
+    buffer = io.BufferedWriter(raw)
+    at_once = raw.fileno() == 2 or buffer.isatty()
     return io.TextIOWrapper(buffer, encoding, errors="replace", line_buffering=at_once)

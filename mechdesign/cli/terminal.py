@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
-from types import TracebackType
+from collections.abc import Iterable, Sequence
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from mechdesign.errors import printable_lines
 from mechdesign.progress import Progress
-from mechdesign.report.tables import cells, to_csv, to_json
+from mechdesign.report.tables import cells, csv_blocks, json_blocks
 from mechdesign.results import Table
 
 if TYPE_CHECKING:
@@ -18,8 +23,10 @@ if TYPE_CHECKING:
 
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
+_PIECE = 1 << 20  # characters of a file that are copied at once
 _NAMES = 6  # names of columns for which there was no room
-_BAR_DELAY = 1.0  # seconds before a bar appears
+_GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
+DELAY = 1.0  # seconds before it is shown how far something is
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -30,27 +37,44 @@ def say(text: str, *, quiet: bool = False) -> None:
 
 def emit(text: str) -> None:
     """Data to stdout."""
-    sys.stdout.write(text)
+    emit_all([text])
+
+
+def emit_all(texts: Iterable[str]) -> None:
+    """Data to stdout, piece by piece."""
+    for text in texts:
+        sys.stdout.write(text)
     sys.stdout.flush()
 
 
-def show(table: Table, *, as_json: bool, rest: str = "") -> None:
-    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and where the `rest` is."""
+def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
+    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and the file of the `rest`."""
     if as_json:
-        emit(to_json(table))
+        emit_all(json_blocks(table))
     elif sys.stdout.isatty():
         _show_to_people(table, rest)
+    elif rest is not None:
+        with rest.open(encoding="utf-8", newline="") as stream:
+            emit_all(iter(partial(stream.read, _PIECE), ""))
     else:
-        emit(to_csv(table))
+        emit_all(csv_blocks(table))
 
 
-def _show_to_people(table: Table, rest: str) -> None:
+def show_lines(lines: Sequence[str]) -> None:
+    """The first of many lines to a terminal, and how many are left."""
+    more = len(lines) - _ROWS
+    emit("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
+    if more > 0:
+        emit(f"... {more} more; --out DIR writes all of them\n")
+
+
+def _show_to_people(table: Table, rest: Path | None) -> None:
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text
 
     console = Console()
-    columns = [column[:_ROWS] for column in cells(table, _DIGITS)]
+    columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
     heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
     room = console.width
@@ -71,31 +95,41 @@ def _show_to_people(table: Table, rest: str) -> None:
         names = [*table.names[shown : shown + _NAMES], *(["..."] if len(columns) > shown + _NAMES else [])]
         left.append(f"{len(columns) - shown} more columns ({', '.join(names)})")
     if left:
-        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest else ''}"), style="dim")
+        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"), style="dim")
+
+
+def lively() -> bool:
+    """Whether a person looks at stderr on a terminal that can be drawn on, rather than a CI server keeps it."""
+    ci = os.environ.get("CI", "").lower() not in ("", "0", "false")
+    return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
+
+
+def announced(total: int, what: str) -> str:
+    """What is said of a great stage when it begins; empty of others."""
+    return f"{total} {what} to compute; Ctrl-C ends it" if total >= _GREAT else ""
 
 
 class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
-        self._wanted = not quiet and sys.stderr.isatty()
+        self._quiet = quiet
+        self._wanted = not quiet and lively()
         self._begun = time.monotonic()
         self._bar: Shown | None = None
         self._task: TaskID | None = None
         self._total = self._done = 0
         self._what = ""
 
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
+            self._bar = self._task = None
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage."""
+        """Begin a stage; a great one is said, also where nobody sees a bar."""
+        if great := announced(total, what):
+            say(great, quiet=self._quiet)
         self._total, self._done, self._what = total, 0, what
         if self._bar is not None and self._task is not None:
             self._bar.reset(self._task, total=total, description=what)
@@ -105,7 +139,7 @@ class Bar(Progress):
         self._done += n
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._done)
-        elif self._wanted and time.monotonic() - self._begun > _BAR_DELAY:
+        elif self._wanted and time.monotonic() - self._begun > DELAY:
             self._open()
 
     def _open(self) -> None:

@@ -6,18 +6,18 @@ import base64
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jinja2 import Environment, PackageLoader
-from numpy.typing import NDArray
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import counted
+from mechdesign.mechanism.describe import LinkWords, drives_in_words, links_in_words
 from mechdesign.mechanism.diagnosis import joints_in_words
-from mechdesign.mechanism.model import Drive, Link
 from mechdesign.report.figures.style import printed
 from mechdesign.report.page.headlines import headlines
+from mechdesign.report.page.pages import harmless
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import cells
 from mechdesign.results import Column, Result, Table
@@ -47,9 +47,9 @@ def study_html(study: Study, picture: bytes | None) -> str:
     """A study: its drawing, a PNG if it has one, and what it says in words."""
     description = study.mechanism.description
     facts = {
-        "links": [_link(study, link) for link in description.links.values()],
+        "links": [_link(link, study.units.label("length")) for link in links_in_words(description)],
         "joints": joints_in_words(description, study.mechanism.graph),
-        "drives": [_drive(drive) for drive in description.drives.values()],
+        "drives": drives_in_words(description),
         "mobility": [str(study.mechanism.mobility)],
         "questions": list(study.questions),
         "changed": list(study.overrides),
@@ -80,18 +80,18 @@ def answer_html(
         "answer.html.j2",
         command=answer.command,
         study=study.name,
-        question=COMMANDS[answer.command].question,
+        question=QUESTIONS[answer.command].question,
         counts=[f"{what}: {count:,}" for what, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
         verdicts=shown,
         met=sum(verdict.met for verdict in judged),
         required=len(judged),
         unjudged=verdicts if isinstance(verdicts, str) else "",
-        headlines=headlines(answer),
+        headlines=headlines(answer.seen),
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,
-        beginning=None if main is None else _beginning(main),
+        beginning=None if main is None else _beginning(main, answer.seen.main),
         others=others,
         also={"pictures": figures, "files": list(answer.files)},
     )
@@ -103,7 +103,13 @@ def _render(template: str, **said: object) -> str:
 
 @cache
 def _environment() -> Environment:
-    made = Environment(loader=PackageLoader("mechdesign.door"), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(
+        loader=PackageLoader("mechdesign.door"),
+        autoescape=True,
+        finalize=harmless,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters |= {"few": _few, "short": _short, "printed": printed}
     return made
 
@@ -126,21 +132,11 @@ def _inline(picture: bytes | None) -> str:
     return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
-def _link(study: Study, link: Link) -> str:
-    """A link with its points, and its length where it has two ends."""
-    words = f"{link.name} ({', '.join(link.points)}"
-    if link.telescopic and link.ends is not None:
-        return f"{link.name} ({'-'.join(link.ends)}, telescopic)"
-    if link.ends is not None:
-        length = link.points[link.ends[1]][0]
-        number = study.mechanism.description.places[length].nominal if isinstance(length, str) else length
-        words += f"; {number:.{_DIGITS}g} {study.units.label('length')}".rstrip()
-    return f"{words})"
-
-
-def _drive(drive: Drive) -> str:
-    reference = "" if drive.kind != "angle" or drive.reference == "ground" else f" from {drive.reference}"
-    return f"{drive.name} ({drive.kind} of {drive.target}{reference})"
+def _link(link: LinkWords, unit: str) -> str:
+    length = "; telescopic" if link.telescopic else ""
+    if link.length is not None:
+        length = f"; {link.length:.{_DIGITS}g} {unit}".rstrip()
+    return f"{link.name} ({', '.join(link.points)}{length})"
 
 
 def _largest(columns: Sequence[Column], unit: str) -> float:
@@ -149,21 +145,21 @@ def _largest(columns: Sequence[Column], unit: str) -> float:
     return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in floats), default=0.0)
 
 
-def _rounded(column: Column, largest: float, rows: NDArray[Any]) -> Column:
-    """Some rows of a column without numbers that would be zero but for rounding."""
-    values = column.values[rows]
+def _rounded(column: Column, largest: float) -> Column:
+    """A column without numbers that would be zero but for rounding."""
+    values = column.values
     if values.dtype.kind == "f" and column.unit:
         values = np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
     return replace(column, values=values)
 
 
-def _beginning(table: Table) -> _Beginning:
+def _beginning(table: Table, seen: Table) -> _Beginning:
     # The units of rows of several quantities are never left out.
     first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
     columns = [column for column in table.columns if column in first or column.name == _UNIT]
-    some = np.arange(min(ROWS, len(table)))
-    largest = {column.unit: _largest(table.columns, column.unit) for column in columns}
-    shown = Table(table.name, tuple(_rounded(column, largest[column.unit], some) for column in columns))
+    largest = {column.unit: _largest(seen.columns, column.unit) for column in columns}
+    first_rows = table.take(np.arange(min(ROWS, len(table))))
+    shown = Table(table.name, tuple(_rounded(first_rows.column(c.name), largest[c.unit]) for c in columns))
     left = []
     if len(table) > ROWS:
         left.append(counted(len(table) - ROWS, "more row"))

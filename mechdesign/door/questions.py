@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from mechdesign import study as studies
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.journal import Journal
@@ -94,7 +94,9 @@ def kinematics(
         Tables ``motion`` (a row a pose) and ``extremes``; for a sweep of one coordinate ``limits``; ``loops`` and
         ``toggles`` of four-bars and slider-cranks; ``targets`` where there are some; ``jacobian`` where as many outputs
         as drives are asked; ``modes`` with `all_modes`. Lengths, angles and times are in the study's units, Jacobians
-        per radian. A pose that cannot be assembled is a row of nan with ``valid`` False.
+        per radian. A pose that cannot be assembled is a row of nan with ``valid`` False. Of more than 65,536
+        poses the tables with a row a pose are in memory only once the values of a column are asked for; ``blocks()``
+        gives their rows in parts.
 
     Raises
     ------
@@ -325,9 +327,111 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     return _ask("stiffness", study, seed, jobs=jobs, progress=progress)
 
 
+def sweep(
+    study: Study,
+    *,
+    seed: int | None = None,
+    jobs: int | None = 1,
+    progress: Progress = NULL,
+    journal: Journal | None = None,
+) -> Answer:
+    """Which cases meet what is required? A row a case of the matrix, each answered as a study of its own.
+
+    Parameters
+    ----------
+    study : Study
+        With a section ``matrix``: which entries vary, and how.
+    seed : int, optional
+        Of random cases and of the random numbers in each, in place of the study's; 0 is a seed.
+    jobs : int or None
+        Processes, a case each; None uses every processor. The result does not depend on them.
+    progress : Progress
+        Is told how far the computation is.
+    journal : Journal, optional
+        Keeps finished cases in a file; those it holds already are not computed again.
+
+    Returns
+    -------
+    Answer
+        Table ``sweep``: the values that vary, each requirement's value and whether it is met, the results that the
+        matrix names, and why a case failed. A case that cannot be loaded or answered is a row of nan with its reason;
+        ``failed`` counts those.
+
+    Raises
+    ------
+    StudyError
+        If there is no matrix, nothing is required and no result named, or a name is unknown; nothing was computed.
+    Interrupted
+        On Ctrl-C; its ``result`` has the cases that were finished.
+
+    Examples
+    --------
+    The stroke of a slider-crank is twice its crank, whatever its rod.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism:
+    ...   parameters: {r: 30, l: 100}
+    ...   links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
+    ...   joints: {guide: {prismatic: [ground, slider], through: O}}
+    ...   drives: [crank]
+    ...   sketch: {A: [0, 30], B: [95, 0]}
+    ... matrix: {vary: {mechanism.parameters.r: [30, 45]}, results: [kinematics.extremes.B.x.range]}
+    ... ''')
+    >>> mechdesign.sweep(study).main["kinematics.extremes.B.x.range"].round(6)
+    array([60., 90.])
+    """
+    return _ask("sweep", study, seed, jobs=jobs, progress=progress, journal=journal)
+
+
+def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
+    """What does each number change? Derivatives of results with respect to numbers of the study.
+
+    Parameters
+    ----------
+    study : Study
+        With a section ``sensitivities``: results, and the numbers that change.
+    seed : int, optional
+        Of the random numbers, in place of the study's, the same in every case; 0 is a seed.
+    jobs : int or None
+        Processes, a case each; None uses every processor. The result does not depend on them.
+    progress : Progress
+        Is told how far the computation is.
+
+    Returns
+    -------
+    Answer
+        Table ``sensitivities``: a row a result and number, with derivative, error estimate, unit and elasticity. At a
+        kink the derivative is nan, and the slopes on both sides are given.
+
+    Raises
+    ------
+    StudyError
+        If there is no such section, a name is unknown, or what is to change is no number; nothing was computed.
+
+    Examples
+    --------
+    The stroke of a slider-crank is twice its crank, whatever its rod.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism:
+    ...   parameters: {r: 30, l: 100}
+    ...   links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
+    ...   joints: {guide: {prismatic: [ground, slider], through: O}}
+    ...   drives: [crank]
+    ...   sketch: {A: [0, 30], B: [95, 0]}
+    ... sensitivities: {results: [kinematics.extremes.B.x.range], parameters: [r, l]}
+    ... ''')
+    >>> mechdesign.sensitivities(study).main["derivative"].round(6) + 0.0
+    array([2., 0.])
+    """
+    return _ask("sensitivities", study, seed, jobs=jobs, progress=progress)
+
+
 def _ask(command: str, study: Study, seed: int | None, *, all_modes: bool = False, **options: Any) -> Answer:
     """A command's answer, which knows its study."""
-    answer = getattr(import_module(COMMANDS[command].module), command)
+    answer = getattr(import_module(QUESTIONS[command].module), command)
     if all_modes:
         options["all_modes"] = True
     try:

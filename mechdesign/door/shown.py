@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
 from mechdesign.files import formats_of, owned
 from mechdesign.report import writer
@@ -155,7 +155,7 @@ class Answer(Result):
         return folder
 
     def __repr__(self) -> str:
-        lines = [f"<{self.command} of {shown(self.study.name)}: {COMMANDS[self.command].question}"]
+        lines = [f"<{self.command} of {shown(self.study.name)}: {QUESTIONS[self.command].question}"]
         lines.append(", ".join(f"{name} ({counted(len(table), 'row')})" for name, table in self.tables.items()))
         judged = self._judged()
         if isinstance(judged, str):
@@ -208,7 +208,7 @@ class Answer(Result):
             return Gallery()
         with style.context():
             drawn = writer.figures(self.study, self)
-            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self)
+            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 
 

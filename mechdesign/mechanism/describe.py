@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.diagnosis import joints_in_words
+from mechdesign.mechanism.derivatives import regularity
+from mechdesign.mechanism.diagnosis import joints_in_words, near_singular
 from mechdesign.mechanism.four_bars import describe_loops
 from mechdesign.mechanism.graph import GROUND, Graph, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
@@ -30,6 +31,15 @@ class GroupChain:
     letters: str
     pins: tuple[str, ...]
     slides: tuple[str, ...]
+
+
+class LinkWords(NamedTuple):
+    """A link, its points, and its length; None where it has none or its length varies."""
+
+    name: str
+    points: tuple[str, ...]
+    length: float | None
+    telescopic: bool
 
 
 def groups_in_words(mechanism: Mechanism) -> list[str]:
@@ -67,13 +77,28 @@ def describe(mechanism: Mechanism) -> str:
     lines.append(f"branch: {description.branch}")
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
-    near = float(regularity(mechanism.linearize(mechanism.sketch_configuration)))
-    if near < STALLED:
-        lines.append(
-            f"warning: the sketch is at a singular position (regularity {near:.1g} of 1): its drives hold the links "
-            "hardly or not at all there, and rates there mean nothing"
-        )
-    return "\n".join(lines)
+    singular = near_singular(float(regularity(mechanism.linearize(mechanism.sketch_configuration))))
+    return "\n".join([*lines, *([singular] if singular else [])])
+
+
+def links_in_words(description: Description) -> list[LinkWords]:
+    """Every link with its points, and its length where it has two ends."""
+    found = []
+    for name, link in description.links.items():
+        points = (*link.points, *(end for end in link.ends or () if end not in link.points))
+        length = link.points[link.ends[1]][0] if link.ends is not None and not link.telescopic else None
+        number = description.places[length].nominal if isinstance(length, str) else length
+        found.append(LinkWords(name, points, number, link.telescopic))
+    return found
+
+
+def drives_in_words(description: Description) -> list[str]:
+    """Every drive and what it is: ``elbow (angle of lower from upper)``."""
+    return [
+        f"{drive.name} ({drive.kind} of {drive.target}"
+        f"{f' from {drive.reference}' if drive.kind == 'angle' and drive.reference != GROUND else ''})"
+        for drive in description.drives.values()
+    ]
 
 
 def _measure(measure: Measure) -> str:

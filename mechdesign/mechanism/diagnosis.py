@@ -8,6 +8,7 @@ import numpy as np
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Prismatic
 from mechdesign.mechanism.rigidity import Equations, null_space, separated
@@ -49,6 +50,16 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
         parts = (*joint.links, joint.point)[:2]
         found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
     return found
+
+
+def near_singular(regularity: float) -> str | None:
+    """A warning where a sketch has so small a regularity."""
+    if regularity >= STALLED:
+        return None
+    return (
+        f"warning: the sketch is at a singular position (regularity {regularity:.1g} of 1): its drives hold the links "
+        "hardly or not at all there, and rates there mean nothing"
+    )
 
 
 def wrong_count(
@@ -95,8 +106,8 @@ def _still(description: Description, graph: Graph, given: Sequence[Coordinate]) 
         if why:
             drive = coordinate.name in description.drives
             where = f"{DRIVES}.{coordinate.name}" if drive else "poses"
-            what = "drive" if drive else "give"
-            return MechanismError(f"'{coordinate.name}' never changes: {why}; {what} something that moves", where)
+            cure = f"{'drive' if drive else 'give'} something that moves"
+            return MechanismError(f"'{coordinate.name}' never changes: {why}; {cure}", where)
     return None
 
 

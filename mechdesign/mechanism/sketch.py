@@ -149,7 +149,10 @@ class Sketch:
             for slide in group.slides:
                 value = self.value(Coordinate("", "slide", "length", slide=slide))
                 if value is None:
-                    raise MechanismError(f"the ends of '{self.graph.slides[slide]}' are needed as a start", SKETCH)
+                    raise MechanismError(
+                        f"the ends of '{self.graph.slides[slide]}' are needed as a start; add them to the sketch",
+                        SKETCH,
+                    )
                 found.append(value)
         return found
 

@@ -201,9 +201,9 @@ def _decompose(
     for coordinate in expressions.values():
         rows.append([variables[v] for v in _variables(graph, roots, coordinate) if v in variables])
     if len(rows) != len(variables):
-        free = len(variables) - len(rows)
-        few = "few" if free > 0 else "many"
-        raise Undetermined(f"{abs(free)} coordinate{'s' if abs(free) > 1 else ''} too {few} given")
+        lacking = len(variables) - len(rows)
+        few = "few" if lacking > 0 else "many"
+        raise Undetermined(f"{abs(lacking)} coordinate{'s' if abs(lacking) > 1 else ''} too {few} given")
     matched = _match(rows, len(variables))
     if matched is None:
         raise Undetermined("the given coordinates fix one part of the mechanism twice and leave another free")

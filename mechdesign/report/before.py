@@ -48,7 +48,9 @@ def laid_under(study: Study, result: Result, before: Study, earlier: Result) -> 
                   for each in (result, earlier)]  # fmt: skip
         if shapes[0] != shapes[1]:
             raise StudyError(f"{who}: a path, a region and a region over a range are not drawn over each other")
-    return dataclasses.replace(result, drawn={**result.drawn, KEY: Before(before, earlier, _names(study, before))})
+    drawn = {**result.drawn, KEY: Before(before, earlier.seen, _names(study, before))}
+    pictured = result.pictured and dataclasses.replace(result.pictured, drawn=drawn)
+    return dataclasses.replace(result, drawn=drawn, pictured=pictured)
 
 
 def _runs_over(poses: Poses) -> str:

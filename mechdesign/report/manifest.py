@@ -8,17 +8,19 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from mechdesign.files import proper
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import plain
+from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
 
 NAME = "manifest.json"
+_INPUTS_IN = "inputs_in"
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
 
 
@@ -35,6 +37,15 @@ class Extras:
     before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
+@cache
+def _versions() -> dict[str, dict[str, str]]:
+    libraries = {name: version(name) for name in _LIBRARIES}
+    return {
+        "tool": {"name": "mechdesign", "version": version("mechdesign")},
+        "libraries": {"python": platform.python_version(), **libraries},
+    }
+
+
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
     files = {
@@ -42,8 +53,7 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
         for _, file, text in study.inputs()
     }
     return {
-        "tool": {"name": "mechdesign", "version": version("mechdesign")},
-        "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
+        **_versions(),
         "command": command,
         "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
         **({"inputs": files} if files else {}),
@@ -58,12 +68,32 @@ def shown_before(study: Study) -> dict[str, Any]:
     return {key: about[key] for key in ("study", "inputs", "overrides") if key in about}
 
 
+def _way_to_inputs(study: Study, directory: Path) -> dict[str, str]:
+    """The folder of a study that names files, as seen from its results: `inputs_in`, by which they are found again."""
+    if not any(True for _ in study.inputs()):
+        return {}
+    return {_INPUTS_IN: Path(os.path.relpath(study.folder.path, directory)).as_posix()}
+
+
+def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
+    """Where the files lie that a study names: beside the study if it is known where that is, else its results."""
+    beside = directory / str(content.get(_INPUTS_IN, "."))
+    names = content.get("inputs") or {}
+    return beside if all((beside / name).is_file() for name in names) else directory
+
+
 def compose(
-    study: Study, result: Result, verdicts: Sequence[Verdict], files: Mapping[str, str], asked: Extras
+    directory: Path,
+    study: Study,
+    result: Result,
+    verdicts: Sequence[Verdict],
+    files: Mapping[str, str],
+    asked: Extras,
 ) -> bytes:
-    """The manifest of a result whose files have these SHA-256."""
+    """The manifest of a result in a folder, whose files have these SHA-256."""
     content = (
         computed_from(study, result.command)
+        | _way_to_inputs(study, directory)
         | asdict(asked)
         | {
             "counts": plain(dict(result.counts)),
@@ -85,7 +115,7 @@ def compose(
             "files": dict(files),
         }
     )
-    return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
+    return (json_text(content, indent=2) + "\n").encode()
 
 
 def read(directory: Path) -> dict[str, Any] | None:
@@ -123,6 +153,7 @@ def is_current(directory: Path, study: Study, command: str, asked: Extras) -> di
 def digest(path: Path) -> str:
     """SHA-256 of a file; empty where it cannot be read."""
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:
         return ""

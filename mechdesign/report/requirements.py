@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.errors import AssemblyError, Problem, StudyError, few_comparisons
+from mechdesign.commands import SWEEP
+from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import Result, Table
-from mechdesign.rows import IN_UNIT, UnknownColumnError, choose
+from mechdesign.rows import IN_UNIT, Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 
@@ -34,6 +35,11 @@ class Verdict:
 def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return requirement.result.partition(".")[0]
+
+
+def judged_by(study: Study, command: str) -> list[int]:
+    """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
+    return [k for k, each in enumerate(study.requirements) if command in (command_of(each), SWEEP.name)]
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
@@ -110,6 +116,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ...     print(verdict)
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
     """
+    if "cases" in result.drawn:
+        return tuple(over_cases(result.drawn["cases"].verdicts))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -133,25 +141,55 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         See `requirements`.
     """
     path = requirement.result.partition(".")[2]
-    chosen = choose(result, path, requirement.where, absolute=requirement.abs)
-    table, name, values = chosen.table, chosen.column, chosen.values
-    words = _words(requirement)
-    rows = np.flatnonzero(chosen.counts)
-    if chosen.missing and whole:
-        raise UnknownColumnError(chosen.missing)
+    table, column, rows = located(result, path)
+    found, begin = None, 0
+    # A word that names the rows may be in a few blocks only.
+    for part in table.blocks() if rows.all() else [table]:
+        chosen = choose(
+            replace(result, tables={**result.tables, table.name: part}), path, requirement.where,
+            absolute=requirement.abs,
+        )  # fmt: skip
+        row = _worst_row(chosen, requirement)
+        if row is not None:
+            value = float(chosen.values[row])
+            verdict = Verdict(
+                in_words(requirement), margin_of(requirement, value) >= 0, value,
+                "" if len(table) == 1 else place_of(part, row, column, freedom, begin), margin_of(requirement, value),
+                unit_of(part, column, row),
+            )  # fmt: skip
+            if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
+                found = verdict
+        begin += len(part)
+    if found is None and whole and (missing := choose(result, path, requirement.where).missing):
+        raise UnknownColumnError(missing)
+    none = "no row of " + table.name
+    return found or Verdict(in_words(requirement), met=False, worst=float("nan"), place=none)
+
+
+def _worst_row(chosen: Chosen, requirement: Requirement) -> int | None:
+    """The row that is worst: one without a value, or else the farthest beyond a limit; None where none counts."""
+    rows, values = np.flatnonzero(chosen.counts), chosen.values
     if not rows.size:
-        return Verdict(words, met=False, worst=float("nan"), place="no row of " + table.name)
+        return None
     undefined = rows[np.isnan(values[rows])]
     if undefined.size:
-        worst, met = undefined[0], False
-    else:
-        ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
-        worst = min(ends, key=lambda row: margin_of(requirement, float(values[row])))
-        met = margin_of(requirement, float(values[worst])) >= 0
-    return Verdict(
-        words, met, float(values[worst]), place_of(table, int(worst), name, freedom),
-        margin_of(requirement, float(values[worst])), unit_of(table, name, int(worst)),
-    )  # fmt: skip
+        return int(undefined[0])
+    ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
+    return int(min(ends, key=lambda row: margin_of(requirement, float(values[row]))))
+
+
+def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
+    """Verdicts on each requirement over cases, given by their names in words: the worst, and how many miss it."""
+    for cases in verdicts:
+        names = list(cases)
+        unmet = [k for k, each in enumerate(cases.values()) if not each.met]
+        margins = [-np.inf if np.isnan(each.margin) else each.margin for each in cases.values()]
+        k = int(np.argmin(margins))
+        worst = cases[names[k]]
+        place = ", ".join(filter(None, (names[k], worst.place)))
+        if unmet:
+            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first is case {unmet[0] + 1}"
+        yield replace(worst, met=not unmet, place=place)
 
 
 def margin_of(requirement: Requirement, value: float) -> float:
@@ -166,7 +204,8 @@ def unit_of(table: Table, name: str, row: int) -> str:
     return str(table["unit"][row]) if IN_UNIT in column.meaning and "unit" in table else column.unit
 
 
-def _words(requirement: Requirement) -> str:
+def in_words(requirement: Requirement) -> str:
+    """What is required: the result, the rows that count, the bounds."""
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))
@@ -174,10 +213,11 @@ def _words(requirement: Requirement) -> str:
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 
-def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
-    """The row in words: its leading columns, which are the pose and words such as the method; an only row has none."""
-    if len(table) == 1:
-        return ""
+def place_of(table: Table, row: int, judged: str, freedom: int, begin: int = 0) -> str:
+    """The row in words: its leading columns, which are the pose and words such as the method.
+
+    `begin` is the number of rows before the table, where it is a part of a long one.
+    """
     parts: list[str] = []
     for column in table.columns:
         if column.numeric:
@@ -187,4 +227,4 @@ def place_of(table: Table, row: int, judged: str, freedom: int) -> str:
             parts.append(f"{column.name} {column.values[row]:.6g}")
         else:
             parts.append(f"{column.name} {column.values[row]}")
-    return ", ".join(parts) or f"row {row + 1}"
+    return ", ".join(parts) or f"row {begin + row + 1}"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import printable
+from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
 
 _DIGITS = 12
@@ -59,17 +59,28 @@ def to_csv(table: Table) -> str:
 
 def csv_blocks(table: Table) -> Iterator[str]:
     """The text of `to_csv` in blocks of some thousand rows, for tables whose text would fill the memory."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([_harmless(printable(name)) for name in table.names])
-    yield stream.getvalue()
-    for start in range(0, len(table), _BLOCK):
-        stream.seek(0)
-        stream.truncate()
-        rows = slice(start, start + _BLOCK)
-        texts = [(column.numeric, _texts(column.values[rows], _DIGITS)) for column in table.columns]
-        writer.writerows(zip(*(each if numeric else map(_harmless, each) for numeric, each in texts), strict=True))
-        yield stream.getvalue()
+    head = io.StringIO()
+    csv.writer(head, lineterminator="\n").writerow([_harmless(printable(name)) for name in table.names])
+    yield head.getvalue()
+    for part in table.blocks():
+        columns = [column.values for column in part.columns]
+        for start in range(0, len(part), _BLOCK):
+            yield _lines([values[start : start + _BLOCK] for values in columns])
+
+
+def _lines(columns: Sequence[NDArray[Any]]) -> str:
+    """Lines of a table; of numbers alone they are formatted all at once, which takes a third of the time."""
+    if not all(values.dtype.kind in "fiub" for values in columns):
+        stream = io.StringIO()
+        cells = [_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in columns]
+        csv.writer(stream, lineterminator="\n").writerows(zip(*cells, strict=True))
+        return stream.getvalue()
+    floats = [values.dtype.kind == "f" for values in columns]
+    line = ",".join(f"%.{_DIGITS}g" if each else "%d" for each in floats) + "\n"
+    flat: list[float] = [0] * (len(columns) * len(columns[0]))
+    for k, values in enumerate(columns):
+        flat[k :: len(columns)] = (values + 0.0 if floats[k] else values).tolist()
+    return line * len(columns[0]) % tuple(flat)
 
 
 def from_csv(text: str, name: str, columns: Sequence[Mapping[str, str]], meaning: str = "") -> Table:
@@ -94,7 +105,7 @@ def plain(value: Any) -> Any:
     """Anything a study or a table holds, as JSON can say it.
 
     Floats keep 12 significant digits; nan and infinities, which JSON does not know, become None; booleans of a
-    table's column are the business of `to_json`.
+    table's column are the business of `json_blocks`.
     """
     if isinstance(value, np.generic):
         value = value.item()
@@ -113,13 +124,20 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def to_json(table: Table) -> str:
-    """The table as a JSON array with an object a row; booleans are 1 and 0 as in the CSV file, nan is null."""
-    lists = []
-    for column in table.columns:
-        values = np.asarray(column.values)
-        lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
-    lines = [
-        json.dumps(dict(zip(table.names, row, strict=True)), ensure_ascii=False) for row in zip(*lists, strict=True)
-    ]
-    return "[\n" + ",\n".join(lines) + "\n]\n" if lines else "[]\n"
+def json_text(value: Any, **options: Any) -> str:
+    """A value as JSON: letters stand as they are, what is not printable as an escape, such as ``\\u202e``."""
+    return printable_lines(json.dumps(value, ensure_ascii=False, **options), json.dumps)
+
+
+def json_blocks(table: Table) -> Iterator[str]:
+    """The table as a JSON array, an object a row, in blocks; booleans are 1 and 0 as in the CSV file, nan is null."""
+    before = "[\n"
+    for part in table.blocks():
+        lists = []
+        for column in part.columns:
+            values = np.asarray(column.values)
+            lists.append(plain(values.astype(int) if values.dtype.kind == "b" else values))
+        for row in zip(*lists, strict=True):
+            yield before + json_text(dict(zip(table.names, row, strict=True)))
+            before = ",\n"
+    yield "\n]\n" if len(table) else "[]\n"

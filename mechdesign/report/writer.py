@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Callable, Iterable, Sequence
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -12,12 +13,13 @@ from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import Transaction, replace, unsettled
+from mechdesign.progress import NULL, Progress
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
-from mechdesign.results import Result
+from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ MECHANISM = "mechanism"
 DIMENSIONS = "dimensions"  # of `check`
 ANIMATION = "motion.gif"
 FIGURES = "mechdesign.report.figures"
+_GIGABYTE = 1e9  # bytes
 # Ends the names under which pictures stand as HTML.
 INLINE = ".html"
 
@@ -52,7 +55,15 @@ def check_writable(directory: Path) -> None:
         )
 
 
-def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras) -> tuple[str, ...]:
+def write(
+    directory: Path,
+    study: Study,
+    result: Result,
+    verdicts: Sequence[Verdict],
+    asked: Extras,
+    jobs: int | None = None,
+    progress: Progress = NULL,
+) -> tuple[str, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
@@ -62,10 +73,10 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
     Raises
     ------
     OutputError
-        If the directory or a file cannot be written.
+        If the directory or a file cannot be written, or long tables need more room than there is.
     """
     files: dict[str, Iterable[bytes]] = {
-        f"{table.name}.csv": map(str.encode, csv_blocks(table)) for table in result.tables.values()
+        f"{table.name}.csv": _encoded(table, progress) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     stale = manifest.recorded_files(manifest.read(directory) or {}).keys() | unsettled(directory)
@@ -73,15 +84,16 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
     warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        _check_room(directory, result)
         tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
         with Transaction(directory) as written:
             digests = {name: written.stage(name, blocks) for name, blocks in files.items()}
-            written.stage(manifest.NAME, [manifest.compose(study, result, verdicts, digests, tables)])
+            written.stage(manifest.NAME, [manifest.compose(directory, study, result, verdicts, digests, tables)])
             written.commit(stale, voucher=manifest.NAME)
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, asked)
+            drawn, warnings = pictures(study, result, asked, jobs)
         if asked.report:
             from mechdesign.report.page import section
 
@@ -93,11 +105,35 @@ def write(directory: Path, study: Study, result: Result, verdicts: Sequence[Verd
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
-                written.stage(manifest.NAME, [manifest.compose(study, told, verdicts, digests, asked)])
+                written.stage(manifest.NAME, [manifest.compose(directory, study, told, verdicts, digests, asked)])
                 written.commit(voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
     return warnings
+
+
+def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
+    """The bytes of a table's file, block by block; tells how far those of a long one are."""
+    long = isinstance(table, LongTable)
+    if long:
+        progress.start(len(table), f"rows of {table.name}.csv")
+    for block in csv_blocks(table):
+        yield block.encode()
+        progress.update(block.count("\n") if long else 0)
+
+
+def _check_room(directory: Path, result: Result) -> None:
+    """Find out before long tables are written that the disk would not hold them."""
+    need = 0.0
+    for name, table in result.tables.items():
+        if isinstance(table, LongTable) and len(some := result.seen.tables[name]):
+            need += sum(map(len, csv_blocks(some))) / len(some) * len(table)
+    free = shutil.disk_usage(directory).free if need else 0
+    if need > free:
+        raise OutputError(
+            f"{directory}: the tables need about {need / _GIGABYTE:.2g} GB, and {free / _GIGABYTE:.2g} GB are free "
+            "there; choose another --out or fewer poses"
+        )
 
 
 def write_file(path: Path, data: bytes) -> None:
@@ -159,13 +195,15 @@ def figures(study: Study, result: Result) -> Gallery:
     """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
     from mechdesign.report.figures.rendering import Gallery
 
-    found = Gallery()
+    found, result = Gallery(), result.seen
     # What all pictures of a command share may fail too.
     found.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
     return found
 
 
-def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:
+def pictures(
+    study: Study, result: Result, asked: Extras, jobs: int | None = None
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
     For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
@@ -176,6 +214,7 @@ def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, byt
     from mechdesign.report.page import vector
 
     formats = asked.formats.split(",")
+    result = result.seen
     with style.context(asked.style):
         gallery = figures(study, result)
 
@@ -196,7 +235,7 @@ def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, byt
             from mechdesign.report.figures.kinematics import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
-        drawn, failed = render(drawings)
+        drawn, failed = render(drawings, jobs)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":
         del drawn[ANIMATION]

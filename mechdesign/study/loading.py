@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons
+from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
@@ -31,11 +31,13 @@ from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema import targets
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.study_file import StudyFile, override
+from mechdesign.study.schema.study_file import StudyFile, entry, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, plain, read
@@ -79,8 +81,11 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
+    matrix: MatrixSection | None
+    sensitivities: SensitivitiesSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
+    kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
@@ -92,7 +97,9 @@ class Study:
     @property
     def label(self) -> str:
         """The name of its folder of results, that of its file or else its own."""
-        return self.path.stem if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        return (
+            printable(self.path.stem) if self.path is not None else _UNFIT.sub("_", self.name).strip("._") or _UNNAMED
+        )
 
     def __repr__(self) -> str:
         questions = ", ".join(self.questions) or "no question"
@@ -153,11 +160,7 @@ def load(
         content = text.encode(errors="surrogateescape") if isinstance(text, str) else text
         return load_bytes(content, None, overrides, seed, Folder(anywhere=allow_files))
     if isinstance(source, Mapping):
-        data = _plain_data(source, "the study")
-        document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
-        override(document, changes)
-        sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-        return load_document(document, None, Folder(anywhere=allow_files), b"", sha256, changes, seed)
+        return load_data(source, overrides, seed, Folder(anywhere=allow_files))
     assert source is not None
     file = pathlib.Path(source)
     try:
@@ -167,6 +170,17 @@ def load(
         why = getattr(error, "strerror", None) or error
         raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
     return load_bytes(whole, file, overrides, seed, Folder(file.parent, allow_files))
+
+
+def load_data(
+    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder
+) -> Study:
+    """Load a study from a mapping; files that it names lie in a folder. See `load`."""
+    data = _plain_data(source, "the study")
+    document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
+    override(document, changes)
+    sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
+    return load_document(document, None, folder, b"", sha256, changes, seed)
 
 
 @one_thread()
@@ -226,7 +240,7 @@ def load_document(
 ) -> Study:
     """Load a study from the data of a file, overrides applied; see `load`.
 
-    The assembly is that of the `original`, a study that differs in numbers alone, where else the sketch would choose.
+    Where it differs from the `original` in numbers alone the assembly is that of the original; else the sketch chooses.
     """
     if seed is not None and seed < 0:
         raise StudyError(f"the seed is a whole number from 0 on, not {seed}")
@@ -265,8 +279,11 @@ def load_document(
         mechanism=mechanism,
         parameters=parameters,
         **{command: parts.get(command) for command in COMMANDS},
+        matrix=parts.get("matrix"),
+        sensitivities=parts.get("sensitivities"),
         requirements=parts["requirements"],
         targets=parts["targets"],
+        kinds=reporter.kinds,
         folder=folder,
         warnings=tuple(reporter.warnings),
     )
@@ -343,8 +360,37 @@ def _checked(checker: Checker) -> dict[str, Any]:
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
+    if "matrix" in found:
+        found["matrix"].checked(checker)
+        _check_varied(found["matrix"], checker)
+    if "sensitivities" in found:
+        found["sensitivities"].checked(checker)
     found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
+
+
+def _check_varied(matrix: MatrixSection, checker: Checker) -> None:
+    """Check that the study has the entries that vary, each named once, and none inside another."""
+    at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
+    try:
+        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
+    except StudyError as error:
+        checker.report(at, str(error))
+        return
+    seen: dict[KeyPath, str] = {}
+    for name in names:
+        place = (*at, name) if matrix.vary is not None else at
+        try:
+            path = entry(checker.reporter.document.data, name)
+        except StudyError as error:
+            checker.report(place, str(error) if matrix.vary is not None else f"column {name!r}: {error}", at_key=True)
+            continue
+        if path[0] == "matrix":
+            checker.report(place, "a matrix does not vary itself", at_key=True)
+        for other, known in seen.items():
+            if path[: len(other)] == other or other[: len(path)] == path:
+                checker.report(place, f"{name} and {known} are, or hold, the same entry; vary one of them", at_key=True)
+        seen[path] = name
 
 
 def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
@@ -404,8 +450,14 @@ def _adapter(key: str) -> TypeAdapter[Any]:
 
 
 def _compiled(description: Description, reporter: Reporter, original: Mechanism | None) -> Mechanism | None:
+    alike = original is not None and _alike(description, original.description)
     try:
-        return Mechanism(description) if original is None else Variant(original, description)
+        return Variant(original, description) if alike and original is not None else Mechanism(description)
     except MechanismError as error:
         reporter.report(error.key.split("."), str(error))
         return None
+
+
+def _alike(one: Description, other: Description) -> bool:
+    """Whether two mechanisms differ in numbers alone."""
+    return dataclasses.replace(one, places=other.places, sketch=other.sketch) == other

@@ -69,6 +69,7 @@ class Poses:
     bends: Mapping[str, Floats] = field(default_factory=dict)
     # Of a grid of rays over a workspace: one a value of its held coordinates.
     regions: tuple[Sectors, ...] = ()
+    rows: Ints | None = None  # of some poses of a long motion or grid: their rows among all
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -78,11 +79,34 @@ class Poses:
     @property
     def values(self) -> dict[str, Floats]:
         """Every coordinate over all poses, shape (count,); nan where a pose does not give it."""
+        if len(self.groups) == 1:
+            return dict(self.groups[0].values)
         columns = {name: np.full(self.count, np.nan) for name in self.names}
         for group in self.groups:
             for name in group.names:
                 columns[name][group.rows] = group.values[name]
         return columns
+
+    @property
+    def numbers(self) -> Floats:
+        """The row of each pose among those of its design, shape (count,)."""
+        if self.rows is not None:
+            return self.rows.astype(float)
+        return np.tile(np.arange(self.count // self.designs, dtype=float), self.designs)
+
+    def take(self, rows: Ints | slice) -> Poses:
+        """Some poses of a motion or a grid of one design, in their order."""
+        (group,) = self.groups
+        parts = (group.values, self.places, self.parameters, self.slopes, self.bends)
+        values, places, parameters, slopes, bends = (
+            {name: column[rows] for name, column in part.items()} for part in parts
+        )
+        taken = np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows
+        count = len(taken)
+        return replace(
+            self, groups=(PoseGroup(group.names, values, np.arange(count)),), count=count, grid=(count,),
+            places=places, parameters=parameters, slopes=slopes, bends=bends, rows=taken,
+        )  # fmt: skip
 
 
 def stacked(poses: Poses, designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> Poses:

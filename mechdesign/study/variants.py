@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.expressions import Expression, ExpressionError, Number
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Variant
@@ -222,11 +222,11 @@ def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, di
     text = _edited(study, data)
     if text is None:
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
-    return f"# {heading}\n{text}", files
+    return f"# {printable(heading)}\n{text}", files
 
 
 def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
-    """The study's own text with single values changed; None where it would not say the same as `data`."""
+    """The study's own text with single values changed or left out; None where it would not say the same as `data`."""
     if not study.text or len(study.text) > _MOST_BYTES:
         return None
     if any(override.startswith("units") for override in study.overrides):
@@ -239,6 +239,9 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         wanted["units"] = written["units"]
     edits = []
     for keys, entries in _replaced(written, wanted, ()):
+        if not entries:
+            edits.append(_removal(text, document, keys))
+            continue
         name, value = document.keys[keys], document.values[keys]
         inside_flow = text[document.values[keys[:-1]].start] == "{"
         if "\n" in text[value.start : value.end].rstrip():
@@ -270,6 +273,23 @@ def _replaced(old: Any, new: Any, keys: KeyPath) -> Iterator[tuple[KeyPath, dict
     for key in old:
         if key in new:
             yield from _replaced(old[key], new[key], (*keys, key))
+
+
+def _removal(text: str, document: Document, keys: KeyPath) -> tuple[int, int, str]:
+    """The edit that takes a key away: with its lines, or with the comma beside it."""
+    start, inside = (
+        document.keys[keys].start,
+        (mark for path, mark in document.values.items() if path[: len(keys)] == keys),
+    )
+    # A mapping in lines of its own ends where the next key begins; its last value ends before.
+    end = max(mark.start + len(text[mark.start : mark.end].rstrip()) for mark in inside
+              if "\n" not in text[mark.start : mark.end].rstrip() or text[mark.start] in "{[")  # fmt: skip
+    if text[document.values[keys[:-1]].start] != "{":
+        return text.rfind("\n", 0, start) + 1, (text.find("\n", end) + 1) or len(text), ""
+    before = text[:start].rstrip()
+    if before.endswith(","):
+        return len(before) - 1, end, ""
+    return start, end + len(text[end:]) - len(text[end:].lstrip(", ")), ""
 
 
 def _in_one_line(key: str, value: Any) -> str:

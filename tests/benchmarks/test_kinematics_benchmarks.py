@@ -6,11 +6,13 @@ pylinkage's compiled stepping of the same four-bar runs beside it where it is in
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
@@ -18,6 +20,7 @@ from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.parallel import map_chunks
+from mechdesign.report.tables import csv_blocks
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSES = 2_000_000
@@ -75,6 +78,22 @@ def test_all_tables_of_a_fine_sweep(benchmark: Any) -> None:
     result = benchmark.pedantic(kinematics, (study,), {"jobs": 2}, rounds=7, warmup_rounds=1)
     assert {"motion", "extremes", "limits", "loops", "toggles"} <= set(result.tables)
     benchmark.extra_info["poses_per_second"] = 1_000_001 / benchmark.stats.stats.min
+
+
+def test_tables_of_a_fine_sweep_as_text(benchmark: Any) -> None:
+    number = 500_001
+    study = study_of(FOUR_BAR + f"kinematics: {{sweep: {{theta: {{from: 0, to: 360, number: {number}}}}}}}\n")
+    table = kinematics(study).main
+    size = benchmark.pedantic(lambda: sum(map(len, csv_blocks(table))), rounds=5, warmup_rounds=1)
+    assert size > 100 * number
+    benchmark.extra_info["rows_per_second"] = number / benchmark.stats.stats.min
+
+
+def test_memory_of_ten_million_poses(tmp_path: Path) -> None:
+    study = tmp_path / "study.yaml"
+    study.write_text(FOUR_BAR + "kinematics: {sweep: {theta: {from: 0, to: 360, number: 10000000}}}\n")
+    command = [sys.executable, "-m", "mechdesign", "kinematics", str(study), "--quiet", "--out", str(tmp_path / "out")]
+    assert peak_of(command) < 1e9
 
 
 def test_pylinkage_steps_a_second(benchmark: Any) -> None:

@@ -235,6 +235,27 @@ def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatc
     assert (moved["column"], moved["old"], moved["new"]) == ("theta2", "60.5", "60")
 
 
+def test_verify_finds_files_beside_the_study_or_the_manifest(folder, invoke, monkeypatch):
+    (folder / "studies").mkdir()
+    (folder / "elsewhere").mkdir()
+    (folder / "studies/angles.csv").write_text("0\n45\n")
+    text = SLIDER[: SLIDER.index("kinematics:")] + "kinematics: {path: {theta: angles.csv}}\n"
+    (folder / "studies/arm.yaml").write_text(text)
+    assert invoke("kinematics", "studies/arm.yaml", "--no-plots", "--out", "deep/old").exit_code == 0
+    monkeypatch.chdir(folder / "elsewhere")
+    assert invoke("run", "--verify", "../deep/old").exit_code == 0
+    (folder / "deep/old").rename(folder / "old")
+    done = invoke("run", "--verify", "../old")
+    assert done.exit_code == 2
+    assert "angles.csv cannot be read: No such file" in done.stderr
+    (folder / "studies/angles.csv").rename(folder / "old/angles.csv")
+    assert invoke("run", "--verify", "../old").exit_code == 0
+    (folder / "old/angles.csv").write_text("0\n60\n")
+    done = invoke("run", "--verify", "../old")
+    assert done.exit_code == 1
+    assert "input angles.csv: another file" in done.stderr
+
+
 def test_verify_tells_files_whose_bytes_are_others(analysis, invoke, folder):
     # A text that hangs on how the study is written, which its manifest has not.
     analysis(lambda study, **ignored: answer(tables=motion().tables, files={"study.yaml": study.text.decode()}))

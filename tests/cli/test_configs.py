@@ -14,6 +14,7 @@ from helpers.pages import faults
 from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
+from mechdesign.cli.batch import questions
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
@@ -62,7 +63,7 @@ def test_study_runs_with_every_question_it_asks(config: Path, tmp_path: Path, in
     done = invoke("run", config, "--out", tmp_path, "--jobs", 1, *fewer)
     assert done.exit_code == 0, done.output
     study = load(config)
-    for command in study.questions:
+    for command in questions(study):
         folder = tmp_path / command
         manifest = json.loads((folder / "manifest.json").read_text())
         assert not manifest["failed"]
@@ -106,6 +107,7 @@ def test_templates_are_studies(name: str) -> None:
         pytest.fail(str(error))
 
 
+@pytest.mark.skipif(not any((ROOT / "results").rglob("*.png")), reason="a source distribution has no pictures")
 def test_pages_show_pictures_that_exist() -> None:
     for page in (ROOT / "README.md", ROOT / "results" / "README.md"):
         pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text())

@@ -1,5 +1,7 @@
 """`mechdesign docs`: words in the terminal, and where a wrong study leads to."""
 
+import re
+
 import pytest
 import typer.main
 
@@ -13,7 +15,7 @@ from mechdesign.reference import entries, find
     [
         ("pin", "normal_in_disc: "),
         ("GII", "global isotropy index"),
-        ("--junit", "stands in: run"),
+        ("--junit", "stands in: sweep, run"),
         ("kinematics", "takes: mechdesign kinematics STUDY [OPTIONS]"),
         ("130", "interrupted"),
         ("reliability.clearances", "    radial: Mean radial clearance"),
@@ -51,6 +53,33 @@ def test_several_words_and_one_that_nobody_knows(invoke):
     done = invoke("docs", "sweep", "clearence")
     assert (done.exit_code, done.stdout) == (2, "")
     assert "the reference has no 'clearence'; did you mean 'clearances'?" in done.stderr
+
+
+ARM = """\
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 30], lower: [E, P, 20]}
+  drives: [upper, lower]
+  sketch: {E: [0, 30], P: [20, 30]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("kinematics={poses: [{P.x: 10, P.y: 20}, {P.x: 60, P.y: 0}]}", "cannot be assembled"),
+        ("kinematics={poses: [{P.x: 60, P.y: 0}]}", "no pose is valid"),
+        ("workspace={point: P, scan: {about: [900, 900], from: 0, to: 1}}", "reaches nothing"),
+    ],
+)
+def test_what_a_mechanism_cannot_do_names_the_words_to_look_up(change, words, tmp_path, monkeypatch, invoke):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.yaml").write_text(ARM)
+    done = invoke(change.partition("=")[0], "arm.yaml", "--no-plots", "--set", change)
+    assert done.exit_code == 3, done.stderr
+    named = re.search(r"\(mechdesign docs '(.+)'\)", done.stderr)
+    assert named is not None
+    assert words in named[1]
+    assert invoke("docs", named[1]).exit_code == 0
 
 
 def test_a_wrong_study_names_the_words_to_look_up_once(folder, invoke):

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.errors import explain
 from mechdesign.files import Transaction
 from mechdesign.results import Column, Result, Table
 
@@ -68,14 +69,17 @@ def test_workers_end_with_their_parent(here, number):
         workers = until(lambda: len(found := children(process.pid)) == 2 and found)
         time.sleep(0.3)
         process.send_signal(number)
-        # Ends when nobody holds the other end.
-        told = process.stderr.read()
-        code = process.wait(30)
-    until(lambda: not any(map(alive, workers)), 5)
+        try:
+            # Ends when nobody holds the other end.
+            _, told = process.communicate(timeout=30)
+            until(lambda: not any(map(alive, workers)), 5)
+        finally:
+            for worker in filter(alive, workers):
+                os.kill(worker, signal.SIGKILL)
     if number == signal.SIGKILL:
-        assert code == -number
+        assert process.returncode == -number
     else:
-        assert code == 128 + number
+        assert process.returncode == 128 + number
         assert "interrupted" in told
     assert "Traceback" not in told
     assert not [path for path in here.rglob("*") if ".tmp" in path.name]
@@ -101,12 +105,61 @@ def test_an_interrupt_during_imports(here, module):
     assert "rror" not in told
 
 
+# What a command does when it is interrupted: in a call back, whose errors are dropped; in an import; in a finaliser;
+# while it blocks signals and another thread lets them in; in the queue that work goes to.
+INTERRUPTED = {
+    "call back": """
+        thing = type("Thing", (), {})()
+        reference = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+    """,
+    "import": """
+        pathlib.Path("slow.py").write_text("import signal; signal.raise_signal(signal.SIGINT); print('whole')")
+        sys.path.insert(0, "")
+        import slow
+    """,
+    "finaliser": """
+        class Thing:
+            def __del__(self):
+                signal.raise_signal(signal.SIGINT)
+                print("whole")
+        Thing()
+    """,
+    "blocked": """
+        threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        os.kill(os.getpid(), signal.SIGINT)
+        whole = sum(range(1_000_000))
+        print("whole")
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    """,
+    "queue": """
+        class Queue(queue.Queue):
+            def _put(self, item):
+                signal.raise_signal(signal.SIGINT)
+                print("whole")
+        Queue().put(1)
+    """,
+}
+
+
+@pytest.mark.parametrize("where", INTERRUPTED)
+def test_an_interrupt_at_a_bad_place_comes_a_little_later(here, where):
+    words = "import os, pathlib, queue, signal, sys, threading, time, weakref\nfrom mechdesign.cli import process"
+    text = f"{words}\ndef command():\n{INTERRUPTED[where]}\n        time.sleep(60)\nprocess.run(command)"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=False, timeout=30)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+    assert done.stdout == ("" if where == "call back" else "whole\n")
+
+
 BAD = ("closed", "full", "broken")
 
 
 @pytest.mark.parametrize("stream", [1, 2])
 @pytest.mark.parametrize("how", BAD)
-def test_no_stream_can_fail_a_run(here, stream, how):
+def test_a_stream_that_cannot_be_written(here, stream, how):
+    """The run goes on; only a summary that was to be kept, and is not, changes its exit code."""
+
     def spoil():
         if how == "closed":
             os.close(stream)
@@ -117,18 +170,20 @@ def test_no_stream_can_fail_a_run(here, stream, how):
             os.close(reader)
             os.dup2(writer, stream)
 
-    (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
-    command = [*COMMAND, "run", "slider.yaml", "wrong.yaml", "--no-plots", "--junit", "junit.xml"]
+    gate = SLIDER + "requirements: [{result: kinematics.theta, at_most: 80}]\n"
+    (here / "gate.yaml").write_text(gate)
+    command = [*COMMAND, "run", "slider.yaml", "gate.yaml", "--no-plots", "--junit", "junit.xml"]
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=spoil, check=False)
-    assert done.returncode == 2
-    assert 'tests="2"' in (here / "junit.xml").read_text()
+    lost = (stream, how) == (1, "full")
+    assert done.returncode == (4 if lost else 1)
+    assert 'tests="3"' in (here / "junit.xml").read_text()
     assert (here / "results/slider/kinematics/manifest.json").exists()
     if stream == 2:
         assert done.stdout.startswith("study,command")
     else:
-        assert "wrong.yaml:6:19" in done.stderr
+        assert "requirement not met" in done.stderr
         assert "Traceback" not in done.stderr
-        assert ("not whole" in done.stderr) == (how == "full")
+        assert ("standard output is not whole: No space left on device" in done.stderr) == lost
 
 
 def contents(folder):
@@ -182,7 +237,7 @@ def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
     assert any(broken)
 
 
-@pytest.mark.parametrize("instant", range(0, 10, 2))
+@pytest.mark.parametrize("instant", [0, 1, 2, 3, 4, 6, 8])
 def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
     """The n-th step on the way of files into place is the last one."""
     arguments = ("run", "slider.yaml", "--no-plots", "--quiet", "--resume", "--out")
@@ -304,7 +359,7 @@ def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monk
     assert any(line.startswith("::error file=gate.yaml,line=16,col=") and "theta at most 80" in line for line in lines)
     assert "::warning file=gate.yaml::gate: kinematics: 50 %25 play, mind the gap" in lines
     at = lines.index("failed: 2 of 3 questions")
-    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["wrong", "gate"]
+    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["gate", "wrong"]
 
 
 def test_inputs_of_one_name_are_told_apart(here, invoke):
@@ -337,6 +392,49 @@ def test_a_poor_environment(here):
     manifest = json.loads((here / "aus/größe/größe/kinematics/manifest.json").read_text(encoding="utf-8"))
     assert manifest["study"]["name"] == "Größe → µm"
     assert any(name.endswith(".png") for name in manifest["files"])
+
+
+def test_a_limit_of_memory(here, invoke):
+    """Nine million poses in 0.45 GB: a message, and what was there before."""
+    arguments = ("kinematics", "slider.yaml", "--no-plots", "--out", "out")
+    assert invoke(*arguments).exit_code == 0
+    old = contents(here / "out")
+
+    def little():
+        resource.setrlimit(resource.RLIMIT_AS, (450_000_000, 450_000_000))
+
+    great = ["--set", "kinematics.sweep.theta={from: 0, to: 90, number: 9000000}"]
+    done = subprocess.run(
+        [*COMMAND, *arguments, *great], capture_output=True, text=True, preexec_fn=little, check=False
+    )
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[-1].startswith("not enough memory for this")
+    assert contents(here / "out") == old
+
+
+def lacking(error):
+    """An error that clearing up met after memory ran out."""
+    try:
+        raise error
+    except Exception:
+        try:
+            raise ValueError("I/O operation on closed file.")
+        except ValueError as second:
+            return second
+
+
+@pytest.mark.parametrize(
+    ("error", "known"),
+    [
+        (lacking(MemoryError()), True),
+        (lacking(KeyError("x")), False),
+        (ImportError("libopenblas.so: failed to map segment from shared object"), True),
+        (RuntimeError("can't start new thread"), True),
+        (OSError(errno.ENOMEM, os.strerror(errno.ENOMEM)), True),
+    ],
+)
+def test_a_lack_of_memory_is_known_whoever_meets_it(error, known):
+    assert explain(error)[1].startswith("not enough memory" if known else "internal error")
 
 
 def test_places_that_are_no_folders(here, invoke):

@@ -7,7 +7,7 @@ import pytest
 import typer.main
 
 from mechdesign.cli.app import app
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS
 
 GROUP = typer.main.get_command(app)
 EVERY = ("--out", "--set", "--seed", "--jobs", "--json", "--quiet", "--no-plots")
@@ -24,10 +24,10 @@ def test_every_command_and_parameter_has_help(name, invoke):
 
 
 def test_the_commands_are_those_of_the_study_format():
-    assert set(GROUP.commands) == {*COMMANDS, "run", "check", "compare", "new", "docs", "schema"}
+    assert set(GROUP.commands) == {*QUESTIONS, "run", "merge", "check", "watch", "compare", "new", "docs", "schema"}
 
 
-@pytest.mark.parametrize("name", [*COMMANDS, "run"])
+@pytest.mark.parametrize("name", [*QUESTIONS, "run"])
 def test_options_that_stand_everywhere(name):
     known = {option for parameter in GROUP.commands[name].params for option in parameter.opts}
     assert known >= set(EVERY)

@@ -90,8 +90,9 @@ def test_interrupt_ends_the_run_and_what_was_finished_is_whole(studies, analysis
         raise KeyboardInterrupt
 
     analysis(interrupt, "stiffness")
-    done = invoke("run", "both.yaml", "slider.yaml", "--no-plots", "--junit", "report.xml")
+    done = invoke("run", "both.yaml", "slider.yaml", "--no-plots", "--junit", "report.xml", "--jobs", 1)
     assert done.exit_code == 130
+    assert "2 of 2 studies were not answered" in done.stderr
     assert summary(done) == [("both", "kinematics", "done", "0")]
     assert (studies / "results/both/kinematics/manifest.json").exists()
     assert not (studies / "results/both/stiffness").exists()
@@ -131,11 +132,40 @@ def test_names_cannot_spoil_junit_or_summary(studies, analysis, invoke):
         (studies / name).write_text(SLIDER)
     (studies / "wrong.yaml").write_text(WRONG.replace("q]", '"\\x01\\ufffe]]>"]'))
     done = invoke("run", *names, "wrong.yaml", "--no-plots", "--junit", "report.xml")
-    assert [suite.name for suite in JUnitXml.fromfile("report.xml")][1:] == [
+    assert [suite.name for suite in JUnitXml.fromfile("report.xml")][:2] == [
         r"=1+1\n\x1b]0;x\x07", r"\u202e<b>&",
     ]  # fmt: skip
-    assert [row[0] for row in summary(done)] == ["wrong", r"'=1+1\n\x1b]0;x\x07", r"\u202e<b>&"]
+    assert [row[0] for row in summary(done)] == [r"'=1+1\n\x1b]0;x\x07", r"\u202e<b>&", "wrong"]
     assert all(line.isprintable() for line in (*done.stderr.splitlines(), *done.stdout.splitlines()))
+
+
+def test_names_cannot_spoil_json_pages_or_annotations(studies, analysis, invoke, monkeypatch):
+    """Readers of JSON get the name as it is; none of it turns or hides the letters beside it, or begins a line."""
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    hostile = "a\u202eb\x1b[31m\x07\u2028\u200f</script>\U000e0041"
+    file = "x\n::error::\u202ey.yaml"
+    gate = "requirements: [{result: kinematics.theta, at_most: 80}]\n"
+    head = f"name: {json.dumps(hostile, ensure_ascii=False)}\n".replace("\U000e0041", "\\U000e0041")
+    (studies / file).write_text(head + SLIDER.partition("\n")[2] + gate)
+    done = invoke("run", file, "wrong.yaml", "--report", "--json", "--no-plots")
+    assert {row["study"] for row in json.loads(done.stdout)} == {r"x\n::error::\u202ey", "wrong"}
+    told = [*done.stderr.splitlines(), *done.stdout.splitlines()]
+    assert all(line.isprintable() and not line.startswith("::error::") for line in told)
+    assert sum(line.startswith("::error file=") for line in told) == 2
+    written = [path for path in studies.rglob("*") if path.suffix in (".json", ".html", ".csv")]
+    assert {path.name for path in written} >= {
+        "manifest.json",
+        "report.json",
+        "report.html",
+        "index.html",
+        "motion.csv",
+    }
+    for path in written:
+        lines = path.read_text(encoding="utf-8").replace("\xa0", " ").split("\n")
+        assert [line for line in lines if not line.isprintable()] == [], path
+        if path.name == "manifest.json":
+            assert json.loads(path.read_text(encoding="utf-8"))["study"]["name"] == hostile
 
 
 def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, invoke):

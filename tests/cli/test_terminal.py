@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from .conftest import SLIDER
+from .conftest import SLIDER, answer
 
 pty = pytest.importorskip("pty")
 
@@ -41,7 +41,7 @@ def at_terminal(folder, pause, *arguments, interrupt_after=None):
     """Run PROGRAM on a terminal of 80 columns; returns its exit code and everything it showed."""
     (folder / "slider.yaml").write_text(SLIDER)
     ours, theirs = pty.openpty()
-    environment = os.environ | {"COLUMNS": "80", "LINES": "40", "TERM": "xterm"}
+    environment = os.environ | {"COLUMNS": "80", "LINES": "40", "TERM": "xterm", "CI": ""}
     command = [sys.executable, "-c", PROGRAM.format(pause=pause), *arguments]
     process = subprocess.Popen(command, cwd=folder, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
     os.close(theirs)
@@ -109,3 +109,15 @@ def test_a_reader_that_has_had_enough_is_no_error(tmp_path):
     process.stderr.close()
     assert process.wait() == 0, talk
     assert "Error" not in talk
+
+
+def test_a_great_job_is_announced_without_a_bar(folder, analysis, invoke):
+    def great(study, *, progress, **options):
+        progress.start(999_999, "poses")
+        progress.start(3_000_000, "designs")
+        return answer()
+
+    analysis(great)
+    arguments = ("kinematics", "slider.yaml", "--no-plots")
+    assert invoke(*arguments).stderr.splitlines()[0] == "3000000 designs to compute; Ctrl-C ends it"
+    assert invoke(*arguments, "--quiet").stderr == ""

@@ -389,7 +389,12 @@ def reached(robot: Robot, degrees: float, same: bool) -> Flags:
 
 def over(robot: Robot, degrees: float, same: bool) -> tuple[float, float] | None:
     """Area of the region over a range of the platform's angle about the drawn one, by single angles."""
-    good, side = reached(robot, degrees, same), 2 * robot.half / (CELLS // 2)
+    return of_sketch(robot, reached(robot, degrees, same), same)
+
+
+def of_sketch(robot: Robot, good: Flags, same: bool) -> tuple[float, float] | None:
+    """Area of cells that are reached, or of the piece of them that holds the sketch's place; None where in doubt."""
+    side = 2 * robot.half / (CELLS // 2)
     if not same:
         return area_of(good, side)
     area, doubt = area_of(holding(good, robot, side), side)
@@ -447,7 +452,8 @@ def test_over_a_range_only_the_sketchs_piece_counts() -> None:
         return good & (z.real**2 > 0.04), np.linalg.det(np.moveaxis(rows, (0, 1), (-2, -1)))
 
     robot = Robot(DIVIDED, solve, 0.4 + 1j, 2.0)
-    one, every = over(robot, 12, same=True), area_of(reached(robot, 12, same=True), 4.0 / (CELLS // 2))
+    good = reached(robot, 12, same=True)
+    one, every = of_sketch(robot, good, same=True), area_of(good, 4.0 / (CELLS // 2))
     assert one is not None
     assert one[0] < 0.9 * every[0]
     result = asked(robot)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.gallery import point, result_of, row, unit
+from helpers.gallery import point, result_of, row, study_named, unit
+
+from mechdesign.experiments.analysis import sweep
 
 
 def test_slider_crank_has_the_published_motion() -> None:
@@ -31,6 +33,14 @@ def test_offset_slider_crank_has_the_stroke_and_time_ratio_of_its_dead_centres()
     assert (extremes["min"], extremes["max"]) == pytest.approx((near, far), abs=1e-12)
     swing = np.degrees(np.arcsin(c / (length - r)) - np.arcsin(c / (length + r)))
     assert extremes["time_ratio"] == pytest.approx((180 + swing) / (180 - swing), abs=1e-8)
+
+
+def test_offset_slider_cranks_of_the_matrix_have_the_stroke_of_their_dead_centres() -> None:
+    table = sweep(study_named("offset_slider_crank")).main
+    c, r = table["mechanism.parameters.c"], table["mechanism.parameters.r"]
+    stroke = np.sqrt((4 + r) ** 2 - c**2) - np.sqrt((4 - r) ** 2 - c**2)
+    assert len(stroke) == 6
+    assert table["kinematics.extremes.B.x.range"] == pytest.approx(stroke, abs=1e-8)
 
 
 def test_inverted_slider_crank_is_a_right_triangle() -> None:

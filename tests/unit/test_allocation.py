@@ -109,6 +109,12 @@ def test_the_file_keeps_its_comments_and_says_the_new_tolerances(tmp_path: Path)
     assert f"    a: {{tolerance: {found['a']}}}       # the wall\n    b: {found['b']}\n" in text
     assert f"    travel: {{sigma: {found['travel']}}}     # the motor\n" in text
     assert "# Where the slider stops." in text
+    assert "allocate" not in text
+    again = mechdesign.reliability(mechdesign.load(text=text))
+    assert (list(again.tables), again.warnings) == (
+        [name for name in result.tables if name[:4] not in ("allo", "conf")],
+        [],
+    )
 
 
 def test_rare_failures_are_confirmed_by_auto() -> None:

@@ -43,6 +43,20 @@ def overlaid(command, now, then):
     return laid_under(now, results[0], then, results[1]), results[1]
 
 
+def test_names_are_drawn_letter_by_letter():
+    """No formula of TeX, and no mark that turns the letters round, which no font has."""
+    now, then = (
+        study_of(FOUR_BAR.format(rocker=60, motion=SWEEP), f"name={name}") for name in ("a", "$\\frac$ \u202e")
+    )
+    result, _ = overlaid("kinematics", now, then)
+    with style.context():
+        figure = kinematics.figures(now, result)["paths"]
+        drawn = style.encoded(figure, "svg").decode()
+    (legend,) = figure.legends
+    assert legend.get_texts()[1].get_text() == r"study, name=\$\frac\$ \u202e (before)"
+    assert drawn.isascii() or "\u202e" not in drawn
+
+
 def test_curves_and_paths_before_are_dashed_under_those_now():
     now, then = (study_of(FOUR_BAR.format(rocker=rocker, motion=SWEEP)) for rocker in (60, 68))
     result, earlier = overlaid("kinematics", now, then)

@@ -174,3 +174,23 @@ def test_the_pose_that_was_asked_for_stands_in_its_row() -> None:
     table = kinematics(study).tables["motion"]
     assert table["P.x"].tolist() == [30, 3]
     assert np.isnan(table["forearm.angle"][0])
+
+
+def test_dead_centres_are_told_wherever_a_sweep_meets_one() -> None:
+    """At 180 and 360 deg rounding leaves a slope of 1e-15."""
+    study = study_of(
+        """
+mechanism:
+  links: {ground: {O: [0, 0], G: [0, 0]}, crank: [O, A, 40], rod: [A, B, 120], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G, point: B}}
+  drives: [crank]
+  sketch: {A: [0, 40], B: [110, 0]}
+kinematics: {sweep: {crank: {from: 0, to: 360, step: 5}}, outputs: [B.x]}
+"""
+    )
+    result = kinematics(study)
+    assert result.warnings == ["3 poses are at a dead centre: B.x stands still there, and det_J is 0"]
+    assert result.tables["motion"].column("det_J").unit == "mm"
+    angle = kinematics(study_of(study.text.decode(), "kinematics.outputs=[rod.angle]"))
+    assert angle.warnings == ["2 poses are at a dead centre: rod.angle stands still there, and det_J is 0"]
+    assert angle.tables["motion"].column("det_J").unit == ""

@@ -24,6 +24,7 @@ ORDER = (
     ("mechdesign.analyses.workspace",),
     ("mechdesign.analyses.optimize",),
     ("mechdesign.report",),
+    ("mechdesign.experiments",),
     ("mechdesign.door",),
     ("mechdesign.reference",),
     ("mechdesign.cli",),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from helpers.studies import study_of
@@ -260,3 +262,12 @@ kinematics: {{sweep: {{crank: {{from: 1, to: 361, step: 10}}}}, outputs: [F]}}
     changes = np.flatnonzero(valid[1:] != valid[:-1])
     found = kinematics(study).tables["limits"]["crank"]
     assert found == pytest.approx((fine[changes] + fine[changes + 1]) / 2, abs=0.0051)
+
+
+@pytest.mark.parametrize("sweep", ["{from: 0, to: 7.5e7, number: 7}", "{from: 0, to: 1e20, number: 7}"])
+def test_steps_of_many_turns_are_told_instead_of_searched(sweep: str) -> None:
+    """Each turn has two limits: steps of a million turns would take hours."""
+    begun = time.process_time()
+    told = warnings(ROCKER.replace("{from: 0, to: 360, step: 5}", sweep))
+    assert time.process_time() - begun < 5
+    assert "the steps of crank are too long for the motion between the poses" in " ".join(told)

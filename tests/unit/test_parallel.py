@@ -1,11 +1,26 @@
-"""Chunks on threads: order, bounded look-ahead, clean ends."""
+"""Chunks on threads, processes and executors: order, bounded look-ahead, clean ends, lost workers, the same bytes."""
 
+import multiprocessing
+import os
+import pickle
+import signal
+import sys
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
 
 import pytest
 
-from mechdesign.parallel import map_chunks
+import mechdesign
+from mechdesign import courier
+from mechdesign.courier import LostWorkerError, Pool
+from mechdesign.parallel import map_chunks, on
+from mechdesign.report.tables import to_csv
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+forked = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
@@ -61,3 +76,121 @@ def test_interrupt_of_the_consumer_drops_what_is_not_begun():
 def test_jobs_must_be_positive():
     with pytest.raises(ValueError, match="from 1 to"):
         list(map_chunks(abs, [1], 0))
+
+
+def squared(k):
+    return k * k
+
+
+def fatal(marks, times, k):
+    """Kill the process that computes chunk 7 so many times; a mark for every chunk that is begun."""
+    (marks / f"{k}_{os.getpid()}").touch()
+    if k == 7 and len([*marks.glob("7_*")]) <= times:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(0.001)
+    return k * k
+
+
+@forked
+def test_a_lost_worker_costs_its_chunk(tmp_path):
+    assert [*map_chunks(partial(fatal, tmp_path, 1), range(200), 2, processes=True)] == [k * k for k in range(200)]
+    # Of the others only those are computed twice that were under way.
+    assert len([*tmp_path.iterdir()]) <= 200 + 2 * courier.LOOK_AHEAD * 8
+    assert len([*tmp_path.glob("199_*")]) == 1
+
+
+@forked
+def test_a_chunk_that_is_always_lost_is_named(tmp_path):
+    found = []
+    with pytest.raises(LostWorkerError, match=r"^chunk 8 of the work ends each process"):
+        found.extend(map_chunks(partial(fatal, tmp_path, 99), range(200), 2, processes=True))
+    assert len([*tmp_path.glob("7_*")]) <= 4
+
+
+@forked
+def test_an_error_in_a_process_ends_the_work():
+    with pytest.raises(ZeroDivisionError):
+        list(map_chunks(partial(divmod, 1), range(1000), 2, processes=True))
+    assert not multiprocessing.active_children()
+
+
+def test_chunks_go_together_when_they_are_short():
+    lengths = []
+
+    def together(items):
+        lengths.append(len(items))
+        return [k * k for k in items]
+
+    class Here(ThreadPoolExecutor):
+        def submit(self, perform, version, digest, content, items):
+            courier._functions[digest] = together
+            return super().submit(perform, version, digest, content, items)
+
+    found = courier.Courier(Pool(lambda: Here(2), 2), squared)
+    assert [*found(range(10_000))] == [k * k for k in range(10_000)]
+    assert lengths[0] == 1
+    assert 100 < max(lengths) <= 10_000 / (2 * courier.LOOK_AHEAD)
+    assert lengths[-1] == 1
+
+
+def test_a_long_function_goes_once_to_each_worker():
+    sent = []
+
+    class Heard(ThreadPoolExecutor):
+        def submit(self, perform, version, digest, content, items):
+            sent.append(content is not None)
+            return super().submit(perform, version, digest, content, items)
+
+    with on(Pool(lambda: Heard(2), 2)):
+        found = [*map_chunks(partial(len_and, bytes(100_000)), range(300), travels=True)]
+    assert found == [100_000 + k for k in range(300)]
+    assert len(sent) > sum(sent) == 2
+
+
+def len_and(content, k):
+    return len(content) + k
+
+
+def test_a_worker_that_forgot_the_function_asks_for_it(monkeypatch):
+    forgetful = {}
+    monkeypatch.setattr(courier, "_functions", forgetful)
+    items = (forgetful.clear() or k for k in range(50))
+    with on(Pool(lambda: ThreadPoolExecutor(1), 1)):
+        assert [*map_chunks(partial(len_and, bytes(100_000)), items, travels=True)] == [100_000 + k for k in range(50)]
+
+
+def test_workers_have_the_same_version(monkeypatch):
+    before = courier._perform
+    monkeypatch.setattr(courier, "_perform", lambda version, *rest: before("0.0", *rest))
+    with on(Pool(lambda: ThreadPoolExecutor(1), 1)), pytest.raises(mechdesign.MechdesignError, match=r"not 0\.0"):
+        list(map_chunks(squared, [1], travels=True))
+
+
+def texts(command, study, **options):
+    result = getattr(mechdesign, command)(study, **options)
+    return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
+
+
+METHODS = "[analytic, second_order, monte_carlo, form, importance_sampling, quasi_monte_carlo, auto]"
+
+
+CASES = [
+    (
+        "reliability",
+        "gallery/slider_crank_tolerances",
+        [f"reliability.methods={METHODS}", "reliability.samples=45000", "reliability.sobol=300"],
+    ),
+    ("optimize", "gallery/path_synthesis", ["optimize.evaluations=60"]),
+    ("optimize", "two_rpr", []),
+]
+
+
+def test_the_same_bytes_wherever_it_is_computed():
+    asked = [(command, mechdesign.load(CONFIGS / f"{name}.yaml", changes)) for command, name, changes in CASES]
+    expected = [texts(*each) for each in asked]
+    assert [texts(command, pickle.loads(pickle.dumps(study))) for command, study in asked] == expected
+    assert [texts(*each, jobs=2) for each in asked] == expected
+    fresh = multiprocessing.get_context("spawn")
+    for open_ in (lambda: ThreadPoolExecutor(2), lambda: ProcessPoolExecutor(1, mp_context=fresh)):
+        with on(Pool(open_, 2)):
+            assert [texts(*each) for each in asked] == expected

@@ -255,8 +255,8 @@ QUESTIONS = [
     ("reliability: {allocate: {reliability: 1}}", "a reliability lies between 0 and 1, not 1"),
     ("reliability: {allocate: {reliability: 0.9}}", "tolerances are allocated to keep 'limits'"),
     ("kinematics: {outputs: [P, P.x]}", "kinematics.outputs.1: 'P.x' is listed twice"),
-    ("matrix: {r: [1, 2]}", "matrix: is not available in this version"),
-    ("stiffness: {at: P, sections: {b: {matrix: [[1]]}}}", "stiffness.sections.b.matrix: is not available"),
+    ("matrix: {r: [1, 2]}", "matrix.r: unknown key"),
+    ("stiffness: {at: P, sections: {b: {matrix: [[1]]}}}", "stiffness.sections.b.matrix: unknown key"),
     (
         f"optimize: {{{VARIABLE}, maximize: [stiffness.k_min]}}",
         "maximize.0: 'stiffness.k_min' needs the stiffness section",

@@ -61,6 +61,7 @@ def test_dotted_names(load, override, read, value):
     [
         ("mechanism.parametrs.r=42", "mechanism.parametrs: unknown key; did you mean 'parameters'?"),
         ("mechanism.links.crank.lenght=42", "mechanism.links.crank is a list of 3; it has no 'lenght'"),
+        ("mechanism.links.krank.2=42", "there is no mechanism.links.krank to have a '2'; did you mean 'crank'?"),
         ("mechanism.links.rocker.length=-1", "must be positive, not -1"),
         ("mechanism.drives.theta.angle.x=1", "mechanism.drives.theta.angle is neither a mapping nor a list"),
         ("kinematics.sweep.theta={to: min(1, 2)}", "put the expression in quotes"),

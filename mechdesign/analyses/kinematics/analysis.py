@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -14,24 +16,19 @@ from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
 from mechdesign.analyses.kinematics.instant_centres import MOTIONS, REST, TRANSLATION
 from mechdesign.analyses.kinematics.lines import PoseLine
 from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
-from mechdesign.analyses.kinematics.motion import (
-    Motion,
-    MotionQuestion,
-    entry,
-    motion_question,
-    move,
-)
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
+from mechdesign.analyses.kinematics.passage import Mark, Passage, pass_over
 from mechdesign.analyses.kinematics.special_poses import special_poses
-from mechdesign.analyses.poses import Keeper, Shown, judge_failures, pose_in_words
+from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.four_bars import four_bars
-from mechdesign.numerics.arrays import Flags
+from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Column, LongTable, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -39,6 +36,17 @@ from mechdesign.study.poses import Poses
 SINGULAR = 1e-8
 # Assembly modes that a picture shows at most.
 MAX_DRAWN_MODES = 12
+# Poses that warnings are about.
+_STALLED = "stalled"
+_LOST = "without drive rates"
+_REGULAR = "regular"
+_NEAR = "nearly singular"
+_WITHOUT_TARGET = " without target"
+# How two links without an instant centre within reach move against each other.
+_CENTRELESS = {
+    TRANSLATION: "one translates against the other: their instant centre is at infinity",
+    REST: "neither moves against the other: they have no instant centre",
+}
 # How far a step of a motion may deviate from the direction of its rates, as a part of it.
 ASTRAY = 1e-3
 
@@ -62,70 +70,94 @@ def kinematics(
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
-    keeper = Keeper(study, poses)
-    motion = move(question, progress, jobs, also=keeper.keep)
-    warnings, failed = judge_failures(study, poses, motion.reason)
-    warnings += (
-        _conditioning(motion)
-        + _stalled(motion)
-        + _astray(motion)
-        + targets.gaps(study, motion.errors, poses, motion.valid)
-    )
-    tables, swept, ends = {"motion": motion_table(motion)}, swept_of(poses), list[Boundary]()
-    if swept is not None:
-        limits, told, ends = motion_limits(motion, swept)
+    swept = swept_of(poses)
+    passage = pass_over(question, swept, _marks, progress, jobs)
+    motion, marks = passage.motion, passage.marks
+    warnings, failed = judge_failures(study, poses, passage.reason)
+    warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
+    warnings += _untargeted(question, marks)
+    tables, ends = {"motion": motion_table(motion)}, list[Boundary]()
+    resolved = True
+    if swept is not None and not passage.followed:
+        warnings.append(
+            "the sweep goes round too often to follow the motion between its poses: extremes are those of the poses, "
+            "and limits of motion and links in line are not looked for; sweep fewer turns"
+        )
+    if swept is not None and passage.followed:
+        limits, told, ends, resolved = motion_limits(motion, swept)
         warnings += told
-    between, _ = tables_between(motion, ends)
+    between, torn = tables_between(motion, ends, every=poses, followed=passage.followed)
+    if torn.any() or not resolved:
+        warnings.append(
+            f"the steps of {swept} are too long for the motion between the poses: limits, extremes and toggles there "
+            "may be missing; sweep in smaller steps, or less far"
+        )
     tables["extremes"] = between["extremes"]
-    if swept is not None:
+    if swept is not None and passage.followed:
         tables["limits"] = limits
     tables |= between
     if motion.errors:
-        tables["targets"] = targets_table(motion)
+        tables["targets"] = targets_table(motion, passage.sums)
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
     if question.centres:
         tables["instant_centres"] = centres_table(motion)
-        warnings += _without_centre(motion)
-    counts = {"poses": poses.count, "invalid": int(np.count_nonzero(motion.reason))}
-    drawn: dict[str, Any] = {"poses": poses, "motion": keeper.shown}
-    drawn["special"] = special_poses(motion, keeper.shown, swept, ends, tables.get("toggles"))
+        warnings += _without_centre(question, marks)
+    counts = {"poses": poses.count, "invalid": int(np.count_nonzero(passage.reason))}
+    drawn: dict[str, Any] = {"poses": motion.question.poses, "motion": passage.shown}
+    drawn["special"] = special_poses(motion, passage.shown, swept, ends, tables.get("toggles"))
     if all_modes:
-        tables["modes"], told, counts["modes"], drawn["modes"] = _modes(question, motion, keeper.shown)
+        modes, told, counts["modes"], drawn["modes"] = _modes(passage, swept, jobs)
+        tables["modes"] = modes
         warnings += told
-    return Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=question.absent)
+    result = Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=question.absent)
+    if not passage.long:
+        return result
+    whole = {name: passage.table(make, jobs) for name, make in A_ROW_A_POSE.items() if name in tables}
+    return dataclasses.replace(result, tables=tables | whole, pictured=result)
 
 
-def _modes(question: MotionQuestion, drawn: Motion, shown: Shown) -> tuple[Table, list[str], int, dict[str, Shown]]:
+def _modes(
+    drawn: Passage, swept: str | None, jobs: int | None
+) -> tuple[Table, list[str], int, dict[str, Shown]]:  # fmt: skip
     """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
-    study, poses = question.study, question.poses
+    study, poses = drawn.question.study, drawn.question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
-    labels: list[str] = []
-    parts: list[Sequence[Column]] = []
+    passages: dict[str, Passage] = {}
     warnings = []
     pictured: dict[str, Shown] = {}
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
-        motion, seen = drawn, shown
+        passage = drawn
         if not assembly.drawn:
             other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
-            keeper = Keeper(other.study, other.poses)
-            motion = move(other, also=keeper.keep)
-            seen = keeper.shown
-        if seen.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
-            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = seen
-        labels += [assembly.label] * poses.count
-        parts.append(motion.columns())
-        bad = int(np.count_nonzero(motion.reason))
+            passage = pass_over(other, swept, _marks, NULL, jobs)
+        if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
+            pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = passage.shown
+        passages[assembly.label] = passage
+        bad = int(np.count_nonzero(passage.reason))
         if bad:
             warnings.append(
                 f"mode {assembly.label}: no pose is valid in this assembly"
                 if bad == poses.count
                 else f"mode {assembly.label}: {bad} of {poses.count} poses are not valid in this assembly"
             )
-    columns = [Column("mode", np.array(labels), "", "assembly: the joints that choose it and their sides")]
-    for same in zip(*parts, strict=True):
-        columns.append(dataclasses.replace(same[0], values=np.concatenate([column.values for column in same])))
-    return Table("modes", tuple(columns), "the motion of every assembly mode"), warnings, len(parts), pictured
+    parts = [_mode(label, passage.motion) for label, passage in passages.items()]
+    columns = [
+        dataclasses.replace(same[0], values=np.concatenate([column.values for column in same]))
+        for same in zip(*(part.columns for part in parts), strict=True)
+    ]
+    table = dataclasses.replace(parts[0], columns=tuple(columns))
+    if drawn.long:
+        each = [partial(passage.blocks, partial(_mode, label), jobs) for label, passage in passages.items()]
+        table = LongTable(table, len(each) * poses.count, lambda: chain.from_iterable(blocks() for blocks in each))
+    return table, warnings, len(parts), pictured
+
+
+def _mode(label: str, motion: Motion) -> Table:
+    """The motion of one assembly."""
+    labels = np.full(len(motion.reason), label)
+    column = Column("mode", labels, "", "assembly: the joints that choose it and their sides")
+    return Table("modes", (column, *motion.columns()), "the motion of every assembly mode")
 
 
 def swept_of(poses: Poses) -> str | None:
@@ -141,7 +173,7 @@ def motion_table(motion: Motion) -> Table:
 
 def tables_between(
     motion: Motion, ends: Sequence[Boundary] = (), wanted: Collection[str] = ("extremes", "loops", "toggles"),
-    names: Collection[str] | None = None,
+    names: Collection[str] | None = None, every: Poses | None = None, followed: bool = True,
 ) -> tuple[dict[str, Table], Flags]:  # fmt: skip
     """Tables of what happens between the poses of a sweep, too.
 
@@ -151,6 +183,10 @@ def tables_between(
         Limits of motion, of a single design.
     names : collection of str, optional
         Outputs, errors and efforts whose extremes between the poses are wanted; all where left out.
+    every : Poses, optional
+        All poses, where the motion may have only some of them.
+    followed : bool
+        Whether the motion can be followed between the poses.
 
     Returns
     -------
@@ -161,7 +197,7 @@ def tables_between(
     poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
     loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
     torn = np.zeros(poses.designs, dtype=bool)
-    if swept is not None and (loops or "extremes" in wanted):
+    if swept is not None and followed and (loops or "extremes" in wanted):
         coordinates = peaks.needed(motion, names) if "extremes" in wanted else []
         others = functions(loops, "toggles" in wanted)
         if "extremes" in wanted:
@@ -171,16 +207,17 @@ def tables_between(
     if "extremes" in wanted:
         tables["extremes"] = peaks.extremes(motion, swept, line, names)
     if loops:
-        tables["loops"] = loops_table(motion, loops, line)
+        tables["loops"] = loops_table(motion, loops, line, every)
     if loops and line is not None and "toggles" in wanted:
         tables["toggles"] = toggles_table(motion, loops, line)
     return tables, torn if line is None else line.torn
 
 
-def targets_table(motion: Motion) -> Table:
-    """Errors against the targets."""
-    poses = motion.question.poses
-    return targets.table(motion.question.study, motion.errors, poses, swept_of(poses), motion.valid)
+def targets_table(motion: Motion, sums: Floats | None = None) -> Table:
+    """Errors against the targets; `sums` are `targets.totals` of all poses, where the motion has only some of them."""
+    poses, errors, valid = motion.question.poses, motion.errors, motion.valid
+    sums = targets.totals(errors, poses.designs, valid) if sums is None else sums
+    return targets.table(motion.question.study, errors, poses, swept_of(poses), valid, sums)
 
 
 def jacobian_table(motion: Motion) -> Table:
@@ -211,20 +248,52 @@ def centres_table(motion: Motion) -> Table:
     return Table("instant_centres", tuple(columns), "instant centres of velocity of pairs of links")
 
 
-def _without_centre(motion: Motion) -> list[str]:
+# Tables with a row a pose.
+A_ROW_A_POSE = {"motion": motion_table, "jacobian": jacobian_table, "instant_centres": centres_table}
+
+
+def _without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
     """What is to be known of poses in which two links have no instant centre within reach."""
-    study, poses, warnings = motion.question.study, motion.question.poses, []
-    for centre in motion.question.centres:
-        for kind, text in (
-            (TRANSLATION, "one translates against the other: their instant centre is at infinity"),
-            (REST, "neither moves against the other: they have no instant centre"),
-        ):
-            rows = np.flatnonzero(motion.valid & (motion.arrays[f"{centre.name}.motion"].round() == kind))
-            if len(rows):
-                where = f"in {len(rows)} of {poses.count} poses"
-                first = pose_in_words(study, poses, int(rows[0]))
+    study, poses, warnings = question.study, question.poses, []
+    for centre in question.centres:
+        for kind, text in _CENTRELESS.items():
+            count, row = marks[f"{centre.name} {kind}"]
+            if count:
+                where, first = f"in {count} of {poses.count} poses", pose_in_words(study, poses, row)
                 warnings.append(f"{centre.one} and {centre.other}: {where} {text}; the first: {first}")
     return warnings
+
+
+def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    """A warning where a valid pose has no target."""
+    study, poses, warnings = question.study, question.poses, []
+    for name, (count, row) in marks.items():
+        output = name.removesuffix(_WITHOUT_TARGET)
+        if output != name and count:
+            warnings.append(
+                f"{count} of {poses.count} poses lie where the target of {output} has no value: their "
+                f"{output}_error is nan; the first: {pose_in_words(study, poses, row)}"
+            )
+    return warnings
+
+
+def _marks(motion: Motion) -> dict[str, Flags]:
+    """Poses that warnings are about."""
+    question, valid, arrays = motion.question, motion.valid, motion.arrays
+    steady = arrays["conditioning"] >= STALLED
+    stalled = valid & ~motion.smooth & ~steady
+    found = {_STALLED: stalled}
+    if question.of_given:
+        found[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
+    if "inverse_condition" in arrays:
+        found[_REGULAR] = valid & steady
+        found[_NEAR] = valid & steady & _near(motion)
+    for output, where in targets.untargeted(question.study, motion.errors, valid).items():
+        found[f"{output}{_WITHOUT_TARGET}"] = where
+    for centre in question.centres:
+        for kind in _CENTRELESS:
+            found[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)
+    return found
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
@@ -237,60 +306,68 @@ def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
     return f"{above or '1'}/{below}" if below else above
 
 
-def _conditioning(motion: Motion) -> list[str]:
-    if "inverse_condition" not in motion.arrays:
+def _near(motion: Motion) -> Flags:
+    """Poses at or near a singularity of the Jacobian."""
+    question, arrays = motion.question, motion.arrays
+    if len(question.drives) > 1:
+        return ~(arrays["inverse_condition"] >= SINGULAR)
+    # A Jacobian of one entry has no condition: it is compared with a whole size of the mechanism a radian.
+    (output,), (drive,) = question.listed, question.drives
+    size = {"length": question.study.mechanism.size}
+    still = np.abs(arrays["det_J"]) * size.get(drive.quantity, 1.0) / size.get(output.quantity, 1.0)
+    return np.asarray(still < SINGULAR)
+
+
+def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    if _REGULAR not in marks:
         return []
-    values = motion.arrays["inverse_condition"]
-    regular = motion.valid & (motion.arrays["conditioning"] >= STALLED)
-    if regular.any() and motion.question.mixed:
+    if marks[_REGULAR].number and question.mixed:
         return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
-    near = regular & ~(values >= SINGULAR)
-    if near.any():
-        count = np.count_nonzero(near)
-        poses = "1 pose is" if count == 1 else f"{count} poses are"
-        return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"]
-    return []
+    count = marks[_NEAR].number
+    poses = "1 pose is" if count == 1 else f"{count} poses are"
+    if len(question.drives) == 1:
+        (output,) = question.listed
+        return [f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"] if count else []
+    return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"] if count else []
 
 
-def _astray(motion: Motion) -> list[str]:
+def _astray(question: MotionQuestion) -> list[str]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
-    study, section, poses = motion.question.study, motion.question.section, motion.question.poses
+    study, section, poses = question.study, question.section, question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
     unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
-    way = np.array([np.diff(poses.values[name]) * u for name, u in zip(poses.names, unit, strict=True)])
     rates = np.array([section.rates.get(name, 0.0) * u for name, u in zip(poses.names, unit, strict=True)])
     if not rates.any():
         return []
-    ahead = rates / np.linalg.norm(rates)
-    off = np.linalg.norm(way - ahead[:, None] * (ahead @ way), axis=0) > ASTRAY * np.linalg.norm(way, axis=0)
-    if not off.any():
+    ahead, values, off = rates / np.linalg.norm(rates), poses.values, 0
+    for begin in range(0, poses.count - 1, POSES_AT_ONCE):
+        some = slice(begin, begin + POSES_AT_ONCE + 1)
+        way = np.array([np.diff(values[name][some]) * u for name, u in zip(poses.names, unit, strict=True)])
+        aside = np.linalg.norm(way - ahead[:, None] * (ahead @ way), axis=0)
+        off += int(np.count_nonzero(aside > ASTRAY * np.linalg.norm(way, axis=0)))
+    if not off:
         return []
     return [
-        f"{np.count_nonzero(off)} of {len(off)} steps of the motion do not go where the rates of "
+        f"{off} of {poses.count - 1} steps of the motion do not go where the rates of "
         f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
         "drawn; 'speed' gives those of a point along its path"
     ]
 
 
-def _stalled(motion: Motion) -> list[str]:
-    study, poses = motion.question.study, motion.question.poses
-    stalled = motion.valid & ~motion.smooth & ~(motion.arrays["conditioning"] >= STALLED)
+def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
     texts = {
-        "at a dead centre or change point, where the drives do not move the mechanism in one way (conditioning below "
-        f"{STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean nothing there": stalled
+        _STALLED: "at a dead centre or change point, where the drives do not move the mechanism in one way "
+        f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
+        "nothing there",
+        _LOST: "where no drive rates give what is asked: the drives cannot move it in every direction; rates are nan "
+        "there",
     }
-    if motion.question.of_given:
-        lost = np.isnan(motion.arrays[f"{study.mechanism.drives[0]}_velocity"])
-        text = (
-            "where no drive rates give what is asked: the drives cannot move it in every direction; rates are nan there"
-        )
-        texts[text] = motion.valid & ~stalled & lost
     warnings = []
-    for text, where in texts.items():
-        rows = np.flatnonzero(where)
-        if len(rows):
-            lie = f"{len(rows)} poses lie" if len(rows) > 1 else "1 pose lies"
-            warnings.append(f"{lie} {text}; the first: {pose_in_words(study, poses, rows[0])}")
+    for name, text in texts.items():
+        count, row = marks.get(name, Mark(0, 0))
+        if count:
+            lie = f"{count} poses lie" if count > 1 else "1 pose lies"
+            warnings.append(f"{lie} {text}; the first: {pose_in_words(question.study, question.poses, row)}")
     return warnings

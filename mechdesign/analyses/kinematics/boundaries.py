@@ -23,6 +23,10 @@ SLOPE_STEP = 1e-4
 PARTS = 8
 # so often: until each end is alone in one, and a margin that falls to zero without crossing it is below `TOUCHING`.
 DIVISIONS = 6
+# Parts that are suspected of an end, a step of the sweep, and of a short sweep at least: steps with more of them do not
+# resolve the motion.
+SUSPECTS = 16
+FEWEST_SUSPECTS = 256
 # Halvings of a step that reach the last bit of any drive's value.
 HALVINGS = 45
 # Precision of roots, as a part of a step.
@@ -67,14 +71,15 @@ class _Parts(Lanes):
     rises: Floats
 
 
-def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint]]:
+def boundaries(margins: SweepMargins, valid: Flags) -> tuple[list[Boundary], list[ChangePoint], bool]:
     """All ends of the motion in the order of the sweep, and all change points; `valid` for each pose, shape (poses,).
 
     Between two poses a margin is looked for that changes its sign, or whose slopes at the poses admit that it does so
-    twice; a step of the sweep must therefore resolve the motion, but not the gaps in it.
+    twice; a step of the sweep must therefore resolve the motion, but not the gaps in it. Whether it does is the last
+    that is returned: where not, there are ends between a valid pose and one that is not, and no change points.
     """
     if len(margins.at) < 2 or not margins.causes:
-        return [], []
+        return [], [], True
     return _Search(margins, valid).found()
 
 
@@ -115,14 +120,16 @@ class _Search:
             found.append(_Parts(here, x, valid[:2], values[:, :2], rises))
         return _Parts.joined(found)
 
-    def found(self) -> tuple[list[Boundary], list[ChangePoint]]:
-        """All ends and change points."""
+    def found(self) -> tuple[list[Boundary], list[ChangePoint], bool]:
+        """All ends and change points, and whether the steps resolve the motion."""
         step = np.flatnonzero(np.diff(self.at) != 0)
-        parts = self.look(step, self.at[step], self.at[step + 1])
+        parts = steps = self.look(step, self.at[step], self.at[step + 1])
         self.scale = np.nanmax(np.where(np.isfinite(parts.values), np.abs(parts.values), 0.0), axis=(1, 2))
-        touched = []
+        touched, most = [], max(FEWEST_SUSPECTS, SUSPECTS * len(step))
         for _ in range(DIVISIONS):
             suspect, touching = self._suspects(parts)
+            if np.count_nonzero(suspect) > most:
+                return self._ends(steps), [], False
             touched.append(parts.take(touching))
             parts = parts.take(suspect)
             if not len(parts.step):
@@ -132,6 +139,10 @@ class _Search:
             parts = self.look(np.tile(parts.step, PARTS), cuts[:-1].ravel(), cuts[1:].ravel())
         suspect, touching = self._suspects(parts)
         changes = self._changes(_Parts.joined([*touched, parts.take(suspect | touching)]))
+        return self._ends(parts), changes, True
+
+    def _ends(self, parts: _Parts) -> list[Boundary]:
+        """Ends of the motion in parts of the steps, in the order of the sweep, each once."""
         ends = self._located(parts.take(parts.valid[0] != parts.valid[1])) + self._endless(parts)
         ends.sort(key=lambda end: end.position)
         span = float(np.ptp(self.at))
@@ -139,7 +150,7 @@ class _Search:
         for end in ends:
             if not kept or abs(end.place - kept[-1].place) > SAME_END * span or end.cause != kept[-1].cause:
                 kept.append(end)
-        return kept, changes
+        return kept
 
     def _suspects(self, parts: _Parts) -> tuple[Flags, Flags]:
         """Parts in which a margin changes its sign or may do so twice, and others in which one is as good as zero.
@@ -285,8 +296,8 @@ class _Search:
         return [(float(place[k]), self.margins.causes[function[k]]) for k in gone_through]
 
 
-def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary]]:
-    """Table of the values of the swept coordinate at which the motion ends, warnings, and these ends.
+def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Boundary], bool]:
+    """Table of the values of the swept coordinate at which the motion ends, warnings, these ends, whether they are all.
 
     `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`; change points are among the warnings.
     """
@@ -298,7 +309,7 @@ def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Bo
     near = {name: radians(study, c, motion.arrays[name][rows]) for name, c in angles.items()}
     given = {name: radians(study, mechanism.coordinate(name), group.values[name][rows]) for name in group.names}
     margins = SweepMargins(mechanism, given, swept, near)
-    found, changes = boundaries(margins, motion.valid[rows])
+    found, changes, resolved = boundaries(margins, motion.valid[rows])
     ends = [replace(end, position=float(np.interp(end.position, np.arange(len(rows)), rows))) for end in found]
     unit = study.units.label(mechanism.quantity(swept))
     places = as_given(motion, swept, np.array([e.place for e in ends]), np.array([e.position for e in ends]))
@@ -319,7 +330,7 @@ def motion_limits(motion: Motion, swept: str) -> tuple[Table, list[str], list[Bo
     warnings = _hidden(swept, unit, places, ends, motion.valid)
     if mechanism.description.branch != "follow":
         warnings += _warnings(study, margins, swept, changes)
-    return table, warnings, ends
+    return table, warnings, ends, resolved
 
 
 def _values(study: Study, output: Coordinate, ends: list[Boundary]) -> Floats:

@@ -25,6 +25,10 @@ MAX_TURN = 0.3
 MAX_BEND = 0.02
 # Halvings of a step of the sweep, at most: a link that turns faster is taken to jump.
 MAX_HALVINGS = 14
+# Poses of the line, a pose of the sweep, and of a short sweep at least: a motion that needs more is not resolved by the
+# steps of its sweep.
+POSES_EACH = 64
+FEWEST_POSES = 10_000
 # Poses added beside one without slopes (a dead centre, from which functions start as a root does), as parts of the step
 # to the next pose.
 GRADED = np.array([1e-6, 1e-4, 1e-2, 0.1])
@@ -86,6 +90,8 @@ class PoseLine:
         Designs whose motion ends between poses where no limit is known.
     limits : list of int
         Poses that are limits of motion.
+    resolved : bool
+        Whether there are poses enough; not where the steps of the sweep are too long for its motion.
     followed : bool
         Whether the motion is followed through change points: beside them poses have no slopes, and few digits.
     """
@@ -132,7 +138,9 @@ class PoseLine:
         for end in inside:
             self._add_end(end, motion.valid)
         self.begin, self.end = self._segments(motion.valid, inside)
-        self._refine()
+        self.resolved = self._refined()
+        if not self.resolved:
+            self.torn[:] = True
 
     def sample(self, node: Ints, place: Floats) -> tuple[Floats, Floats, Flags]:
         """Values and slopes of all functions with the swept coordinate at `place`, beside poses of the line."""
@@ -253,8 +261,12 @@ class PoseLine:
         self.begin = np.concatenate([self.begin[others], chain[:, :-1].ravel()])
         self.end = np.concatenate([self.end[others], chain[:, 1:].ravel()])
 
-    def _refine(self) -> None:
-        """Put poses into segments until no link turns far within one and the functions are smooth there."""
+    def _refined(self) -> bool:
+        """Put poses into segments until no link turns far within one and the functions are smooth there.
+
+        Returns whether that could be done without too many of them.
+        """
+        most = max(FEWEST_POSES, POSES_EACH * self.poses.count)
         self.divide(np.flatnonzero(~self.sharp()[self.begin]), GRADED)
         self.divide(np.flatnonzero(~self.sharp()[self.end]), 1 - GRADED[::-1])
         low, high = self.least(self.values), -self.least(-self.values)
@@ -273,8 +285,11 @@ class PoseLine:
             wide = np.abs(self.position[self.end] - self.position[self.begin]) > GRADED[1]
             split = np.flatnonzero(((steep[len(self.rows) :] > MAX_TURN).any(axis=0) | rough.any(axis=0)) & wide)
             if not len(split):
-                return
+                break
+            if len(self.row) + len(split) > most:
+                return False
             self.divide(split, np.array([0.5]))
+        return True
 
     def sharp(self) -> Flags:
         """Poses that have slopes."""

@@ -16,6 +16,8 @@ from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 
 # Angles nearer than this are the same (radians).
 SAME_ANGLE = 1e-12
@@ -59,10 +61,13 @@ def _cosine(loop: FourBar, end: int) -> Function:
     return Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
 
 
-def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None) -> Table:
+def loops_table(
+    motion: Motion, loops: Sequence[FourBar], line: PoseLine | None, every: Poses | None = None
+) -> Table:  # fmt: skip
     """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
 
     `line` is the motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
+    `every` are all poses, where the motion may have only some of them.
     """
     study, poses = motion.question.study, motion.question.poses
     length, angle = study.units.label("length"), study.units.label("angle")
@@ -87,7 +92,7 @@ def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None)
     at_unit, where = "", "row at the"
     if line is not None:
         at_unit, where = study.units.label(study.mechanism.quantity(line.swept)), f"{line.swept} at the"
-    both = _at_poses(motion, loops) if line is None else _between(motion, line, len(loops))
+    both = _at_poses(study, every or poses, loops) if line is None else _between(motion, line, len(loops))
     for (values, places), end, which in zip(both, ("min", "max"), ("smallest", "largest"), strict=True):
         name = f"transmission_{end}"
         meaning = f"{which} angle between coupler and output, up to 90 deg"
@@ -99,9 +104,8 @@ def loops_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine | None)
 
 
 @quiet
-def _at_poses(motion: Motion, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
+def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over the poses, and its row; shape (loops, designs)."""
-    study, poses = motion.question.study, motion.question.poses
     angle = np.full((len(loops), poses.count), np.nan)
     for solved in solve_poses(study, poses):
         valid = solved.configuration.valid

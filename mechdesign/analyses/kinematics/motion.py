@@ -5,13 +5,13 @@ At a change point that the motion follows, values are interpolated from poses on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
+from mechdesign.analyses.columns import power_of_length, shared
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
@@ -154,11 +154,11 @@ class MotionQuestion:
         points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
         rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
         given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
-        told = f"{given} for {counted(len(drives), 'drive')}; name as many"
+        words = f"{given} for {counted(len(drives), 'drive')}; name as many"
         if not named:
-            told = f"no outputs are named; name as many as there are drives, {len(drives)},"
-        told += f" by kinematics.jacobian: [{', '.join(rows)}]"
-        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), told)
+            words = f"no outputs are named; name as many as there are drives, {len(drives)},"
+        words += f" by kinematics.jacobian: [{', '.join(rows)}]"
+        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), words)
 
 
 def motion_question(study: Study) -> MotionQuestion:
@@ -197,7 +197,8 @@ class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
     `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
-    point whose values are those of the motion that goes through it.
+    point whose values are those of the motion that goes through it. Where the poses are some of a long motion, one in
+    `stride` of all is enough to follow it.
     """
 
     question: MotionQuestion
@@ -205,6 +206,7 @@ class Motion:
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    stride: int | None = None
 
     @property
     def valid(self) -> Flags:
@@ -285,6 +287,11 @@ class Motion:
         for name, values in statics(self.question, linear).items():
             put(name, values)
 
+    def complete(self, poses: Poses, rows: Ints) -> None:
+        """What is known only when all poses are there: change points, and errors; `rows` are their rows of `poses`."""
+        _through_change_points(self)
+        self.errors = list(errors(self.question.study, poses, self.arrays, rows))
+
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
         question, arrays, label = self.question, self.arrays, self.question.study.units.label
@@ -302,14 +309,16 @@ class Motion:
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
         rows = ", ".join(output.name for output in question.listed)
-        for name, meaning in (
-            ("det_J", f"determinant of the Jacobian of {rows} by the drives, per radian"),
-            ("inverse_condition", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
-            ("conditioning", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the angle "
-             "between two links that meet"),
+        lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
+        area = power_of_length(question.study.units, lengths[0] - lengths[1])
+        for name, unit, meaning in (
+            ("det_J", area, f"determinant of the Jacobian of {rows} by the drives, per radian"),
+            ("inverse_condition", "", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
+            ("conditioning", "", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the "
+             "angle between two links that meet"),
         ):  # fmt: skip
             if name in arrays:
-                columns.append(Column(name, arrays[name], "", meaning))
+                columns.append(Column(name, arrays[name], unit, meaning))
         columns += [Column(s.name, arrays[s.name], s.unit, s.meaning) for s in question.statics]
         return [*columns, *shared(self.question.study.units, valid=self.valid)]
 
@@ -365,18 +374,23 @@ def _advantage(question: MotionQuestion, linear: Linearization, output: str, giv
 
 def thinned(motion: Motion, swept: str) -> Flags:
     """Poses of a sweep that are enough to follow the motion: its ends, those where validity changes, some between."""
-    study, poses = motion.question.study, motion.question.poses
-    coordinate, valid, each = study.mechanism.coordinate(swept), motion.valid, poses.count // poses.designs
-    steps = np.diff(np.asarray(radians(study, coordinate, poses.groups[0].values[swept][:each])))
-    longest = LONGEST_STEP * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
-    stride = min(-(-each // ENOUGH_POSES), int(longest / max(np.abs(steps).max(initial=0.0), longest / each)))
-    taken: Flags = np.arange(each) % max(stride, 1) == 0
-    taken[-1] = True
-    taken = np.tile(taken, poses.designs)
+    poses, valid = motion.question.poses, motion.valid
+    each = poses.count // poses.designs
+    taken: Flags = poses.numbers % (motion.stride or followed_stride(motion.question.study, poses, swept)) == 0
+    taken[each - 1 :: each] = True
     change = valid[1:] != valid[:-1]
     taken[1:] |= change
     taken[:-1] |= change
     return taken
+
+
+def followed_stride(study: Study, poses: Poses, swept: str) -> int:
+    """Of so many poses of a sweep one is enough to follow the motion between them."""
+    coordinate, each = study.mechanism.coordinate(swept), poses.count // poses.designs
+    steps = np.diff(poses.groups[0].values[swept][:each])
+    longest = LONGEST_STEP * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
+    step = float(radians(study, coordinate, max(steps.max(initial=0.0), -steps.min(initial=0.0))))
+    return max(min(-(-each // ENOUGH_POSES), int(longest / max(step, longest / each))), 1)
 
 
 def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
@@ -418,9 +432,20 @@ def move(
         if also is not None:
             also(solved)
         progress.update(len(solved.rows))
-    _through_change_points(motion)
-    motion.errors = list(errors(study, poses, motion.arrays, np.arange(poses.count)))
+    motion.complete(poses, np.arange(poses.count))
     return motion
+
+
+def pieces(question: MotionQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, Motion]]:
+    """The motion of poses of one kind in pieces, with their solved poses; what is held is a few pieces."""
+    study, poses = question.study, question.poses
+    for solved in solve_poses(study, poses, question.watched, jobs):
+        rows = solved.rows
+        some = poses.take(slice(int(rows[0]), int(rows[-1]) + 1))
+        motion = Motion(replace(question, poses=some), reason=np.zeros(len(rows), dtype=np.int8))
+        motion.fill(replace(solved, rows=np.arange(len(rows))))
+        motion.complete(poses, rows)
+        yield solved, motion
 
 
 def _through_change_points(motion: Motion) -> None:

@@ -256,7 +256,7 @@ def extremes(motion: Motion, swept: str | None, line: PoseLine | None, names: Co
         values = motion.arrays[static.name]
         curves[static.name] = ("none", np.where(np.isinf(values), np.nan, values))
         units.append(static.unit)
-    at = poses.values[swept] if swept is not None else np.tile(np.arange(each, dtype=float), poses.designs)
+    at = poses.values[swept] if swept is not None else poses.numbers
     turn = 2 * np.pi / study.units.angle_factor
     sizes = {"length": mechanism.size, "angle": turn}
     # By curve and design; of both ends the pose, and value and place.
@@ -325,7 +325,7 @@ def _between(
     def take(peak: Peak, end: int, which: Sequence[int], *, exact: bool = False) -> None:
         sign = 1 - 2 * end
         value = np.where(np.isnan(found[end, 0, which]), np.inf, sign * found[end, 0, which])
-        away, rounding = np.abs(peak.position - row[end, which]), still[which]
+        away, rounding = _rows_between(line, peak, row[end, which]), still[which]
         with np.errstate(invalid="ignore"):
             # Better, or that pose's own extreme, but beside it.
             beside = (np.abs(peak.value - value) <= rounding) & (away < 1) & (away > 1e-9) & moving[which] & exact
@@ -355,6 +355,17 @@ def _between(
             return np.asarray(sign * line.at(node, place)[rows])
 
         take(searched(line, effort, sign * line.values[rows], still[held], poles=True), end, held)
+
+
+def _rows_between(line: PoseLine, peak: Peak, row: Ints) -> Floats:
+    """How many rows of the sweep lie between peaks and poses."""
+    poses = line.poses
+    if poses.rows is None:
+        return np.abs(peak.position - row)
+    # Between the poses that stay of a long sweep there are others.
+    given = line.given[line.which]
+    order = np.argsort(given, kind="stable")
+    return np.abs(np.interp(peak.place, given[order], poses.numbers[order]) - poses.numbers[row])
 
 
 def _errors(motion: Motion, line: PoseLine, sign: int) -> Along:

@@ -25,6 +25,8 @@ from mechdesign.study.poses import PoseGroup, Poses
 # Poses that are shown at most, and at least along a motion.
 MOST = 6
 FEW = 4
+# Limits and toggles of a motion that are compared, whether a turn of the drive brought them back.
+COMPARED = 200
 # Places nearer than this part of the sweep's range are one, and so are poses whose points are nearer than this part of
 # the mechanism's size.
 SAME = 1e-6
@@ -84,14 +86,15 @@ def special_poses(
     rates = bool(any(section.rates.values()) or any(section.accelerations.values()) or section.speed is not None)
     if not poses.motion and not poses.listed:
         return SpecialPoses((), 0, rates)
-    found: list[SpecialPose] = []
+    found, more = list[SpecialPose](), 0
     if poses.motion and swept is not None:
-        found = _distinct(motion, _at_events(motion, swept, _events(motion, swept, ends, toggles)))
+        events = _events(motion, swept, ends, toggles)
+        found, more = _distinct(motion, _at_events(motion, swept, events[:COMPARED])), len(events[COMPARED:])
     valid = np.flatnonzero(kept.configuration.valid)
     some, left_out = valid[:MOST], max(len(valid), len(found)) - MOST
     along = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
     if poses.motion:
-        some, left_out = _spread(motion, kept, along, [each.place for each in found]), len(found) - MOST
+        some, left_out = _spread(motion, kept, along, [each.place for each in found]), len(found) + more - MOST
     configuration = kept.configuration.take(some)
     words = [(float(along[row]), pose_in_words(kept.study, poses, int(row), DIGITS), "") for row in kept.rows[some]]
     solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)

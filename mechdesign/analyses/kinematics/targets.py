@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.analyses.poses import pose_in_words
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -135,21 +134,30 @@ def nearest(points: Complexes, corners: Complexes) -> Complexes:
     return found
 
 
-def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: Flags) -> Table:
-    """Mean and largest errors of each design over the valid poses that have a target."""
+def totals(found: Sequence[Error], designs: int, valid: Flags) -> Floats:
+    """Number, sum, and sum of the squares of each design's errors at valid poses, shape (3, designs, errors)."""
+    sums = np.zeros((3, designs, len(found)))
+    for k, error in enumerate(found):
+        known = (valid & np.isfinite(error.values)).reshape(designs, -1)
+        values = np.where(known, error.values.reshape(known.shape), 0.0)
+        sums[:, :, k] = known.sum(axis=1), values.sum(axis=1), (values**2).sum(axis=1)
+    return sums
+
+
+def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: Flags, sums: Floats) -> Table:
+    """Mean and largest errors of each design over the valid poses that have a target; `sums` are their `totals`."""
     shape = (poses.designs, poses.count // poses.designs)
-    at = poses.values[swept] if swept is not None else np.tile(np.arange(shape[1], dtype=float), shape[0])
+    at = poses.values[swept] if swept is not None else poses.numbers
     found_at = np.full((4, poses.designs, len(found)), np.nan)
     for k, error in enumerate(found):
         known = (valid & np.isfinite(error.values)).reshape(shape)
         some = known.any(axis=1)
         values = np.where(known, error.values.reshape(shape), 0.0)[some]
-        count = known[some].sum(axis=1)
         worst = np.where(known[some], np.abs(values), -1.0).argmax(axis=1)
-        lane = np.arange(len(worst))
+        lane, (count, total, squares) = np.arange(len(worst)), sums[:, some, k]
         found_at[:, some, k] = (
-            np.sqrt((values**2).sum(axis=1) / count),
-            values.sum(axis=1) / count,
+            np.sqrt(squares / count),
+            total / count,
             np.abs(values[lane, worst]),
             at.reshape(shape)[some][lane, worst],
         )
@@ -171,14 +179,7 @@ def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None,
     )
 
 
-def gaps(study: Study, found: Sequence[Error], poses: Poses, valid: Flags) -> list[str]:
-    """Warnings where a valid pose has no target."""
-    warnings = []
-    for error in found:
-        lost = np.flatnonzero(valid & ~np.isfinite(error.values))
-        if len(lost) and error.output not in {f"{owner}.{axis}" for owner in study.targets for axis in "xy"}:
-            warnings.append(
-                f"{len(lost)} of {poses.count} poses lie where the target of {error.output} has no value: their "
-                f"{error.name} is nan; the first: {pose_in_words(study, poses, int(lost[0]))}"
-            )
-    return warnings
+def untargeted(study: Study, found: Sequence[Error], valid: Flags) -> dict[str, Flags]:
+    """By outputs, the valid poses where their target has no value."""
+    parts = {f"{owner}.{axis}" for owner in study.targets for axis in "xy"}
+    return {error.output: valid & ~np.isfinite(error.values) for error in found if error.output not in parts}

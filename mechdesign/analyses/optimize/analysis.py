@@ -82,7 +82,7 @@ def optimize(
         else searching.allowance(len(section.variables), len(weights), len(goals), slow=evaluator.slow)
     )
     evaluator.limit_rows(MAX_KEPT_ROWS // budget)
-    with workers(evaluator, jobs, processes=True) as compute:
+    with workers(evaluator, jobs, processes=True, travels=True) as compute:
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
             doubts = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)
@@ -349,6 +349,6 @@ def drawn_design(designs: Designs, numbers: Mapping[str, float]) -> tuple[Study,
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
         if any(each.command == "kinematics" for each in designs.goals):
-            return made, kinematics(made)
+            return made, kinematics(made).seen
         return made, Result("kinematics", {}, drawn={"motion": solve_shown(made)})
     return made, Result("kinematics", {})

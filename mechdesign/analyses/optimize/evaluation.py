@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +120,15 @@ class Evaluator:
         self.layout = Layout(self.goals, self._rows, clear)
         if not graded:
             self.limit_rows(0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What the study gives again, where it travels to."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("questions", "_poses")}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.questions = questions(self.study, GRID_TOLERANCE, self._columns) if self._regional else []
+        self._poses = {command: stacked.poses_of(self.study, command) for command in self._together}
 
     @property
     def slow(self) -> bool:

@@ -284,13 +284,16 @@ def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
 def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
     """The study's data where tolerances are as many times as wide.
 
-    What a wildcard gives is written out, place by place, unless all of it stays alike.
+    What a wildcard gives is written out, place by place, unless all of it stays alike. What is done is no longer asked:
+    `allocate` is left out, unless a requirement judges its tables.
     """
     section = study.reliability
     assert section is not None
     data: dict[str, Any] = plain(study.resolved)
     changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
     given = data["reliability"]
+    if not any(each.result.split(".")[1:2] in (["allocation"], ["confirmation"]) for each in study.requirements):
+        del given["allocate"]
     entries = given.get("dimensions") or {}
     # Of several wildcards the last one counts.
     key_of = {name: name if name in entries else [key for key in entries if fnmatchcase(name, key)][-1]

@@ -26,7 +26,7 @@ from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
-from mechdesign.parallel import keep_freed_memory, one_thread
+from mechdesign.parallel import Divided, apart, keep_freed_memory, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -62,13 +62,18 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     if section.precision is not None:
         task = replace(task, precision=section.precision)
     found: list[MethodResult] = []
+    left: list[Divided] = []
     interrupted = ""
     indices: dict[int, SobolIndices] = {}
     allocated = Result("allocation", {})
     try:
         for method in section.methods:
-            found.append(with_cycle(methods.run(method, task), task, found))
-        indices = sobol.indices(task, section)
+            with apart(left):
+                found.append(with_cycle(methods.run(method, task), task, found))
+        with apart(left):
+            indices = sobol.indices(task, section)
+        if left:
+            raise left[0]
         allocated = allocate(task, section)
     except Partial as partial:
         found.append(partial.found)
@@ -271,10 +276,10 @@ def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
         factor, pose, one, other = max(cases, key=lambda case: case[0])
         times_apart = f"{factor:.3g} times" if factor < 1e6 else "many orders of magnitude"
         several = task.poses.count > 1
-        rest = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
+        others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
         sentences.append(
             f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is {one.failure:.3g} by "
-            f"the one and {other.failure:.3g} by the other, {times_apart} apart{rest}"
+            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}"
         )
     return sentences
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -67,15 +68,12 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
     size = max(_CHUNK_LEAST, min(CHUNK, _CHUNK_WORK // len(settings)))
     chunks = -(-samples // size)
     total = np.zeros(4, dtype=np.int64)
-
-    def work(chunk: int) -> Ints:
-        return count_chunk(settings, task.sources, task.seed, chunk, min(size, samples - chunk * size))
-
+    work = partial(_counted, settings, task.sources, task.seed, samples, size)
     task.progress.start(samples, "whole cycles")
     done, until = 0, 1 if precise else chunks
     try:
         while done < chunks:
-            for part in map_chunks(work, range(done, until), task.jobs):
+            for part in map_chunks(work, range(done, until), task.jobs, travels=True):
                 total += part
                 task.progress.update(int(part[1]))
             done, until = until, min(chunks, 2 * until)
@@ -85,6 +83,10 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
     except KeyboardInterrupt:
         raise Partial(replace(found, cycle=counted(*total.tolist()) if total[1] else None)) from None
     return replace(found, cycle=counted(*total.tolist()))
+
+
+def _counted(settings: Sequence[Setting], sources: Sources, seed: int, samples: int, size: int, chunk: int) -> Ints:
+    return count_chunk(settings, sources, seed, chunk, min(size, samples - chunk * size))
 
 
 def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Ints:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 
@@ -230,15 +230,19 @@ def simulate(
     jobs: int | None = 1, progress: Progress = NULL,
 ) -> None:  # fmt: skip
     """Fill `sums` by pose, all poses chunk by chunk, so that an interrupt leaves something of each."""
-
-    def work(item: tuple[int, Setting]) -> tuple[int, Sums]:
-        chunk, setting = item
-        return setting.pose, simulate_chunk(setting, sources, seed, chunk, min(CHUNK, samples - chunk * CHUNK))
-
-    items = ((chunk, setting) for chunk in range(-(-samples // CHUNK)) for setting in settings)
-    for pose, found in map_chunks(work, items, jobs):
+    work = partial(_simulated, settings, sources, seed, samples)
+    items = range(-(-samples // CHUNK) * len(settings))
+    for pose, found in map_chunks(work, items, jobs, travels=True):
         sums[pose] = sums[pose] + found if pose in sums else found
         progress.update(found.samples)
+
+
+def _simulated(
+    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, item: int
+) -> tuple[int, Sums]:  # fmt: skip
+    chunk, place = divmod(item, len(settings))
+    count = min(CHUNK, samples - chunk * CHUNK)
+    return settings[place].pose, simulate_chunk(settings[place], sources, seed, chunk, count)
 
 
 def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, count: int) -> Sums:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -157,18 +158,22 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
     replicates = max(_REPLICATES, -(-points // _REPLICATE_POINTS))
     each = max(2, points // replicates)
     task.progress.start(len(settings) * replicates, "replicates")
-
-    def work(item: tuple[Setting, int]) -> Replicate:
-        setting, replicate = item
-        rng = generator(task.seed, setting.pose, _STREAM, replicate)
-        return sample(_both_models(setting, sources, linear), rows, len(owners), each, rng)
-
+    work = partial(_replicate, settings, sources, linear, rows, task.seed, each)
     found: dict[int, list[Replicate]] = {setting.pose: [] for setting in settings}
-    items = [(setting, replicate) for setting in settings for replicate in range(replicates)]
-    for (setting, _), part in zip(items, map_chunks(work, items, task.jobs), strict=True):
-        found[setting.pose].append(part)
+    items = [(place, replicate) for place in range(len(settings)) for replicate in range(replicates)]
+    for (place, _), part in zip(items, map_chunks(work, items, task.jobs, travels=True), strict=True):
+        found[settings[place].pose].append(part)
         task.progress.update(1)
     return {pose: combine(parts, _variances(linear, pose)) for pose, parts in found.items()}
+
+
+def _replicate(
+    settings: Sequence[Setting], sources: Sources, linear: FirstOrder, rows: Sequence[Sequence[int]], seed: int,
+    points: int, item: tuple[int, int],
+) -> Replicate:  # fmt: skip
+    place, replicate = item
+    rng = generator(seed, settings[place].pose, _STREAM, replicate)
+    return sample(_both_models(settings[place], sources, linear), rows, len(sources.owners), points, rng)
 
 
 def uncorrelated(sources: Sources) -> set[str]:

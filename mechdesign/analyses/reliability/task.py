@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,10 @@ class Task:
     precision: Precision = field(default_factory=lambda: Precision(relative=RELATIVE_PRECISION))
     jobs: int | None = 1
     progress: Progress = NULL
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Where it travels to, nobody looks at its progress."""
+        return self.__dict__ | {"progress": NULL, "jobs": 1}
 
     @cached_property
     def assembled(self) -> Flags:

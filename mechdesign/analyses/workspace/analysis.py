@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.columns import SHARED, shared
+from mechdesign.analyses.columns import SHARED, power_of_length, shared
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.ellipses import ellipses
-from mechdesign.analyses.workspace.index import Local, determinant_power, power_of_length, prepare
+from mechdesign.analyses.workspace.index import Local, determinant_power, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.quadrature import FINEST_AREA
@@ -222,7 +222,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
     node = np.concatenate([np.tile(np.arange(grid.shape[1]), len(grid)) for grid in grids])
     ray = np.concatenate([np.repeat(np.arange(len(grid)), grid.shape[1]) for grid in grids])
     patch = np.repeat(np.arange(len(grids)), [grid.size for grid in grids])
-    per_area = power_of_length(study, determinant_power(question.field))
+    per_area = power_of_length(study.units, determinant_power(question.field))
     determinant = np.broadcast_to(local.determinant, z.shape)
     if question.field.same_assembly:
         # It has one sign all over a patch; at a tip where no node is off the boundary rounding would choose another.

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechdesign import indices
+from mechdesign.analyses.columns import power_of_length
 from mechdesign.analyses.region.field import Field, Places
 from mechdesign.analyses.region.rays import Designs
 from mechdesign.errors import StudyError
@@ -179,19 +180,12 @@ def stiffness(study: Study, where: Field) -> str:
 
 def determinant(study: Study, where: Field) -> str:
     """That of det J: lengths of outputs over those of drives, per radian."""
-    return power_of_length(study, determinant_power(where))
+    return power_of_length(study.units, determinant_power(where))
 
 
 def inverse_determinant(study: Study, where: Field) -> str:
     """That of 1/det J."""
-    return power_of_length(study, -determinant_power(where))
-
-
-def power_of_length(study: Study, power: int) -> str:
-    """The study's unit of length to a power."""
-    name = "" if study.units.length == "dimensionless" else study.units.length
-    text = name if abs(power) == 1 else f"{name}^{abs(power)}"
-    return "" if power == 0 or not name else text if power > 0 else f"1/{text}"
+    return power_of_length(study.units, -determinant_power(where))
 
 
 def determinant_power(where: Field) -> int:
@@ -204,4 +198,4 @@ def singular_value_unit(study: Study, where: Field) -> str:
     """That of an output over that of a drive, per radian; none with a characteristic length."""
     driven = where.mechanism.forward.structure.given[0].quantity
     power = int(where.outputs[0].quantity == "length") - int(driven == "length")
-    return "" if where.length is not None else power_of_length(study, power)
+    return "" if where.length is not None else power_of_length(study.units, power)

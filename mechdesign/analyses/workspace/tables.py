@@ -67,10 +67,10 @@ def beyond(study: Study, question: Question, areas: Sequence[float]) -> str:
     if not other > max(areas, default=0.0):
         return ""
     unit = study.units.label("area")
-    here, there = (f"{area:.3g} {unit}".rstrip() for area in (sum(areas[:1]), other))
+    inside, beyond = (f"{area:.3g} {unit}".rstrip() for area in (sum(areas[:1]), other))
     return (
-        f"more of the region{where(question)} lies beyond a forward singularity, in the other assembly: about {there}, "
-        f"and {here} here; 'assembly: any' counts all, or redraw the sketch in the other assembly"
+        f"more of the region{where(question)} lies beyond a forward singularity, in the other assembly: about "
+        f"{beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch in the other assembly"
     )
 
 

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mechdesign.errors import printable
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes
@@ -45,7 +46,9 @@ def draw_sweep(axes: Axes, sweep: Sweep) -> None:
 
 def name_both(figure: Figure, before: Before, color: str = style.INK) -> None:
     """A legend above all panels, for which the page is made higher."""
-    labels = [f"{name} ({when})" for name, when in zip(before.names, ("now", "before"), strict=True)]
+    # As they are: a dollar would begin a formula.
+    names = [printable(name).replace("$", r"\$") for name in before.names]
+    labels = [f"{name} ({when})" for name, when in zip(names, ("now", "before"), strict=True)]
     columns = fitting(labels)
     looks: tuple[dict[str, Any], ...] = ({"color": color}, {"color": COLOR, "linestyle": DASHES})
     handles = [Line2D([], [], label=label, **look) for label, look in zip(labels, looks, strict=True)]

@@ -67,7 +67,7 @@ def abscissa(study: Study, poses: Poses) -> Along:
     """The one coordinate that moves, always the same way, or else the number of the pose."""
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
-        return Along(np.arange(1.0, poses.count + 1), "pose along the path")
+        return Along(poses.numbers + 1, "pose along the path")
     return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0])
 
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from concurrent.futures import BrokenExecutor
 from contextlib import suppress
+from functools import partial
 from typing import ParamSpec
 
 from matplotlib.figure import Figure
 
+from mechdesign.courier import LostWorkerError
 from mechdesign.errors import explain
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 
 # To the files of one picture: their bytes by their names.
 Drawing = Callable[[], dict[str, bytes]]
@@ -49,10 +50,22 @@ class Gallery(dict[str, Figure]):
             self.failed |= made.failed
 
 
-def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Call every drawing; on Linux in two forked processes, for Matplotlib draws on one processor only.
+# Drawings under way, which a forked process has as well: figures do not travel.
+_here: dict[int, Mapping[str, Drawing]] = {}
 
-    The bytes do not depend on where they are drawn. What a process that was killed left out is drawn in this one.
+
+def _draw(key: int, name: str) -> dict[str, bytes] | str:
+    try:
+        return _here[key][name]()
+    except Exception as error:
+        return explain(error)[1]
+
+
+def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Call every drawing; on Linux in two forked processes, if two `jobs` may be done at a time.
+
+    Matplotlib draws on one processor only. The bytes do not depend on where they are drawn. What a process that was
+    killed left out is drawn in this one.
 
     Returns
     -------
@@ -62,18 +75,17 @@ def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str,
         Why there are none, by the names of drawings.
     """
 
-    def draw(name: str) -> dict[str, bytes] | str:
-        try:
-            return drawings[name]()
-        except Exception as error:
-            return explain(error)[1]
-
     names = list(drawings)
     found: dict[str, dict[str, bytes] | str] = {}
-    with suppress(BrokenExecutor):
-        jobs = 2 if sys.platform == "linux" and len(names) >= FEWEST else 1
-        for name, drawn in zip(names, map_chunks(draw, names, jobs, processes=True), strict=True):
-            found[name] = drawn
-    found |= {name: draw(name) for name in names if name not in found}
+    key = id(drawings)
+    _here[key] = drawings
+    try:
+        with suppress(LostWorkerError):
+            count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
+            for name, drawn in zip(names, map_chunks(partial(_draw, key), names, count, processes=True), strict=True):
+                found[name] = drawn
+        found |= {name: _draw(key, name) for name in names if name not in found}
+    finally:
+        del _here[key]
     files = {file: data for name in names if isinstance(drawn := found[name], dict) for file, data in drawn.items()}
     return files, {name: why for name in names if isinstance(why := found[name], str)}

@@ -80,6 +80,8 @@ _RULES: dict[str, tuple[_Rule, ...]] = {
         _Rule("stiffness", "k_max", "largest stiffness", "largest"),
         _Rule("deflections", "d[xy]", "largest deflection {name}", "size"),
     ),
+    "sweep": (),
+    "sensitivities": (),
 }  # fmt: skip
 
 

@@ -9,15 +9,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
+from itertools import zip_longest
+from operator import itemgetter
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from PIL import Image
 
-from mechdesign.commands import COMMANDS
+from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.errors import counted, explain
-from mechdesign.mechanism.describe import describe
+from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import fit
@@ -26,8 +28,8 @@ from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
-from mechdesign.report.page.pages import GENERATOR
-from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.report.page.pages import GENERATOR, harmless
+from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.reliability import in_words
@@ -88,7 +90,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         drawing=drawing or (_sketch(study) if plots else ""),
         plots=plots,
         answers=answers,
-        questions=COMMANDS,
+        questions=QUESTIONS,
         required=required,
         met=sum(each["met"] for each in required),
         warnings=warnings,
@@ -138,7 +140,7 @@ def thumbnail(study: Study) -> str:
 
 def _page(template: str, *, moving: bool, **content: Any) -> bytes:
     environment = Environment(
-        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined,
+        loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
@@ -167,17 +169,16 @@ def _hash(text: str) -> str:
 
 
 def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, Any]]:
-    """The requirements of the questions that were asked, in the order of the study, each with its verdict."""
-    by_command = {each.command: each for each in answers}
-    verdicts = {command: iter(each.verdicts) for command, each in by_command.items()}
-    rows: list[dict[str, Any]] = []
-    for requirement in study.requirements:
-        command = command_of(requirement)
-        if command in by_command:
-            verdict = next(verdicts[command], None)
-            met = verdict is not None and verdict.met
-            rows.append({"command": command, "verdict": verdict, "met": met, **_in_words(requirement)})
-    return rows
+    """The requirements of the questions that were asked, in the order of the study, each with its verdict.
+
+    Those of its cases, where they were asked, come last.
+    """
+    rows: list[tuple[bool, int, dict[str, Any]]] = []
+    for each in answers:
+        for k, verdict in zip_longest(judged_by(study, each.command), each.verdicts):
+            about = {"command": each.command, "verdict": verdict, "met": verdict is not None and verdict.met}
+            rows.append((each.command == SWEEP.name, k, about | _in_words(study.requirements[k])))
+    return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:
@@ -206,24 +207,14 @@ def _about(study: Study) -> dict[str, Any]:
             told[kind].append(words)
         elif kind not in ("links", "mobility"):
             rest.append(line.strip())
-    places = description.places
     links = [
-        {
-            "name": name,
-            "kind": "telescopic leg" if link.telescopic else "link",
-            "points": ", ".join([*link.points, *(end for end in link.ends or () if end not in link.points)]),
-            "length": shown(places[f"{name}.length"].nominal) if f"{name}.length" in places else "",
-        }
-        for name, link in description.links.items()
-    ]
-    drives = [
-        f"{name}, the {drive.kind} of {drive.target}"
-        + (f" to {drive.reference}" if drive.reference != "ground" else "")
-        for name, drive in description.drives.items()
+        (link.name, ", ".join(link.points), "varies" if link.telescopic else shown(link.length) if link.length else "")
+        for link in links_in_words(description)
     ]
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives, "parameters": parameters, "told": told, "solution": rest, "loops": loops,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told,
+        "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip

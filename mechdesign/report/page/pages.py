@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+from mechdesign.errors import printable_lines
 
 REPORT = "report.html"
 INDEX = "index.html"
 # By this a file is known as one of these pages, in its first bytes.
 GENERATOR = '<meta name="generator" content="mechdesign">'
 _HEAD = 2000
+
+
+def harmless(value: Any) -> Any:
+    """What a template is given, texts without what turns or hides the letters beside it; HTML as it is."""
+    return printable_lines(value) if type(value) is str else value
 
 
 def remove(path: Path) -> None:

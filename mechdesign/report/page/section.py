@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from mechdesign.errors import explain
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
-from mechdesign.report.tables import cells, plain
+from mechdesign.report.tables import cells, json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
@@ -46,14 +45,14 @@ def section(
     part, warnings = None, tuple(undrawn)
     if plots and not result.interrupted:
         try:
-            part = moving(study, result)
+            part = moving(study, result.seen)
         except Exception as error:
             warnings = (*warnings, f"the mechanism cannot be shown moving: {explain(error)[1]}")
     doubled = CURVES if part is not None and part.beside else ""
     shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
         "command": result.command,
-        "headlines": [dataclasses.asdict(each) for each in headlines(result)],
+        "headlines": [dataclasses.asdict(each) for each in headlines(result.seen)],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
@@ -67,7 +66,7 @@ def section(
 
 def encoded(part: Mapping[str, Any]) -> bytes:
     """The part as the bytes of its file."""
-    return (json.dumps(part, ensure_ascii=False, separators=(",", ":")) + "\n").encode()
+    return (json_text(part, separators=(",", ":")) + "\n").encode()
 
 
 def _table(table: Table) -> dict[str, Any]:

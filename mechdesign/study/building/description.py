@@ -293,8 +293,8 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
 def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: KeyPath) -> None:
     low, high = section.min, section.max
     if low is not None and high is not None and high.nominal < low.nominal:
-        mend = "; add a full turn to it" if quantity == "angle" else ""
-        builder.report((*path, "max"), f"the maximum {high.nominal:g} is below the minimum {low.nominal:g}{mend}")
+        also = "; add a full turn to it" if quantity == "angle" else ""
+        builder.report((*path, "max"), f"the maximum {high.nominal:g} is below the minimum {low.nominal:g}{also}")
     if quantity == "angle" and (low is None or high is None):
         builder.report(path, "an angle needs both 'min' and 'max': angles are judged modulo a turn")
     if section.kind == "distance":

@@ -55,7 +55,7 @@ def _known() -> tuple[str, ...]:
     return (*REGIONAL, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in STATISTICS))
 
 
-def _result(raw: Any, context: Context) -> str | Expression:
+def read_result(raw: Any, context: Context) -> str | Expression:
     """The name of a result, or an expression over parameters; a name that is both is the result's."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         raise failure(f"expected a result, such as GII or kinematics.mu, or an expression, not {shown(raw)}")
@@ -77,7 +77,7 @@ def _required(raw: Any, context: Context) -> str:
     if isinstance(raw, str) and raw.startswith("optimize."):
         # A column of its tables may be an expression.
         return raw
-    if isinstance(found := _result(raw, context), str):
+    if isinstance(found := read_result(raw, context), str):
         return found
     cure = f"give it as a measure, mechanism.measures: {{NAME: {raw}}}, and require kinematics.NAME"
     raise failure(f"a requirement judges the result of a command, and {shown(raw)} is of parameters alone; {cure}")
@@ -90,7 +90,7 @@ class Judged(fields.Model):
     short: ClassVar[tuple[fields.Form, ...]] = ({**fields.NAME_FORM, "title": "result"},)
     result: Annotated[
         str | Expression,
-        fields.Read(_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
+        fields.Read(read_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
     ]
     """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
     counts, or an expression over parameters. Example: kinematics.extremes.C.x.range

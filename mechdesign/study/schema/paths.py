@@ -255,15 +255,8 @@ def read_column(folder: Folder, file: str, name: str | None) -> Floats:
     StudyError
         Where the file cannot be read, there is no such column, or it holds anything but finite numbers.
     """
-    lines = _lines(folder, file)
-    if not lines:
-        raise StudyError(f"{file} holds no numbers")
-    separator = next((mark for mark in (";", "\t") if mark in lines[0][1]), ",")
-    try:
-        rows = [[cell.strip() for cell in next(csv.reader([line], delimiter=separator))] for _, line in lines]
-    except csv.Error as error:
-        raise StudyError(f"{file} is no CSV file: {error}") from None
-    first, place = rows[0], 0
+    rows = read_cells(folder, file)
+    first, place = rows[0][1], 0
     if name is not None and name not in first:
         raise StudyError(f"{file} has no column {name!r} among the {len(first)} of its first line")
     if name is not None:
@@ -271,15 +264,35 @@ def read_column(folder: Folder, file: str, name: str | None) -> Floats:
     elif len(first) > 1:
         raise StudyError(f"{file} has {len(first)} columns: say by 'column' which one, by its name in the first line")
     found = []
-    for (number, line), row in zip(lines, rows, strict=True):
+    for number, row in rows:
         value = _number(row[place]) if place < len(row) <= len(first) else None
         if value is not None and math.isfinite(value):
             found.append(value)
         elif row is not first or (name is None and value is not None):
             what = f" of column {name!r}" if name is not None else ""
-            hint = "; a decimal is written with a point" if "," in line and separator != "," else ""
+            hint = "; a decimal is written with a point" if any("," in cell for cell in row) else ""
             raise StudyError(f"{file}:{number}: the line has no finite number{what}{hint}")
     return np.array(found)
+
+
+def read_cells(folder: Folder, file: str) -> list[tuple[int, list[str]]]:
+    """Read the cells of a CSV file, line by line with its number; commas, semicolons or tabs stand between them.
+
+    Raises
+    ------
+    StudyError
+        Where it cannot be read, or is empty.
+    """
+    lines = _lines(folder, file)
+    if not lines:
+        raise StudyError(f"{file} holds no numbers")
+    separator = next((mark for mark in (";", "\t") if mark in lines[0][1]), ",")
+    try:
+        return [
+            (number, [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]) for number, line in lines
+        ]
+    except csv.Error as error:
+        raise StudyError(f"{file} is no CSV file: {error}") from None
 
 
 def _number(text: str) -> float | None:

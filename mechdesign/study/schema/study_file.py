@@ -8,9 +8,11 @@ from typing import Annotated, Any
 
 from mechdesign.errors import Problem, StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
 from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
@@ -33,6 +35,8 @@ class StudyFile(fields.Model):
     optimize: OptimizeSection | None = None
     reliability: ReliabilitySection | None = None
     stiffness: StiffnessSection | None = None
+    matrix: MatrixSection | None = None
+    sensitivities: SensitivitiesSection | None = None
     requirements: tuple[Requirement, ...] = ()
     """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts. Example: [{result:
     kinematics.mu, abs: true, at_least: 40}, {result: reliability.reliability, where: {method: monte_carlo}, at_least:
@@ -143,4 +147,33 @@ def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> 
             return key, rest[length:]
     if schema_fields(StudyFile, path):
         return rest[0], rest[1:]
+    if len(rest) > 1 and _INDEX.fullmatch(rest[-1]):
+        place, hint = dotted([*path, *rest[:-1]]), suggestion(rest[0], data)
+        raise StudyError([Problem(f"there is no {place} to have a {rest[-1]!r}{hint}", file=label)])
     return ".".join(rest), []
+
+
+def entry(data: Any, name: str) -> KeyPath:
+    """The path of an entry that a study has, or leaves to its default, by the dotted name that ``--set`` takes.
+
+    Raises
+    ------
+    StudyError
+        If it has none: a name there would be a new one.
+    """
+    segments = name.split(".")
+    if not all(segments) or len(name) > MAX_NAME:
+        raise StudyError("is no dotted name of an entry, such as mechanism.parameters.r")
+    try:
+        _, path = _descend(Document("", data), segments, "", making=False)
+    except StudyError as error:
+        raise StudyError(error.problems[0].message) from None
+    here = data
+    for k, key in enumerate(path):
+        known = schema_fields(StudyFile, path[:k])
+        if not has(here, key) and key not in known:
+            names = [*known, *(here if isinstance(here, dict) else ())]
+            hint = suggestion(str(key), names) or "; give it a value there first"
+            raise StudyError(f"the study has no {dotted(path[: k + 1])}{hint}")
+        here = (here[key] if has(here, key) else None) or {}
+    return path

@@ -132,7 +132,8 @@ def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
         raise failure(f"{text!r} has a decimal comma; a decimal is written with a point: {text.replace(',', '.')}")
     expression = context.expression(text)
     for name in sorted(expression.names - set(context.parameters)):
-        raise failure(f"unknown name {name!r} in {shown(text)}{_known_names(name, context)}")
+        hint = _known_names(name, context)
+        raise failure(f"unknown name {name!r} in {shown(text)}{hint}")
     return StudyNumber(float(expression.evaluate(context.parameters)), expression if expression.names else None)
 
 

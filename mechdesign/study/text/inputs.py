@@ -80,3 +80,5 @@ def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[Ke
     for name, raw in ((data.get("reliability") or {}).get("dimensions") or {}).items():
         if isinstance(raw, Mapping) and isinstance(raw.get("measured"), str):
             yield ("reliability", "dimensions", name, "measured"), raw["measured"]
+    if isinstance(cases := (data.get("matrix") or {}).get("cases"), str):
+        yield ("matrix", "cases"), cases

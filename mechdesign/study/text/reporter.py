@@ -17,8 +17,6 @@ from mechdesign.study.text.units import QUANTITY, QuantityError, measure
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
-# Keys that come with a later release, wherever they stand.
-LATER = ("matrix",)
 # What is expected where pydantic says of which type an error is.
 _EXPECTED = defaultdict(
     lambda: "something else",
@@ -39,7 +37,7 @@ _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 def unknown_key(name: str, known: Iterable[str]) -> str:
     """Say that a key is not known, and which one may be meant."""
-    return "is not available in this version" if name in LATER else f"unknown key{suggestion(name, known)}"
+    return f"unknown key{suggestion(name, known)}"
 
 
 class Reporter:
@@ -50,6 +48,7 @@ class Reporter:
         # In the order found, each once.
         self._problems = dict.fromkeys(document.problems)
         self.warnings: list[Problem] = []
+        self.kinds: dict[KeyPath, str] = {}
 
     @property
     def problems(self) -> list[Problem]:
@@ -81,6 +80,7 @@ class Reporter:
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        self.kinds[path] = kind
         for keys, raw in leaves(self.raw(path)):
             if isinstance(raw, str) and QUANTITY.fullmatch(raw):
                 try:

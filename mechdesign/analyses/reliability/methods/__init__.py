@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -47,12 +48,12 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
     return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
 
 
-def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult]) -> MethodResult:
-    """What `work` says of each pose; an interrupt keeps the poses that are finished."""
+def pose_by_pose(name: str, task: Task, work: Callable[[Task, Setting], MethodResult]) -> MethodResult:
+    """What `work`, a function of a module, says of each pose; an interrupt keeps the poses that are finished."""
     found = MethodResult(name)
     task.progress.start(len(task.settings), "poses")
     try:
-        for part in map_chunks(work, task.settings, task.jobs):
+        for part in map_chunks(partial(_at, work, task), range(len(task.settings)), task.jobs, travels=True):
             found.add(part)
             task.progress.update(1)
     except KeyboardInterrupt:
@@ -60,8 +61,16 @@ def pose_by_pose(name: str, task: Task, work: Callable[[Setting], MethodResult])
     return found
 
 
-def of_limits(name: str, task: Task, work: Callable[[Setting], Estimate]) -> MethodResult:
-    """What `work` estimates at each pose; nothing where there are no limits."""
+def of_limits(name: str, task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
+    """What `work`, a function of a module, estimates at each pose; nothing where there are no limits."""
     if not task.question.limited:
         return MethodResult(name)
-    return pose_by_pose(name, task, lambda setting: MethodResult(name, {setting.pose: work(setting)}))
+    return pose_by_pose(name, task, partial(_estimated, name, work))
+
+
+def _at(work: Callable[[Task, Setting], MethodResult], task: Task, place: int) -> MethodResult:
+    return work(task, task.settings[place])
+
+
+def _estimated(name: str, work: Callable[[Task, Setting], Estimate], task: Task, setting: Setting) -> MethodResult:
+    return MethodResult(name, {setting.pose: work(task, setting)})

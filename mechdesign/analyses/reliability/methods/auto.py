@@ -36,29 +36,28 @@ def rungs() -> dict[str, Rung]:
 
 def run(task: Task) -> MethodResult:
     """Plain samples first, then the steps, until one is precise enough."""
-    steps = rungs()
+    return pose_by_pose("auto", task, _at_pose)
 
-    def work(setting: Setting) -> MethodResult:
-        drawn: list[Sums] = []
 
-        def plain(count: int) -> Estimate:
-            while (have := sum(part.samples for part in drawn)) < count:
-                # The first chunk is the pilot, the following ones are whole.
-                size = min(PILOT if not drawn else FEW, count - have)
-                drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
-            return Sums.total(drawn).estimate
+def _at_pose(task: Task, setting: Setting) -> MethodResult:
+    drawn: list[Sums] = []
 
-        if not task.question.limited:
-            plain(min(FEW, task.most))
-            return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
-        rng = generator(task.seed, setting.pose, SEARCH, 2)
-        # Where nothing else helps, plain samples are as many in all.
-        problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
-        estimate, used, said = climb(problem, task.precision, plain, steps, rng, task.most, shared)
-        pose = setting.pose
-        return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: said})
+    def plain(count: int) -> Estimate:
+        while (have := sum(part.samples for part in drawn)) < count:
+            # The first chunk is the pilot, the following ones are whole.
+            size = min(PILOT if not drawn else FEW, count - have)
+            drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
+        return Sums.total(drawn).estimate
 
-    return pose_by_pose("auto", task, work)
+    if not task.question.limited:
+        plain(min(FEW, task.most))
+        return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
+    rng = generator(task.seed, setting.pose, SEARCH, 2)
+    # Where nothing else helps, plain samples are as many in all.
+    problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
+    estimate, used, said = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
+    pose = setting.pose
+    return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: said})
 
 
 def climb(

@@ -39,12 +39,12 @@ _LEAST_SHARE = 0.02
 
 def run(task: Task) -> MethodResult:
     """Of every pose."""
+    return of_limits("form", task, _at_pose)
 
-    def work(setting: Setting) -> Estimate:
-        problem = problem_of(setting, task.sources)
-        return form(problem, find(problem, generator(task.seed, setting.pose, SEARCH, 0)))
 
-    return of_limits("form", task, work)
+def _at_pose(task: Task, setting: Setting) -> Estimate:
+    problem = problem_of(setting, task.sources)
+    return form(problem, find(problem, generator(task.seed, setting.pose, SEARCH, 0)))
 
 
 def rung(

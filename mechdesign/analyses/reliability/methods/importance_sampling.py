@@ -64,19 +64,19 @@ _MAX_LOG_DENSITY = 600.0
 
 def run(task: Task) -> MethodResult:
     """Of every pose; where no failure was seen, plain samples bound what was missed."""
+    return of_limits("importance_sampling", task, _at_pose)
 
-    def work(setting: Setting) -> Estimate:
-        problem = problem_of(setting, task.sources)
-        rng = generator(task.seed, setting.pose, SEARCH, 1)
-        found = importance_sampling(problem, find(problem, rng), rng, task.samples)
-        if found.failures:
-            return found
-        sums: dict[int, Sums] = {}
-        simulate([setting], task.sources, task.seed, task.samples, sums)
-        found = sums[setting.pose].estimate
-        return replace(found, evaluations=found.evaluations + problem.evaluations)
 
-    return of_limits("importance_sampling", task, work)
+def _at_pose(task: Task, setting: Setting) -> Estimate:
+    problem = problem_of(setting, task.sources)
+    rng = generator(task.seed, setting.pose, SEARCH, 1)
+    found = importance_sampling(problem, find(problem, rng), rng, task.samples)
+    if found.failures:
+        return found
+    sums: dict[int, Sums] = {}
+    simulate([setting], task.sources, task.seed, task.samples, sums)
+    found = sums[setting.pose].estimate
+    return replace(found, evaluations=found.evaluations + problem.evaluations)
 
 
 def importance_sampling(

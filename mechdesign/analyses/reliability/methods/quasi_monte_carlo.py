@@ -25,26 +25,26 @@ _FEW_FAILURES = 200
 
 def run(task: Task) -> MethodResult:
     """About as many points as asked at each pose."""
+    return pose_by_pose(NAME, task, _at_pose)
+
+
+def _at_pose(task: Task, setting: Setting) -> MethodResult:
     sources, counts = task.sources, replicates(task.samples)
-
-    def work(setting: Setting) -> MethodResult:
-        seeds = generator(task.seed, setting.pose, QUASI, 0).integers(2**62, size=len(counts))
-        parts: list[list[Sums]] = []
-        for count, seed in zip(counts, seeds.tolist(), strict=True):
-            begun = sum(map(len, parts))
-            parts.append([
-                sums_of(replace(setting, scale=None), sources.made(sources.at(u)), u.shape[1], begun + block)
-                for block, u in enumerate(points(len(sources.owners), count, seed))
-            ])  # fmt: skip
-        total = Sums.total([part for replicate in parts for part in replicate])
-        # Points that are spread evenly have no trend.
-        found = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
-        if task.question.limited:
-            broken = [sum(part.failures for part in replicate) for replicate in parts]
-            found.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)
-        return found
-
-    return pose_by_pose(NAME, task, work)
+    seeds = generator(task.seed, setting.pose, QUASI, 0).integers(2**62, size=len(counts))
+    parts: list[list[Sums]] = []
+    for count, seed in zip(counts, seeds.tolist(), strict=True):
+        begun = sum(map(len, parts))
+        parts.append([
+            sums_of(replace(setting, scale=None), sources.made(sources.at(u)), u.shape[1], begun + block)
+            for block, u in enumerate(points(len(sources.owners), count, seed))
+        ])  # fmt: skip
+    total = Sums.total([part for replicate in parts for part in replicate])
+    # Points that are spread evenly have no trend.
+    found = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
+    if task.question.limited:
+        broken = [sum(part.failures for part in replicate) for replicate in parts]
+        found.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)
+    return found
 
 
 def replicates(samples: int) -> list[int]:

@@ -6,8 +6,9 @@ error = f0 + a z + z H z / 2 for deviations z of all that varies; mean and covar
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -71,15 +72,19 @@ def run(task: Task) -> MethodResult:
     steps = step_sizes(task.sources, np.sqrt(np.diagonal(law.covariance)))
     mean = np.full(task.nominal.shape, np.nan)
     covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
-
-    def work(setting: Setting) -> tuple[Floats, Floats]:
-        return quadratic(setting, task.sources, steps).moments(law)
-
     task.progress.start(len(task.settings), "poses")
-    for setting, (middle, spread) in zip(task.settings, map_chunks(work, task.settings, task.jobs), strict=True):
+    work = partial(_moments, task.settings, task.sources, steps, law)
+    found = map_chunks(work, range(len(task.settings)), task.jobs, travels=True)
+    for setting, (middle, spread) in zip(task.settings, found, strict=True):
         mean[:, setting.pose], covariance[setting.pose] = middle, spread
         task.progress.update(1)
     return normal("second_order", task, mean, covariance)
+
+
+def _moments(
+    settings: Sequence[Setting], sources: Sources, steps: Floats, law: Cumulants, place: int
+) -> tuple[Floats, Floats]:  # fmt: skip
+    return quadratic(settings[place], sources, steps).moments(law)
 
 
 def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:

@@ -1,0 +1,179 @@
+"""One pass over all poses of a motion: of a long one, what stays in memory are those poses that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, followed_stride, move, pieces
+from mechdesign.analyses.kinematics.targets import Error
+from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.progress import Progress
+from mechdesign.results import LongTable, Table
+
+# Of a long sweep that needs more poses than this to follow it, what lies between its poses is not looked at.
+MOST_FOLLOWED = 1 << 18
+# Which poses of a motion something is to be said of, by what it is.
+Marks = Callable[[Motion], Mapping[str, Flags]]
+
+
+class Mark(NamedTuple):
+    """How many poses something is to be said of, and the row of the first."""
+
+    number: int
+    first: int
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """What is known of a motion after one pass over all its poses.
+
+    Attributes
+    ----------
+    motion : Motion
+        Of all poses; of a long motion of those with the extremes of each column, those where validity or the sign of
+        the determinant changes, and as many between as a picture and the search between the poses need.
+    shown : Shown
+        The poses that a picture shows, of those of the motion.
+    reason : int8 array, shape (poses,)
+        Of all poses; see `mechdesign.mechanism.Reason`.
+    marks : mapping of str to Mark
+        What is to be said of how many of all poses.
+    sums : ndarray
+        `mechdesign.analyses.kinematics.targets.totals` of all poses.
+    followed : bool
+        Whether the poses of the motion are near enough to each other to follow it between them.
+    """
+
+    question: MotionQuestion
+    motion: Motion
+    shown: Shown
+    reason: NDArray[np.int8]
+    marks: Mapping[str, Mark]
+    sums: Floats
+    followed: bool = True
+
+    @property
+    def long(self) -> bool:
+        """Whether the motion has not all poses."""
+        return self.motion.question is not self.question
+
+    def table(self, make: Callable[[Motion], Table], jobs: int | None) -> Table:
+        """A table with a row a pose; of a long motion its rows are made anew where they are wanted."""
+        like = make(self.motion)
+        return LongTable(like, self.question.poses.count, partial(self.blocks, make, jobs)) if self.long else like
+
+    def blocks(self, make: Callable[[Motion], Table], jobs: int | None) -> Iterator[Table]:
+        """A table with a row a pose in parts."""
+        return (make(motion) for _, motion in pieces(self.question, jobs))
+
+
+def pass_over(
+    question: MotionQuestion, swept: str | None, marks: Marks, progress: Progress, jobs: int | None
+) -> Passage:  # fmt: skip
+    """Solve every pose of a question once; `swept` is the coordinate that moves along a sweep.
+
+    Raises
+    ------
+    MechanismError
+        If a pose's coordinates do not determine the mechanism.
+    """
+    poses, keeper = question.poses, Keeper(question.study, question.poses)
+    if not _is_long(question):
+        motion = move(question, progress, jobs, also=keeper.keep)
+        found = {name: _mark(where, 0) for name, where in marks(motion).items()}
+        sums = targets.totals(motion.errors, poses.designs, motion.valid)
+        return Passage(question, motion, keeper.shown, motion.reason, found, sums)
+    stride = followed_stride(question.study, poses, swept) if swept is not None else poses.count
+    followed = poses.count // stride <= MOST_FOLLOWED
+    picked = _Picked(question, stride if followed else poses.count // MOST_FOLLOWED, keeper.rows)
+    reason, told, sums = np.empty(poses.count, dtype=np.int8), dict[str, Mark](), np.zeros(())
+    for solved, motion in pieces(question, jobs):
+        reason[solved.rows] = motion.reason
+        begin = int(solved.rows[0])
+        for name, where in marks(motion).items():
+            new, old = _mark(where, begin), told.get(name, Mark(0, -1))
+            told[name] = Mark(old.number + new.number, old.first if old.number else new.first)
+        sums = sums + targets.totals(motion.errors, 1, motion.valid)
+        picked.add(begin, motion)
+        keeper.keep(solved)
+        progress.update(len(solved.rows))
+    motion, shown = picked.motion(), keeper.shown
+    assert motion.question.poses.rows is not None
+    rows = np.searchsorted(motion.question.poses.rows, shown.rows)
+    return Passage(
+        question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, told, sums, followed
+    )  # fmt: skip
+
+
+def _is_long(question: MotionQuestion) -> bool:
+    """Whether poses are too many to be held with all their columns, and all of one kind and one design."""
+    poses = question.poses
+    each = any(t.table is not None and len(t.table) == poses.count for t in question.study.targets.values())
+    single = len(poses.groups) == 1 and poses.designs == 1 and not poses.regions
+    return poses.count > POSES_AT_ONCE and single and not poses.listed and not each
+
+
+def _mark(where: Flags, begin: int) -> Mark:
+    return Mark(int(np.count_nonzero(where)), begin + int(where.argmax()))
+
+
+@dataclass
+class _Picked:
+    """Those poses of a long motion that stay in memory: every so many, the ones shown, and where something changes."""
+
+    question: MotionQuestion
+    stride: int
+    shown: Ints
+    _rows: list[Ints] = field(default_factory=list)
+    _motions: list[Motion] = field(default_factory=list)
+
+    def add(self, begin: int, motion: Motion) -> None:
+        """Take over the poses of the next piece, which begins with the row `begin`."""
+        rows = begin + np.arange(len(motion.reason))
+        some = (rows % self.stride == 0) | np.isin(rows, self.shown)
+        # Changes between two pieces lie between their ends.
+        some[[0, -1]] = True
+        _beside(some, motion.valid[1:] != motion.valid[:-1])
+        if "det_J" in motion.arrays:
+            with np.errstate(invalid="ignore"):
+                _beside(some, (motion.arrays["det_J"][1:] > 0) != (motion.arrays["det_J"][:-1] > 0))
+        for values in [*motion.arrays.values(), *(error.values for error in motion.errors)]:
+            known = motion.valid & np.isfinite(values)
+            if known.any():
+                low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
+                some[[low.argmin(), high.argmax(), known.argmax()]] = True
+        kept = np.flatnonzero(some)
+        errors = [Error(error.output, error.quantity, error.values[kept]) for error in motion.errors]
+        arrays = {name: values[kept] for name, values in motion.arrays.items()}
+        self._rows.append(rows[kept])
+        self._motions.append(Motion(self.question, arrays, motion.reason[kept], errors, motion.smooth[kept]))
+
+    def motion(self) -> Motion:
+        """The motion of all poses that were kept."""
+        parts = self._motions
+        poses = self.question.poses.take(np.concatenate(self._rows))
+        return Motion(
+            replace(self.question, poses=poses),
+            {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays},
+            np.concatenate([part.reason for part in parts]),
+            [
+                replace(error, values=np.concatenate([part.errors[k].values for part in parts]))
+                for k, error in enumerate(parts[0].errors)
+            ],
+            np.concatenate([part.smooth for part in parts]),
+            self.stride,
+        )
+
+
+def _beside(some: Flags, changes: Flags) -> None:
+    """Keep the poses on both sides of changes."""
+    some[1:] |= changes
+    some[:-1] |= changes

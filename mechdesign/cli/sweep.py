@@ -1,0 +1,95 @@
+"""`sweep`: the cases of a matrix that the study or the command line gives."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mechdesign.cli.batch import failure
+from mechdesign.cli.execution import ask
+from mechdesign.cli.options import Options
+from mechdesign.cli.summary import junit
+from mechdesign.errors import Interrupted, Problem, StudyError
+from mechdesign.report.writer import write_file
+from mechdesign.study.schema.matrix import RANGE
+from mechdesign.study.text.document import read
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """What the options say of the cases; what is left out is the study's."""
+
+    vary: Sequence[str] | None = None
+    method: str | None = None
+    samples: int | None = None
+    cases: Path | None = None
+    results: Sequence[str] | None = None
+
+    def overrides(self, study: Path | None) -> Iterator[str]:
+        """The same as changes of the section ``matrix``; of other cases nothing of the study's design stays.
+
+        Raises
+        ------
+        StudyError
+            If a text is no entry with its values, or both entries and a file are given.
+        """
+        if self.vary and self.cases is not None:
+            raise StudyError("--vary and --cases contradict each other: the cases of a file are as they are")
+        if self.vary or self.cases is not None:
+            yield from (f"matrix.{key}=" for key in ("vary", "method", "samples", "cases"))
+        if self.vary:
+            yield f"matrix.vary={json.dumps(dict(map(_varied, self.vary)))}"
+        if self.cases is not None:
+            beside = study.parent if study is not None else Path()
+            yield f"matrix.cases={json.dumps(os.path.relpath(self.cases, beside))}"
+        if self.method is not None:
+            yield f"matrix.method={json.dumps(self.method)}"
+        if self.samples is not None:
+            yield f"matrix.samples={self.samples}"
+        if self.results:
+            names = [name.strip() for each in self.results for name in each.split(",")]
+            yield f"matrix.results={json.dumps(names)}"
+
+
+def _varied(text: str) -> tuple[str, Any]:
+    """An entry and its values: a range, or a list of which commas stand between."""
+    name, separator, values = text.partition("=")
+    name, values = name.strip(), values.strip()
+    label = f"--vary {text}"
+    if not separator or not name or not values:
+        raise StudyError([Problem("is <dotted name>=START:STOP:STEP, =LOW:HIGH or =VALUE,VALUE,...", file=label)])
+    if RANGE.fullmatch(values):
+        return name, values
+    listed = read(f"[{values}]".encode(errors="surrogateescape"), label)
+    if listed.problems:
+        raise StudyError(listed.problems)
+    return name, listed.data
+
+
+def _as_typed(error: StudyError) -> StudyError:
+    """The same mistakes under the options that say what `Matrix.overrides` made of them."""
+    written = re.compile(r"--set matrix\.(\w+)=.*")
+    return StudyError([replace(each, file=written.sub(r"--\1", each.file)) for each in error.problems])
+
+
+def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
+    """Answer the cases of a study; returns the exit code, the highest of them all."""
+    given = None
+    try:
+        changes = (*(options.overrides or ()), *matrix.overrides(path))
+        given = ask("sweep", path, replace(options, overrides=changes))
+        return given.exit_code
+    except Interrupted:
+        raise
+    except Exception as wrong:
+        error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
+        given = failure(path.stem if path is not None else "study", "sweep", Path(), error)
+        return given.exit_code
+    finally:
+        if options.junit is not None and given is not None:
+            write_file(options.junit, junit([given]).encode())

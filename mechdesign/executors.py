@@ -1,0 +1,154 @@
+"""Executors by name, as `--executor` takes them: of dask, or what a function of a module gives."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import socket
+import sys
+import time
+from concurrent.futures import Executor
+from itertools import chain
+from typing import Any
+from urllib.parse import urlsplit
+
+from mechdesign.courier import Pool
+from mechdesign.errors import StudyError, counted
+from mechdesign.parallel import worker_count
+
+LOCAL = "local"
+_PORT = 8786  # of a scheduler, where none is said
+# Seconds that the address of a scheduler may take to answer, and its first worker to come.
+_ANSWERS = 10
+_FIRST_WORKER = 60
+# Of a scheduler that is started here: its clocks and profiles would take a twentieth of each processor.
+_OWN = {
+    "distributed.scheduler.allowed-failures": 0,  # a chunk that ends its worker is found here
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.tick.cycle": "10s",
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.work-stealing-interval": "1s",
+}
+# Seconds after which the workers of a scheduler are counted again.
+_RECOUNT = 5.0
+
+
+def named(name: str, jobs: int | None) -> Pool:
+    """Workers of ``dask:ADDRESS``, of ``dask:local``, or of the executor that ``module:factory`` gives.
+
+    Parameters
+    ----------
+    jobs : int or None
+        Number of workers, where the executor does not say that itself; None: as many as processors.
+
+    Raises
+    ------
+    StudyError
+        If there is no such executor, or nobody answers.
+    """
+    kind, colon, rest = name.partition(":")
+    if not kind or not colon or not rest:
+        raise StudyError(f"--executor takes dask:ADDRESS, dask:{LOCAL} or module:factory, not {name!r}")
+    return _Dask(name, rest, jobs) if kind == "dask" else _of_module(name, kind, rest, jobs)
+
+
+def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
+    # As for `python -m`: a module in the working directory is found.
+    sys.path.insert(0, os.getcwd())
+    try:
+        found = getattr(importlib.import_module(module), factory)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise StudyError(f"--executor {name}: {error}") from None
+    finally:
+        sys.path.pop(0)
+
+    def open_() -> Executor:
+        try:
+            executor = found()
+        except Exception as error:
+            raise StudyError(f"--executor {name}: {type(error).__name__}: {error}") from None
+        if not isinstance(executor, Executor):
+            kind = type(executor).__name__
+            raise StudyError(f"--executor {name} gives no concurrent.futures.Executor, but {kind!r}")
+        return executor
+
+    first = open_()
+    # Those of the standard library say how many workers they have.
+    width = worker_count(jobs) if jobs is not None else getattr(first, "_max_workers", worker_count(None))
+    opened = chain([first], iter(open_, None))
+    return Pool(lambda: next(opened), width)
+
+
+class _Dask(Pool):
+    """Workers of a scheduler of dask, which replaces those that are lost; or of one that is started here."""
+
+    def __init__(self, name: str, address: str, jobs: int | None) -> None:
+        try:
+            distributed: Any = importlib.import_module("distributed")
+        except ImportError:
+            message = "needs dask, which is not installed: pip install 'mechdesign[cluster]'"
+            raise StudyError(f"--executor {name} {message}") from None
+        self._cluster: Any = None
+        try:
+            if address == LOCAL:
+                with importlib.import_module("dask").config.set(_OWN):
+                    self._cluster = distributed.LocalCluster(
+                        n_workers=worker_count(jobs),
+                        threads_per_worker=1,
+                        dashboard_address="127.0.0.1:0",
+                        silence_logs=50,
+                        preload=[__name__],
+                    )
+            else:
+                _knock(address)
+            self._client: Any = distributed.Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
+        except (OSError, ValueError, RuntimeError) as error:
+            self._end()
+            what = "no cluster starts" if address == LOCAL else "no scheduler answers there"
+            raise StudyError(f"--executor {name}: {what}: {error}") from None
+        try:
+            self._client.wait_for_workers(1, timeout=_FIRST_WORKER)
+        except TimeoutError:
+            self.close()
+            message = f"the scheduler has no workers after {counted(_FIRST_WORKER, 'second')}; start some"
+            raise StudyError(f"--executor {name}: {message}") from None
+        self._counted, self._threads = -_RECOUNT, 1
+        if address != LOCAL:
+            # It has tried several workers.
+            self.losses = 0
+        self.executor = self._client.get_executor(pure=False)
+
+    @property
+    def width(self) -> int:
+        """Number of threads of the workers, which come and go."""
+        if time.monotonic() - self._counted > _RECOUNT:
+            self._threads = max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic()
+        return self._threads
+
+    def renew(self) -> None:
+        """The scheduler takes other workers itself."""
+
+    def close(self) -> None:
+        """Drop the tasks and leave the scheduler; one that was started here ends."""
+        self._client.close()
+        self._end()
+
+    def _end(self) -> None:
+        if self._cluster is not None:
+            self._cluster.close()
+
+
+def _knock(address: str) -> None:
+    """Whether anybody answers, found out sooner than by a client that tries again and again."""
+    place = urlsplit(address if "://" in address else f"tcp://{address}")
+    with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS) as stream:
+        # A scheduler speaks first.
+        if place.scheme == "tcp" and not stream.recv(1):
+            raise OSError("it does not answer as one")
+
+
+def dask_setup(worker: object) -> None:
+    """In a worker of a scheduler that was started here: an interrupt is the command's to handle."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

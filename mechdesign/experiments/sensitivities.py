@@ -1,0 +1,215 @@
+"""The question ``sensitivities``: derivatives of results with respect to numbers of the study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from pydantic_core import PydanticCustomError
+
+from mechdesign.commands import SENSITIVITIES
+from mechdesign.errors import Problem, StudyError
+from mechdesign.experiments.analysis import unit_of
+from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee
+from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.differences import STEPS, slope
+from mechdesign.parallel import one_thread
+from mechdesign.progress import NULL, Progress
+from mechdesign.results import Column, Result, Table
+from mechdesign.rows import IN_UNIT
+from mechdesign.study import Study
+from mechdesign.study.schema.sensitivities import Changed
+from mechdesign.study.schema.study_file import entry
+from mechdesign.study.text.document import dotted, has
+from mechdesign.study.text.fields import Context, read_number, shown
+from mechdesign.study.text.units import Units
+
+# Largest change where the study names none, as a part of the value.
+_PART = 0.01
+# A derivative is told as uncertain from this relative error on, unless so little of the result hangs on it.
+_UNCERTAIN, _NOTHING = 0.01, 1e-9
+
+
+@dataclass(frozen=True)
+class Changing:
+    """A number of the study that changes."""
+
+    given: str  # as the study names it
+    name: str  # of the entry
+    value: float
+    step: float  # the largest
+    unit: str
+
+    def cases(self) -> Iterator[Case]:
+        """The study with less of it by each step, and with more."""
+        for sign in (-1, 1):
+            yield from (Case.of({self.name: self.value + sign * each}) for each in (self.step * STEPS).tolist())
+
+
+def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
+    """The results and the numbers that change; nothing is computed but a look at the study.
+
+    Raises
+    ------
+    StudyError
+        If there is no section, a name is unknown, or a parameter is no number that can change by itself.
+    """
+    section = study.sensitivities
+    if section is None:
+        raise StudyError(
+            "sensitivities need a section of that name, e.g. sensitivities: {results: [GII], parameters: [r]}"
+        )
+    wanted = [
+        Wanted(each.result, tuple(each.where.items()), ("sensitivities", "results", k))
+        for k, each in enumerate(section.results)
+    ]
+    found: list[Changing] = []
+    problems: list[Problem] = []
+    for k, each in enumerate(section.parameters):
+        try:
+            changing = _changing(study, each)
+            if changing.name in [other.name for other in found]:
+                raise StudyError(f"{changing.given} is listed twice")
+            found.append(changing)
+        except StudyError as error:
+            problems.append(study.problem(error.problems[0].message, "sensitivities", "parameters", k))
+    if problems:
+        raise StudyError(problems)
+    foresee(study, wanted)
+    return wanted, found
+
+
+def _changing(study: Study, each: Changed) -> Changing:
+    given = each.parameter
+    path = entry(study.resolved, f"mechanism.parameters.{given}" if given in study.parameters.nominal else given)
+    raw: Any = study.resolved
+    for key in path:
+        raw = raw[key] if has(raw, key) else None
+    if raw is None:
+        raise StudyError(f"{given} is left to its default; give it a value in the study first")
+    try:
+        number = read_number(raw, Context(study.units, study.parameters.nominal))
+    except PydanticCustomError:
+        raise StudyError(f"{given} is {shown(raw)}, and only a number can change a little") from None
+    if number.expression is not None:
+        raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
+    if each.step is None and number.nominal == 0:
+        raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
+    step = _PART * abs(number.nominal) if each.step is None else each.step
+    name = dotted(path)
+    return Changing(given, name, number.nominal, step, unit_of(study, name))
+
+
+@one_thread()
+def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
+    """Differentiate results of a study by central differences.
+
+    Parameters, tables and errors are told at `mechdesign.sensitivities`, the door to it.
+    """
+    if seed is not None:
+        study = replace(study, seed=seed, resolved=study.resolved | {"seed": seed})
+    wanted, numbers = prepared(study)
+    judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
+    plain = replace(study, requirements=(), resolved=judged_by_none)
+    cases = [Case(()), *(case for each in numbers for case in each.cases())]
+    progress.start(len(cases), "cases")
+    found: list[Answered] = []
+    for answered in answers(plain, cases, wanted, jobs=jobs):
+        found.append(answered)
+        progress.update(1)
+    rows = list(_rows(wanted, numbers, found))
+    table = _table(rows, [each.unit for each in found[0].numbers], numbers)
+    counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
+    failed = f"the study itself has no answer: {found[0].failed}" if found[0].failed else ""
+    doubts = tuple(f"{row.result} by {row.parameter}: {row.doubt}" for row in rows if row.doubt)
+    return Result(SENSITIVITIES.name, {table.name: table}, doubts, counts, failed)
+
+
+@dataclass(frozen=True)
+class Row:
+    """The derivative of a result by a number."""
+
+    result: str
+    parameter: str
+    value: float
+    at: float
+    derivative: float
+    error: float
+    below: float
+    above: float
+    doubt: str  # why it is not known, or not well
+
+    @property
+    def elasticity(self) -> float:
+        """Change of the result, in % of its size, for 1 % of the number's size more; nan where either is zero."""
+        return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
+
+
+def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence[Answered]) -> Iterator[Row]:
+    middle = _values(found[:1])[0]
+    sides = _chunks(found[1:], len(STEPS))
+    slopes = {}
+    beside = {}
+    for each in numbers:
+        pair = list(islice(sides, 2))
+        slopes[each.name] = slope(middle, _values(pair[0]), _values(pair[1]), each.step)
+        beside[each.name] = next((one.failed for side in pair for one in side if one.failed), "")
+    for k, result in enumerate(wanted):
+        for each in numbers:
+            value, error, below, above = (float(part[k]) for part in slopes[each.name])
+            scale = abs(middle[k]) * _NOTHING / each.step
+            doubt = ""
+            if not math.isnan(below):
+                doubt = f"has a kink here; its slope is {below:.6g} below {each.value:g} and {above:.6g} above"
+            elif math.isnan(value):
+                doubt = f"is not known near {each.value:g}: {beside[each.name] or found[0].failed or 'it is nan there'}"
+            elif error > max(_UNCERTAIN * abs(value), scale):
+                doubt = (
+                    f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
+                    f"(few samples); another step may help, {{parameter: {each.given}, step: {10 * each.step:g}}}"
+                )
+            yield Row(result.title, each.given, float(middle[k]), each.value, value, error, below, above, doubt)
+
+
+def _values(found: Sequence[Answered]) -> Floats:
+    return np.array([[number.value for number in each.numbers] for each in found])
+
+
+def _chunks(found: Sequence[Answered], size: int) -> Iterator[Sequence[Answered]]:
+    return (found[k : k + size] for k in range(0, len(found), size))
+
+
+def _table(rows: Sequence[Row], result_units: Sequence[str], numbers: Sequence[Changing]) -> Table:
+    units = [unit for unit in result_units for _ in numbers]
+    by = [each.unit for _ in result_units for each in numbers]
+    ratio = [Units.ratio(one, other) for one, other in zip(units, by, strict=True)]
+
+    def of(name: str) -> Floats:
+        return np.array([getattr(row, name) for row in rows], dtype=float)
+
+    columns = (
+        Column("result", np.array([row.result for row in rows]), "", "result of the study"),
+        Column("parameter", np.array([row.parameter for row in rows]), "", "number of the study that changes"),
+        Column(
+            "derivative", of("derivative"), "",
+            f"of the result with respect to the parameter, {IN_UNIT}; nan at a kink and where it is not known",
+        ),
+        Column("error", of("error"), "", f"error estimate of the derivative, {IN_UNIT}"),
+        Column("unit", np.array(ratio), "", "unit of the derivative, as far as the study tells that of the parameter"),
+        Column(
+            "elasticity", of("elasticity"), "",
+            "change of the result, in % of its size, for 1 % of the parameter's size more; nan where either is 0",
+        ),
+        Column("below", of("below"), "", f"slope below a kink, {IN_UNIT}; else nan"),
+        Column("above", of("above"), "", f"slope above a kink, {IN_UNIT}; else nan"),
+        Column("value", of("value"), "", "the result, in its own unit"),
+        Column("value_unit", np.array(units), "", "unit of the result"),
+        Column("at", of("at"), "", "the parameter, in its own unit"),
+        Column("at_unit", np.array(by), "", "unit of the parameter; empty where the study does not tell it"),
+        Column("settled", np.array([not row.doubt for row in rows]), "", "1 where the differences agree"),
+    )  # fmt: skip
+    return Table("sensitivities", columns, "derivatives of results with respect to numbers of the study")

@@ -1,0 +1,137 @@
+"""Derivatives of results against closed forms and the tables of other questions; what is no derivative is told."""
+
+import numpy as np
+import pytest
+
+import mechdesign
+from mechdesign.errors import StudyError
+from mechdesign.numerics.differences import STEPS, slope
+
+SLIDER = """
+mechanism:
+  parameters: {r: 30, l: 100, e: 10}
+  links: {ground: {O: [0, 0], G: [0, e]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [95, 10]}
+kinematics: {poses: [{crank: 60}], outputs: [B.x]}
+sensitivities: {results: [kinematics.B.x], parameters: [r, l, e, kinematics.poses.0.crank]}
+"""
+
+
+def rows(text, *changes):
+    answer = mechdesign.sensitivities(mechdesign.load(text=text, overrides=changes))
+    return answer, answer.main
+
+
+def test_derivatives_of_a_slider_crank_are_its_closed_form():
+    answer, table = rows(SLIDER)
+    r, rod, e, q = 30, 100, 10, np.radians(60)
+    v = r * np.sin(q) - e
+    s = np.sqrt(rod**2 - v**2)
+    exact = np.array(
+        [np.cos(q) - v * np.sin(q) / s, rod / s, v / s, (-r * np.sin(q) - v * r * np.cos(q) / s) * np.pi / 180]
+    )
+    np.testing.assert_allclose(table["derivative"], exact, rtol=1e-9)
+    assert (np.abs(table["derivative"] - exact) <= table["error"] + 1e-14).all()
+    assert table["unit"].tolist() == ["mm/mm", "mm/mm", "mm/mm", "mm/deg"]
+    assert not answer.warnings
+    jacobian = mechdesign.kinematics(mechdesign.load(text=SLIDER)).tables["jacobian"]
+    assert table["derivative"][3] == pytest.approx(np.radians(1) * jacobian["B.x_by_crank"][0], rel=1e-9)
+
+
+def test_they_are_those_of_the_linear_error_model():
+    made = (
+        "reliability: {dimensions: {r: 0.1, l: 0.1, e: 0.1}, poses: [{crank: 60}], outputs: [B.x], limits: {B.x: 0.5},"
+        " methods: [analytic]}"
+    )
+    linear = mechdesign.reliability(mechdesign.load(text=SLIDER + made)).tables["contributions"]
+    _, table = rows(SLIDER)
+    for name in "rle":
+        found = table["derivative"][table["parameter"] == name]
+        np.testing.assert_allclose(found, linear["derivative"][linear["source"] == name], rtol=1e-9)
+
+
+def test_deflection_grows_with_the_load_and_falls_with_the_drive_s_stiffness():
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0]}, beam: [O, P, 400]}
+  drives: {q: {angle: beam}}
+  sketch: {P: [400, 0]}
+stiffness: {at: P, actuators: {q: 4.0e+7}, poses: [{q: 30}], loads: [[0, -60]]}
+sensitivities:
+  results: [stiffness.deflections.dy]
+  parameters: [stiffness.loads.0.1, stiffness.actuators.q]
+"""
+    _, table = rows(text)
+    deflection = -60 * (400 * np.cos(np.radians(30))) ** 2 / 4e7
+    np.testing.assert_allclose(table["value"], deflection, rtol=1e-12)
+    np.testing.assert_allclose(table["derivative"], [deflection / -60, -deflection / 4e7], rtol=1e-8)
+    # A larger load bends it further down, stiffer gears less.
+    np.testing.assert_allclose(table["elasticity"], [1, 1], rtol=1e-8)
+    assert table["unit"].tolist() == ["mm/N", "mm/(N*mm/rad)"]
+
+
+def differences(function, at, step):
+    """What `slope` finds of a function of an array."""
+    places = at + step * np.array([[0], [-1], [1]]) * STEPS
+    middle, below, above = function(places)
+    return slope(middle[:1], below[:, None], above[:, None], step)
+
+
+@pytest.mark.parametrize(
+    ("function", "exact"),
+    [
+        (np.sin, np.cos(0.7)),
+        (np.exp, np.exp(0.7)),
+        (lambda x: 1 / (0.72 - x), 1 / 0.02**2),
+        (np.ones_like, 0.0),
+    ],
+)
+def test_a_slope_is_within_its_error(function, exact):
+    found = differences(function, 0.7, 0.007)
+    assert abs(found.value[0] - exact) <= found.error[0] + 1e-15
+    assert found.error[0] <= 1e-3 * abs(exact) + 1e-12
+
+
+def test_a_kink_has_two_slopes_and_no_derivative():
+    found = differences(lambda x: np.where(x < 2, 3 * (x - 2) ** 2 - 2 * x, 3 * x - 10), 2.0, 0.02)
+    assert np.isnan(found.value[0])
+    assert (found.below[0], found.above[0]) == pytest.approx((-2, 3), rel=1e-6)
+
+
+def test_counts_of_samples_are_not_taken_for_a_smooth_result():
+    """A piecewise constant result has a slope of 0 at small steps; its own is that over many of its parts."""
+    random = np.random.default_rng(4)
+    places = np.sort(random.uniform(-1, 1, 20_000))
+    covered = 0
+    for at in random.uniform(-0.5, 0.5, 50):
+        found = differences(lambda x: np.searchsorted(places, x) / 10_000, at, 0.01)
+        assert found.error[0] > 0.01
+        covered += abs(found.value[0] - 1.0) <= found.error[0]
+    assert covered >= 40
+
+
+def test_what_is_no_derivative_is_told():
+    answer, table = rows(
+        SLIDER, "sensitivities.parameters=[l]", "mechanism.parameters.l=20.1", "kinematics.poses=[{crank: 91}]"
+    )
+    assert np.isnan(table["derivative"][0])
+    assert "is not known near 20.1" in answer.warnings[0]
+    assert "cannot be assembled" in answer.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("sensitivities.parameters=[rr]", "rr"),
+        ("sensitivities.parameters=[mechanism.drives]", "only a number"),
+        ("sensitivities.results=[kinematics.C.x]", "C.x"),
+        ("sensitivities.results=[]", "names nothing"),
+        ("sensitivities.parameters=[r, mechanism.parameters.r]", "listed twice"),
+        ("mechanism.parameters.e=0", "say by how much"),
+    ],
+)
+def test_mistakes_are_told_before_anything_is_computed(change, message):
+    with pytest.raises(StudyError, match=message):
+        mechdesign.sensitivities(mechdesign.load(text=SLIDER, overrides=[change]))
