@@ -214,23 +214,34 @@ def _forked(count: int) -> Executor:
     """Forked workers; a signal waits until they know what to do with it."""
     fork = multiprocessing.get_context("fork")
     pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_settle_in, initargs=(os.getpid(),))
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-    try:
+    with undisturbed():
         # The first work forks all of them.
         pool.submit(os.getpid)
+    return pool
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Inside, an interrupt waits; also in what is forked there."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    return pool
+
+
+def end_with(parent: int) -> None:
+    """However the process that forked this one ends, this one ends with it."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _settle_in(parent: int) -> None:
     # Work inside of work stays here.
     _pool.set(None)
     _division.set(None)
-    # However the parent ends, its workers end with it.
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGKILL)
+    end_with(parent)
     # An interrupt is the parent's to handle: it lets the chunks under way finish.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 
 class Progress:
-    """Receives how far a computation is; this one ignores it."""
+    """Receives how far a computation is, which happens inside it as a context; this one ignores it."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
 
     def start(self, total: int, what: str) -> None:
         """Begin a stage of `total` steps named `what`; ends the stage before it."""

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from inspect import Parameter, Signature
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from mechdesign.cli import options as given
 from mechdesign.cli import process
-from mechdesign.cli.options import BUILT_IN, Options
+from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
@@ -20,7 +22,6 @@ app = typer.Typer(
     name="mechdesign",
     help="Design studies of planar mechanisms: one study file, five questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
-    add_completion=False,
     no_args_is_help=True,
     # Rich would cost --help a tenth of a second.
     rich_markup_mode=None,
@@ -64,43 +65,63 @@ def _start(
     """Options before the command."""
 
 
-def _add(name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
-    """Add a command: its arguments and options, and its help; what it runs is imported when it is called."""
+def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
+    """Add a command: what it does, its arguments and options, and its help."""
 
     def command(**said: Any) -> None:
         with _guard():
-            if name == "compare":
-                from mechdesign.cli.compare import compare
-
-                raise typer.Exit(compare(**said))
-            chosen: dict[str, Any] = {
-                key: said.pop(key) for key in ("vary", "method", "samples", "cases", "results") if key in said
-            }
-            study, options = said.pop("study"), Options(command=name, **said)
-            with _placed(options):
-                raise typer.Exit(_called(name, study, options, chosen))
+            raise typer.Exit(action(**said))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
     app.command(name, short_help=short, help=long)(command)
 
 
-def _called(name: str, study: Any, options: Options, chosen: Mapping[str, Any]) -> int:
-    """The exit code of a command that takes studies; `chosen` is what the options say of a sweep's cases."""
-    if name in COMMANDS or name == SENSITIVITIES.name:
-        from mechdesign.cli.execution import ask
+# What the commands do; it is imported when they are called.
 
-        return ask(name, study, options).exit_code
-    if name == SWEEP.name:
-        from mechdesign.cli.sweep import Matrix, sweep
 
-        return sweep(study, options, Matrix(**chosen))
+def _ask(command: str, study: Path | None, **said: Any) -> int:
+    from mechdesign.cli.execution import ask
+
+    options = Options(command=command, **said)
+    with _placed(options):
+        return ask(command, study, options).exit_code
+
+
+def _sweep(study: Path | None, **said: Any) -> int:
+    from mechdesign.cli.sweep import Matrix, sweep
+
+    matrix = Matrix(**{each.name: said.pop(each.name) for each in given.MATRIX})
+    options = Options(command=SWEEP.name, **said)
+    with _placed(options):
+        return sweep(study, options, matrix)
+
+
+def _run(command: str, study: Sequence[Path] | None, **said: Any) -> int:
+    from mechdesign.cli import batch, compare
+
+    options = Options(command=command, **said)
     if options.verify is not None:
-        from mechdesign.cli.compare import verify
+        return compare.verify(study, options)
+    with _placed(options):
+        return batch.run(study, options)
 
-        return verify(study, options)
+
+def _check(study: Sequence[Path] | None, **said: Any) -> int:
     from mechdesign.cli import batch
 
-    return (batch.check if name == "check" else batch.run)(study, options)
+    return batch.check(study, Options(command="check", **said))
+
+
+def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:
+    from mechdesign.cli.watch import watch
+
+    return watch(file, commands or (), Options(command="watch", **said))
+
+
+def _compare(**said: Any) -> int:
+    from mechdesign.cli.compare import compare
+
+    return compare(**said)
 
 
 def _placed(options: Options) -> AbstractContextManager[None]:
@@ -115,17 +136,19 @@ def _placed(options: Options) -> AbstractContextManager[None]:
 
 for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
-    _add(_name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+    _add(partial(_ask, _name), _name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
 _add(
+    _sweep,
     SWEEP.name,
     (
-        *given.COMMON[:2], given.VARY, given.METHOD, given.SAMPLES, given.CASES, given.RESULTS, *given.COMMON[2:],
+        *given.COMMON[:2], *given.MATRIX, *given.COMMON[2:],
         given.REPORT, given.JUNIT, given.RESUME_DESIGNS, given.EXECUTOR, given.SHARD,
     ),
     SWEEP.question,
     f"{SWEEP.question} {SWEEP.answer}",
 )  # fmt: skip
 _add(
+    partial(_run, "run"),
     "run",
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
@@ -135,6 +158,7 @@ _add(
     "Answer every question that each study asks, each in a folder of its own; one summary for all.",
 )  # fmt: skip
 _add(
+    partial(_run, MERGE),
     MERGE,
     (
         given.STUDIES, given.OUT_ALL, *given.COMMON[2:], given.REPORTS, given.ANIMATE, given.JUNIT, given.FAIL_FAST,
@@ -145,6 +169,7 @@ _add(
     "numbers, such as --set and --seed, and --out are given again.",
 )  # fmt: skip
 _add(
+    _check,
     "check",
     (
         given.STUDIES,
@@ -160,6 +185,18 @@ _add(
     "Validate only: say the joints, the mobility and how the mechanism is solved, and draw the sketch.",
 )
 _add(
+    _watch,
+    "watch",
+    (
+        given.FILE, given.ASKED, given.OUT_ALL, given.OVERRIDES, given.SEED, given.JOBS, given.QUIET,
+        given.NO_PLOTS, given.FORMAT, given.STYLE, given.REPORT, given.ANIMATE, given.ALLOW_FILES,
+    ),
+    "Answer a study's questions again whenever it is saved.",
+    "Answer a study's questions, or only some, now and whenever it or a file that it names is saved. Mistakes are "
+    "told, and it goes on until Ctrl-C.",
+)  # fmt: skip
+_add(
+    _compare,
     "compare",
     (
         given.OLD, given.NEW, given.RTOL, given.ATOL, given.TOLERANCES, given.OUT_DIFFERENCES, given.JUNIT, given.JSON,
@@ -176,7 +213,7 @@ _add(
 def new(
     template: Annotated[
         str | None,
-        typer.Argument(metavar="[TEMPLATE]", help="Name of a template; a wrong name lists them.", show_default=False),
+        given.TEMPLATE,
     ] = None,
 ) -> None:
     """Print a commented study to start from."""
@@ -184,7 +221,20 @@ def new(
         from mechdesign.cli.terminal import emit
         from mechdesign.study import template as template_text
 
-        emit(template_text(template or BUILT_IN))
+        emit(template_text(template) if template else template_text())
+
+
+def _words(incomplete: str) -> list[str]:
+    """Commands and options that a word may become; those of the study would take a second to find."""
+    commands = _group().commands
+    options = {flag for command in commands.values() for each in command.params for flag in each.opts if flag[0] == "-"}
+    return sorted(word for word in {*commands, *options} if word.startswith(incomplete))
+
+
+def _group() -> Any:
+    import typer.main
+
+    return typer.main.get_command(app)
 
 
 @app.command("docs", context_settings={"ignore_unknown_options": True})
@@ -195,17 +245,15 @@ def docs(
             metavar="[WORD]...",
             help="Keys of the study (kinematics.sweep, sweep), commands, options, indices, units, ...",
             show_default=False,
+            autocompletion=_words,
         ),
     ] = None,
 ) -> None:
     """Say what words mean; without any, which there are."""
     with _guard():
-        import typer.main
-
         from mechdesign.cli.docs import show
 
-        group: Any = typer.main.get_command(app)
-        show(words or (), group.commands)
+        show(words or (), _group().commands)
 
 
 @app.command("schema", short_help="Print the JSON Schema of the study file.")

@@ -3,55 +3,87 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
-from dataclasses import replace
-from itertools import groupby
+import io
+import sys
+from collections.abc import Sequence
+from contextlib import redirect_stderr
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mechdesign import shards
-from mechdesign.cli import terminal
+from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
+from mechdesign.cli.board import Board, Far, Reported
+from mechdesign.cli.crew import Alone, Crew, Tell
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     OUTCOMES,
     RESULTS,
     Outcome,
+    Source,
     answer,
     claim,
     extras,
     folder,
     interrupted,
+    load_source,
     load_study,
     place,
+    source,
     tell,
     write_report,
 )  # fmt: skip
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
-from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable, printable_lines
+from mechdesign.courier import LostWorkerError
+from mechdesign.errors import Interrupted, OutputError, StudyError, counted, printable
 from mechdesign.experiments import analysis, sensitivities
 from mechdesign.files import owned
 from mechdesign.mechanism.describe import describe
-from mechdesign.parallel import one_thread
+from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, foresee, judged_by
 from mechdesign.report.tables import to_csv
-from mechdesign.report.writer import check_writable, write_file, write_sketch
-from mechdesign.results import Column, Table
+from mechdesign.report.writer import FIGURES, check_writable, write_file, write_sketch
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
 
 if TYPE_CHECKING:
-    from junitparser import JUnitXml
-
     from mechdesign.report.page.page import Entry
 
-SUMMARY = "summary.csv"  # of several studies, beside their folders
+_KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A study that could be read, for who reads it again and answers its questions."""
+
+    number: int  # in the order of the studies
+    source: Source
+    label: str
+    root: Path  # of the folders of its questions
+    questions: tuple[tuple[str, Path], ...]  # commands, and the folders of their results
+
+
+@dataclass(frozen=True)
+class Said:
+    """Messages about a study, and the question that they are about where it is answered."""
+
+    words: str
+    given: Outcome | None = None
+
+
+@dataclass(frozen=True)
+class End:
+    """The end of a study: what an index of the reports says of it, an exit code of the report, an interrupt."""
+
+    entry: Entry | None = None
+    exit_code: int = 0
+    interrupted: bool = False
 
 
 def questions(study: Study) -> tuple[str, ...]:
@@ -89,35 +121,23 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
 
 
 @one_thread()
-def run(paths: Sequence[Path] | None, options: Options) -> int:
-    """Answer every question of the studies; returns the exit code, the highest of them all.
+def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()) -> int:
+    """Answer every question of the studies, or only some; returns the exit code, the highest of them all.
 
-    A study or question that fails does not stop the others, unless `options.fail_fast`. An interrupt ends the run; the
-    summary and the JUnit file then show what was finished.
+    Every study is read before the first is computed. Several are answered side by side, by as many processes as there
+    are jobs; their messages and results come in the order of the studies. One that fails does not stop the others,
+    unless `options.fail_fast`. After an interrupt the summary and the JUnit file show what was finished.
     """
-    answers: list[Outcome] = []
     asked = found_studies(paths)
-    book = Book(options, several=len(asked) > 1)
-    try:
-        with closing(_answers(asked, options, book)) as found:
-            for given in found:
-                answers.append(given)
-                if given.exit_code and options.fail_fast:
-                    break
-    except KeyboardInterrupt:
-        terminal.say("interrupted; what was finished is whole")
-        answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
-    if options.junit is not None:
-        book.file(options.junit, junit(answers).encode())
-    summary = _summary(answers)
-    if book.several and any(given.written for given in answers):
-        book.file((options.out or RESULTS) / SUMMARY, to_csv(summary).encode())
-    terminal.show(summary, as_json=options.json)
-    book.close()
-    told = [_in_brief(given) for given in answers if given.command and given.exit_code]
-    if len(summary) > 1 and told:
-        terminal.say("\n".join([f"failed: {len(told)} of {counted(len(summary), 'question')}", *told]))
-    return max(book.exit_code, *(given.exit_code for given in answers))
+    with Board(quiet=options.quiet) as board:
+        ledger = Ledger(options, len(asked), board)
+        try:
+            tasks = _read(asked, options, ledger, only)
+            if not ledger.stopped:
+                _answer(tasks, options, ledger)
+        except KeyboardInterrupt:
+            ledger.interrupted = True
+    return ledger.close()
 
 
 @one_thread()
@@ -153,131 +173,277 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
     return worst
 
 
-def _answers(paths: Sequence[Path | None], options: Options, book: Book) -> Generator[Outcome, None, None]:
-    """Answers of all studies in order, without their results; every study is read before the first is computed.
-
-    However the answers to a study end, its page is written.
-    """
-    studies: list[Study] = []
-    for path in paths:
-        try:
-            studies.append(load_study(path, options))
-        except Exception as error:
-            yield book.missing(failure(printable(path.stem) if path else "study", "check", Path(), error))
+def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: Sequence[str]) -> list[Task]:
+    """Read the studies, and keep no more of them than it takes to read them again."""
+    tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
-    for study in studies:
-        label = study.label
-        root = folder(study, "", options, several=len(paths) > 1)
+    for number, path in enumerate(paths):
+        label, study = printable(path.stem) if path else "study", None
         try:
+            origin = source(path, options)
+            study = load_source(origin, options)
+            label = study.label
             claim(owners, study)
-            asked = _places(study, root, options)
-        except StudyError as error:
-            yield book.missing(failure(label, "check", Path(), error, study))
-            continue
-        told: list[Outcome] = []
-        try:
-            for command, directory in asked:
-                try:
-                    check_writable(directory)
-                    with owned(directory):
-                        given = replace(answer(study, command, directory, options), result=None)
-                    tell(given, options)
-                    annotate("error", of_verdicts(study, command, given.verdicts))
-                    annotate("warning", of_warnings(study, command, given.warnings))
-                except KeyboardInterrupt as error:
-                    told.append(interrupted(study, command, directory, error))
-                    raise
-                except Exception as error:
-                    given = failure(label, command, directory, error, study)
-                told.append(given)
-                yield given
-        finally:
-            book.add(study, root, told)
+            root = folder(study, "", options, several=len(paths) > 1)
+            tasks.append(Task(number, origin, label, root, _places(only or questions(study), root, options)))
+        except Exception as error:
+            ledger.missing(number, failure(label, "check", Path(), error, study))
+            if ledger.stopped:
+                break
+    return tasks
 
 
-def _places(study: Study, root: Path, options: Options) -> list[tuple[str, Path]]:
+def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
     """The questions of a study with their folders; of shards that one command computed, that alone."""
-    found = [(command, place(root / command, options)) for command in questions(study)]
+    found = tuple((command, place(root / command, options)) for command in commands)
     if options.command != MERGE:
         return found
     if alone := shards.found(root):
-        return [(shards.command_of(alone[0]), root)]
+        return ((shards.command_of(alone[0]), root),)
     if (done := manifest.read(root)) is not None and done.get("command") in QUESTIONS:
-        return [(done["command"], root)]
-    begun = [(command, directory) for command, directory in found if shards.found(directory)]
+        return ((done["command"], root),)
+    begun = tuple((command, directory) for command, directory in found if shards.found(directory))
     given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
     return found if not begun or "run" in given else begun
 
 
-class Book:
-    """The reports of a run, where they are wanted: a page a study, and an index of several."""
+def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
+    """Answer the questions of the studies, side by side if there are several and the system forks processes.
 
-    def __init__(self, options: Options, *, several: bool) -> None:
-        self.options = options
-        self.several = several
-        self.exit_code = 0
-        self._entries: list[Entry] = []
-        self._folder = Path()
+    Raises
+    ------
+    KeyboardInterrupt
+        When what an interrupt has left is told.
+    """
+    jobs = worker_count(options.jobs)
+    # Work that goes elsewhere goes from this process.
+    count = min(jobs, len(tasks)) if sys.platform == "linux" and options.executor is None else 1
+    if count > 1:
+        options = replace(options, jobs=jobs // count)
+        if not options.resume:
+            _import(tasks, options)
+    ledger.begin(tasks)
+    work = partial(_study, options, ledger.several)
+    crew: Crew[Task, End] | Alone[Task, End]
 
-    def add(self, study: Study, root: Path, told: Sequence[Outcome]) -> None:
-        """Write the page of a study with what was told of its questions; without the option an older one goes."""
+    def heard(index: int, note: Far | Said) -> None:
+        before = ledger.stopped
+        ledger.note(index, note)
+        if ledger.stopped and not before:
+            crew.stop(index)
+
+    def finish() -> None:
+        for index, end in crew:
+            ledger.end(index, end)
+            if ledger.interrupted and not ledger.stopped:
+                raise KeyboardInterrupt
+
+    with Crew(work, tasks, count, heard, ledger.board.show) if count > 1 else Alone(work, tasks, heard) as crew:
         try:
-            if not self.options.report:
-                pages.remove(root / pages.REPORT)
-                return
-            left = [command for command in questions(study) if command not in {given.command for given in told}]
-            write_report(root, study, told, self.options, left)
-            self._folder = root.parent
-            if self.several:
-                self._entries.append(self._entry(study, told))
-        except Exception as error:
-            self._fail(f"{study.label}: report: {explained(error)[1]}", error)
+            finish()
+        except KeyboardInterrupt:
+            ledger.stopped = True
+            crew.stop()
+            finish()
+            raise
 
-    def missing(self, given: Outcome) -> Outcome:
-        """Note a study that could not be read in the index; gives it back."""
+
+def _import(tasks: Sequence[Task], options: Options) -> None:
+    """Import what answers the questions, once for all processes that are forked."""
+    for command in {command for task in tasks for command, _ in task.questions}:
+        import_module(QUESTIONS[command].module)
+        if not options.no_plots:
+            import_module(f"{FIGURES}.{command}")
+
+
+def _study(options: Options, several: bool, task: Task, hear: Tell) -> End:
+    """Answer the questions of a study, and write its page however that ends."""
+    words = io.StringIO()
+    told: list[Outcome] = []
+    ended = End()
+
+    def say(given: Outcome | None = None) -> None:
+        hear(Said(words.getvalue(), given))
+        words.seek(0)
+        words.truncate()
+
+    with redirect_stderr(words):
+        try:
+            study = load_source(task.source, options)
+        except Exception as error:
+            say(failure(task.label, "check", Path(), error))
+            return ended
+        try:
+            for command, directory in task.questions:
+                given = _question(study, command, directory, options, Reported(command, hear))
+                told.append(given)
+                say(given)
+                if given.exit_code and options.fail_fast:
+                    break
+        except KeyboardInterrupt as error:
+            told.append(interrupted(study, command, directory, error))
+            ended = End(interrupted=True)
+        try:
+            ended = replace(ended, entry=_page(study, task, told, options, several=several))
+        except Exception as error:
+            code, message = explained(error)
+            terminal.say(f"{study.label}: report: {message}")
+            ended = replace(ended, exit_code=code)
+        say()
+    return ended
+
+
+def _question(study: Study, command: str, directory: Path, options: Options, progress: Reported) -> Outcome:
+    """Answer one question and say what came out; what goes wrong is its outcome."""
+    try:
+        check_writable(directory)
+        with owned(directory):
+            given = replace(answer(study, command, directory, options, progress), table=None)
+        tell(given, options)
+        annotate("error", of_verdicts(study, command, given.verdicts))
+        annotate("warning", of_warnings(study, command, given.warnings))
+    except Exception as error:
+        return failure(study.label, command, directory, error, study)
+    return given
+
+
+def _page(study: Study, task: Task, told: Sequence[Outcome], options: Options, *, several: bool) -> Entry | None:
+    """Write the page of a study, and give its line of the index of several; without the option an older one goes."""
+    if not options.report:
+        pages.remove(task.root / pages.REPORT)
+        return None
+    left = [command for command, _ in task.questions if command not in {given.command for given in told}]
+    write_report(task.root, study, told, options, left)
+    if not several:
+        return None
+    from mechdesign.report.page.page import Entry, thumbnail
+
+    verdicts = [verdict for given in told for verdict in given.verdicts]
+    return Entry(
+        study.name,
+        study.label,
+        [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
+        met=sum(verdict.met for verdict in verdicts),
+        required=sum(len(judged_by(study, command)) for command, _ in task.questions),
+        warnings=len({warning for given in told for warning in given.warnings}),
+        drawing="" if options.no_plots else thumbnail(study),
+        link=f"{study.label}/{pages.REPORT}",
+    )
+
+
+class Ledger:
+    """What becomes of studies: told in their order, in whatever order it is heard, and written in the end."""
+
+    def __init__(self, options: Options, count: int, board: Board) -> None:
+        self.options = options
+        self.board = board
+        self.several = count > 1
+        self.interrupted = False
+        self.stopped = False  # nothing more is begun
+        self._answers: list[list[Outcome]] = [[] for _ in range(count)]
+        self._entries: dict[int, Entry] = {}
+        self._tasks: Sequence[Task] = ()
+        self._words: list[list[str]] = []
+        self._ended: set[int] = set()  # indices of tasks
+        self._first = 0  # task that is not ended
+        self._left = count  # studies without an answer
+        self._exit_code = 0
+
+    def missing(self, number: int, given: Outcome) -> None:
+        """Note a study that could not be read, or was lost."""
+        self._answers[number].append(given)
+        self._left -= 1
+        self.stopped |= self.options.fail_fast
         if self.options.report and self.several:
             from mechdesign.report.page.page import Entry
 
-            self._entries.append(Entry(given.study, given.study, [], failed=given.failed))
-        return given
+            self._entries[number] = Entry(given.study, given.study, [], failed=given.failed)
 
-    def close(self) -> None:
-        """Write the index of the studies, where there are pages of several."""
-        if not any(entry.link for entry in self._entries):
+    def begin(self, tasks: Sequence[Task]) -> None:
+        """Begin with the questions."""
+        self._tasks = tasks
+        self._words = [[] for _ in tasks]
+        self.board.start([task.label for task in tasks])
+
+    def note(self, index: int, note: Far | Said) -> None:
+        """Hear of a task how far it is, or a question's outcome."""
+        task = self._tasks[index]
+        if isinstance(note, Far):
+            self.board.far(index, note)
+            great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
+            note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
+        self._words[index].append(note.words)
+        if note.given is not None:
+            self._answers[task.number].append(note.given)
+            self.board.done(index, note.given)
+            self.stopped |= self.options.fail_fast and note.given.exit_code > 0
+        if index == self._first:
+            self._say()
+
+    def end(self, index: int, end: End | None) -> None:
+        """Note the end of a task; it may be heard once more."""
+        if index in self._ended:
             return
-        from mechdesign.report.page.page import index
+        self._ended.add(index)
+        self.board.end(index)
+        number = self._tasks[index].number
+        if end is None:
+            if not self.stopped:
+                with redirect_stderr(io.StringIO()) as words:
+                    given = failure(self._tasks[index].label, "run", Path(), LostWorkerError(_KILLED))
+                self._words[index].append(words.getvalue())
+                self.missing(number, given)
+        else:
+            self._exit_code = max(self._exit_code, end.exit_code)
+            self._left -= not end.interrupted
+            self.interrupted |= end.interrupted and not self.stopped
+            if end.entry is not None:
+                self._entries[number] = end.entry
+        while self._first in self._ended:
+            self._say()
+            self._first += 1
 
-        path = self._folder / pages.INDEX
-        if self.file(path, index(self._entries)):
-            terminal.say(f"index of the reports in {path}", quiet=self.options.quiet)
+    def _say(self) -> None:
+        for words in self._words[self._first]:
+            self.board.say(words)
+        self._words[self._first].clear()
 
-    def file(self, path: Path, data: bytes) -> bool:
+    def close(self) -> int:
+        """Tell what came out, write the summary, the JUnit file and the index, and give the exit code."""
+        options = self.options
+        answers = [given for study in self._answers for given in study]
+        lost = f"; {self._left} of {len(self._answers)} studies were not answered" if self.several else ""
+        if self.interrupted:
+            terminal.say(f"interrupted; what was finished is whole{lost}")
+            answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
+        elif self.stopped and self._left:
+            terminal.say(f"stopped at the first failure{lost}")
+        if options.junit is not None:
+            self._file(options.junit, summary.junit(answers).encode())
+        table = summary.summary(answers)
+        root = options.out or RESULTS
+        if self.several and any(given.written for given in answers):
+            self._file(root / summary.NAME, to_csv(table).encode())
+        terminal.show(table, as_json=options.json)
+        if any(entry.link for entry in self._entries.values()):
+            from mechdesign.report.page.page import index
+
+            if self._file(root / pages.INDEX, index([entry for _, entry in sorted(self._entries.items())])):
+                terminal.say(f"index of the reports in {root / pages.INDEX}", quiet=options.quiet)
+        told = [summary.in_brief(given) for given in answers if given.command and given.exit_code]
+        if len(table) > 1 and told:
+            terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
+        return max(self._exit_code, *(given.exit_code for given in answers))
+
+    def _file(self, path: Path, data: bytes) -> bool:
         """Write a file about all studies; whether it is there, for the run goes on without it."""
         try:
             write_file(path, data)
         except OutputError as error:
-            self._fail(str(error), error)
+            terminal.say(str(error))
+            self._exit_code = max(self._exit_code, explained(error)[0])
             return False
         return True
-
-    def _entry(self, study: Study, told: Sequence[Outcome]) -> Entry:
-        from mechdesign.report.page.page import Entry, thumbnail
-
-        verdicts = [verdict for given in told for verdict in given.verdicts]
-        return Entry(
-            study.name,
-            study.label,
-            [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
-            met=sum(verdict.met for verdict in verdicts),
-            required=sum(len(judged_by(study, command)) for command in questions(study)),
-            warnings=len({warning for given in told for warning in given.warnings}),
-            drawing="" if self.options.no_plots else thumbnail(study),
-            link=f"{study.label}/{pages.REPORT}",
-        )
-
-    def _fail(self, message: str, error: Exception) -> None:
-        terminal.say(message)
-        self.exit_code = max(self.exit_code, explained(error)[0])
 
 
 def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
@@ -286,69 +452,3 @@ def failure(label: str, command: str, directory: Path, error: Exception, study: 
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))
     return Outcome(label, command, directory, code, 0, failed=message)
-
-
-def _in_brief(given: Outcome) -> str:
-    """What a question failed by, in a line."""
-    why = [given.failed.splitlines()[0]] if given.failed else []
-    why += [str(verdict) for verdict in given.verdicts if not verdict.met]
-    return f"  {given.study}: {given.command}: {OUTCOMES[given.exit_code]}: {'; '.join(why)}"
-
-
-def _summary(answers: Sequence[Outcome]) -> Table:
-    def met(given: Outcome) -> str:
-        return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
-
-    found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
-        "study": (str, lambda given: given.study),
-        "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
-        "exit_code": (int, lambda given: given.exit_code),
-        "requirements": (str, met),
-        "rows": (int, lambda given: given.rows),
-        "warnings": (int, lambda given: len(given.warnings)),
-        "directory": (str, lambda given: str(given.directory) if given.rows else ""),
-    }
-    columns = (
-        Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
-        for name, (kind, tell_of) in found.items()
-    )
-    return Table("summary", tuple(columns), meaning="what became of each question")
-
-
-def junit(answers: Sequence[Outcome]) -> str:
-    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
-
-    A requirement that is not met is a failure; whatever kept a command from its result is an error.
-    """
-    from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
-
-    report = JUnitXml("mechdesign")
-    for study, group in groupby(answers, key=lambda given: given.study):
-        study = printable(study)
-        suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
-        for given in group:
-            case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
-            if given.exit_code > 1:
-                failed = printable_lines(given.failed)
-                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {given.exit_code}")
-                error.text = failed
-                case.result = [error]
-            if given.warnings:
-                case.system_out = "\n".join(f"warning: {printable(warning)}" for warning in given.warnings)
-            suite.add_testcase(case)
-            for verdict in given.verdicts:
-                case = TestCase(f"{given.command}: {printable(verdict.requirement)}", classname=name, time=0)
-                if not verdict.met:
-                    case.result = [Failure(printable(str(verdict)), type_="requirement")]
-                suite.add_testcase(case)
-        report.add_testsuite(suite)
-    return junit_text(report)
-
-
-def junit_text(report: JUnitXml) -> str:
-    """The text of a JUnit report, with its counts."""
-    report.update_statistics()  # type: ignore[no-untyped-call]
-    text = report.tostring()  # type: ignore[no-untyped-call]
-    body = text.decode() if isinstance(text, bytes) else str(text)
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

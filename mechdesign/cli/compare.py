@@ -12,8 +12,8 @@ from typing import Any
 
 import mechdesign
 from mechdesign.cli import terminal
-from mechdesign.cli.batch import junit_text
 from mechdesign.cli.options import Options
+from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer

@@ -17,9 +17,9 @@ import mechdesign
 from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
-from mechdesign.cli.options import BUILT_IN, STYLES, Options
+from mechdesign.cli.options import STYLES, Options
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
-from mechdesign.errors import Interrupted, MechdesignError, StudyError
+from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import Divided, divided, one_thread
@@ -38,6 +38,7 @@ from mechdesign.study.text.document import MAX_BYTES
 STANDARD_INPUT = Path("-")
 _ROWS_AT_ONCE = 20_000  # of a table that is read from its file
 RESULTS = Path("results")  # where no other folder is asked for
+Source = Path | bytes  # of a study: its file or its text
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -67,28 +68,37 @@ class Outcome:
     seconds: float = 0.0
     kept: bool = False
     written: bool = False  # whether the directory holds what was found
-    result: Result | None = None
+    table: Table | None = None  # the main one
     shard: str = ""  # what became of a part of it, where no more was asked
 
 
-def load_study(path: Path | None, options: Options) -> Study:
-    """Load a study with the options' overrides and seed; ``-`` is standard input; without a path, say which is taken.
+def source(path: Path | None, options: Options) -> Source:
+    """Where a study comes from: ``-`` is standard input; without a path, say which is taken."""
+    if path is None:
+        here = Path("study.yaml")
+        path = here if here.exists() else template_path()
+        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        terminal.say(f"study: {what}", quiet=options.quiet)
+    return sys.stdin.buffer.read(MAX_BYTES + 1) if path == STANDARD_INPUT else path
+
+
+def load_source(source: Source, options: Options) -> Study:
+    """Load a study with the options' overrides and seed.
 
     Raises
     ------
     StudyError
         Every mistake of the study or the overrides.
     """
-    if path is None:
-        here = Path("study.yaml")
-        path = here if here.exists() else template_path(BUILT_IN)
-        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
-        terminal.say(f"study: {what}", quiet=options.quiet)
     overrides = options.overrides or ()
-    if path == STANDARD_INPUT:
-        content = sys.stdin.buffer.read(MAX_BYTES + 1)
-        return load(text=content, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
-    return load(path, overrides, options.seed, allow_files=options.allow_files)
+    if isinstance(source, bytes):
+        return load(text=source, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
+    return load(source, overrides, options.seed, allow_files=options.allow_files)
+
+
+def load_study(path: Path | None, options: Options) -> Study:
+    """Load the study of a path; see `source` and `load_source`."""
+    return load_source(source(path, options), options)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
@@ -116,7 +126,7 @@ def claim(owners: dict[str, Path | None], study: Study) -> None:
         raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
 
 
-def answer(study: Study, command: str, directory: Path, options: Options) -> Outcome:
+def answer(study: Study, command: str, directory: Path, options: Options, progress: Progress) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
     Raises
@@ -125,7 +135,7 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         Whatever the analysis, the requirements or the files run into.
     """
     if options.part is not None:
-        return _shard(study, command, directory, options, options.part)
+        return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
     asked = extras(command, options)
     before = None
@@ -148,9 +158,9 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     if journal is not None:
         more["journal"] = journal
     try:
-        with terminal.Bar(quiet=options.quiet) as bar, divided(share):
+        with progress, divided(share):
             result: Result = getattr(mechdesign, command)(
-                study, seed=options.seed, jobs=options.jobs, progress=bar, **more
+                study, seed=options.seed, jobs=options.jobs, progress=progress, **more
             )
             if before is not None:
                 result = laid_under(study, result, before, _earlier(before, command, options))
@@ -159,8 +169,8 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     try:
-        with terminal.Bar(quiet=options.quiet) as bar:
-            verdicts, undrawn = _judged_and_written(directory, study, result, asked, bar)
+        with progress:
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -172,11 +182,11 @@ def answer(study: Study, command: str, directory: Path, options: Options) -> Out
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, result=result,
+        written=True, table=result.main,
     )  # fmt: skip
 
 
-def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard) -> Outcome:
+def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
     """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
     told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
     if command not in DIVIDED:
@@ -188,8 +198,8 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
         requirements.foresee(study, [command])
     taken = shards.Taken(shard)
     try:
-        with terminal.Bar(quiet=options.quiet) as bar, divided(taken):
-            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=bar)
+        with progress, divided(taken):
+            getattr(mechdesign, command)(study, seed=options.seed, jobs=options.jobs, progress=progress)
     except Divided:
         pass
     except Interrupted:
@@ -242,7 +252,8 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     settle(directory)
     code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True
+        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
+        table=table,
     )  # fmt: skip
 
 
@@ -269,7 +280,7 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras, progress: Progress
+    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress
 ) -> tuple[Sequence[Verdict], Sequence[str]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
@@ -279,7 +290,7 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked, progress)
+    return verdicts, writer.write(directory, study, result, verdicts, asked, jobs, progress)
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
@@ -306,7 +317,7 @@ def tell(given: Outcome, options: Options) -> None:
         terminal.say(f"{who} {given.shard}", quiet=options.quiet)
         return
     kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{who} {given.rows} rows in {given.directory}{kept}", quiet=options.quiet)
+    terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
 
 
 def write_report(
@@ -349,20 +360,17 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
     writer.check_writable(directory)
     with owned(directory):
         try:
-            given = answer(study, command, directory, options)
+            given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
         except Interrupted as error:
             if options.report:
                 write_report(directory, study, [interrupted(study, command, directory, error)], options)
             raise
         if options.report:
             write_report(directory, study, [given], options)
-        if given.shard:
-            tell(given, options)
-            return given
-        if given.result is not None:
-            table = given.result.main
-        else:
-            table = _main_table(directory, manifest.read(directory) or {})
-    terminal.show(table, as_json=options.json, rest=directory / f"{table.name}.csv")
+    if given.shard:
+        tell(given, options)
+        return given
+    assert given.table is not None
+    terminal.show(given.table, as_json=options.json, rest=directory / f"{given.table.name}.csv")
     tell(given, options)
     return given

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from inspect import Parameter
 from pathlib import Path
@@ -9,20 +10,38 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mechdesign.commands import MAX_JOBS
+from mechdesign.commands import MAX_JOBS, QUESTIONS
 from mechdesign.errors import StudyError
-from mechdesign.files import formats_of
+from mechdesign.files import FORMATS, formats_of
 
 if TYPE_CHECKING:
     from mechdesign.shards import Shard
 
-# Template of the study that is taken where there is none.
-BUILT_IN = "two_link_arm"
 # Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
 # Relative tolerance of `compare`: more than machines differ by, less than anything that matters.
 RELATIVE = 1e-9
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
+
+
+def _studies(incomplete: str) -> list[str]:
+    """Files of studies that a word may become; a shell completes the names of folders where there are none."""
+    folder, slash, start = incomplete.rpartition("/")
+    try:
+        found = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
+    except OSError:
+        return []
+    return [f"{folder}{slash}{name}" for name in found if name.startswith(start)]
+
+
+def _templates(incomplete: str) -> list[str]:
+    folder = Path(__file__).parents[1] / "study" / "templates"
+    return sorted(path.stem for path in folder.glob("*.yaml") if path.stem.startswith(incomplete))
+
+
+def _one_of(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """Completes a word to those known."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
 def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
@@ -31,7 +50,8 @@ def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
 
 
 def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
-    argument = typer.Argument(metavar=metavar, help=f"{meaning} {_LEFT_OUT}", show_default=False)
+    told = f"{meaning} {_LEFT_OUT}"
+    argument = typer.Argument(metavar=metavar, help=told, show_default=False, autocompletion=_studies)
     return _parameter("study", kind | None, None, argument)
 
 
@@ -68,7 +88,7 @@ JOBS = _text(
     int,
     "--jobs",
     "N",
-    "Threads to compute on; the results do not depend on it. Default: every processor.",
+    "Threads to compute on, or studies at a time; the results do not depend on it. Default: every processor.",
     min=1,
     max=MAX_JOBS,
 )
@@ -91,13 +111,21 @@ SHARD = _text(
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
 QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag("no_plots", "--no-plots", "Draw no pictures.")
-FORMAT = _text("formats", str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.")
+FORMAT = _text(
+    "formats",
+    str,
+    "--format",
+    "LIST",
+    "Formats of the pictures, e.g. png,svg,pdf. Default: png.",
+    autocompletion=_one_of(FORMATS),
+)
 STYLE = _text(
     "style",
     str,
     "--style",
     "NAME",
     "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
+    autocompletion=_one_of(STYLES),
 )
 ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
 REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
@@ -114,6 +142,7 @@ BEFORE = _text(
     "--before",
     "STUDY",
     "Also draw this study, without the overrides of --set, in dashes under the other: before and after a change.",
+    autocompletion=_studies,
 )
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
@@ -166,6 +195,26 @@ def _folder(name: str, meaning: str) -> Parameter:
     return _parameter(name, Path, Parameter.empty, typer.Argument(metavar=name.upper(), help=meaning))
 
 
+FILE = _parameter(
+    "file", Path, Parameter.empty, typer.Argument(metavar="STUDY", help="The study file.", autocompletion=_studies)
+)
+ASKED = _parameter(
+    "commands",
+    list[str] | None,
+    None,
+    typer.Argument(
+        metavar="[COMMAND]...",
+        help="Questions; left out: all that the study asks.",
+        show_default=False,
+        autocompletion=_one_of(QUESTIONS),
+    ),
+)
+TEMPLATE = typer.Argument(
+    metavar="[TEMPLATE]",
+    help="Name of a template; a wrong name lists them.",
+    show_default=False,
+    autocompletion=_templates,
+)
 OLD = _folder("old", "Folder of the results that are the baseline.")
 NEW = _folder("new", "Folder of the results that are compared with it.")
 RTOL = _parameter(
@@ -192,6 +241,8 @@ TOLERANCES = _text(
     "that fits counts, --rtol and --atol where none does.",
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
+# Of the cases of a sweep.
+MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS)
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mechdesign.cli.batch import failure, junit
+from mechdesign.cli.batch import failure
 from mechdesign.cli.execution import ask
 from mechdesign.cli.options import Options
+from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError
 from mechdesign.report.writer import write_file
 from mechdesign.study.schema.matrix import RANGE

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +26,7 @@ _DIGITS = 6  # significant digits of its numbers
 _PIECE = 1 << 20  # characters of a file that are copied at once
 _NAMES = 6  # names of columns for which there was no room
 _GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
-_BAR_DELAY = 1.0  # seconds before a bar appears
+DELAY = 1.0  # seconds before it is shown how far something is
 
 
 def say(text: str, *, quiet: bool = False) -> None:
@@ -98,31 +98,38 @@ def _show_to_people(table: Table, rest: Path | None) -> None:
         console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"), style="dim")
 
 
+def lively() -> bool:
+    """Whether a person looks at stderr on a terminal that can be drawn on, rather than a CI server keeps it."""
+    ci = os.environ.get("CI", "").lower() not in ("", "0", "false")
+    return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
+
+
+def announced(total: int, what: str) -> str:
+    """What is said of a great stage when it begins; empty of others."""
+    return f"{total} {what} to compute; Ctrl-C ends it" if total >= _GREAT else ""
+
+
 class Bar(Progress):
     """A progress bar on stderr, which appears only on a terminal and only after a second."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
-        self._wanted = not quiet and sys.stderr.isatty()
+        self._wanted = not quiet and lively()
         self._begun = time.monotonic()
         self._bar: Shown | None = None
         self._task: TaskID | None = None
         self._total = self._done = 0
         self._what = ""
 
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
+            self._bar = self._task = None
 
     def start(self, total: int, what: str) -> None:
         """Begin a stage; a great one is said, also where nobody sees a bar."""
-        if total >= _GREAT:
-            say(f"{total} {what} to compute; Ctrl-C ends it", quiet=self._quiet)
+        if great := announced(total, what):
+            say(great, quiet=self._quiet)
         self._total, self._done, self._what = total, 0, what
         if self._bar is not None and self._task is not None:
             self._bar.reset(self._task, total=total, description=what)
@@ -132,7 +139,7 @@ class Bar(Progress):
         self._done += n
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._done)
-        elif self._wanted and time.monotonic() - self._begun > _BAR_DELAY:
+        elif self._wanted and time.monotonic() - self._begun > DELAY:
             self._open()
 
     def _open(self) -> None:

@@ -8,6 +8,7 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,15 @@ class Extras:
     before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
+@cache
+def _versions() -> dict[str, dict[str, str]]:
+    libraries = {name: version(name) for name in _LIBRARIES}
+    return {
+        "tool": {"name": "mechdesign", "version": version("mechdesign")},
+        "libraries": {"python": platform.python_version(), **libraries},
+    }
+
+
 def computed_from(study: Study, command: str) -> dict[str, Any]:
     """Everything that decides the numbers of the results: versions, study, the files it names, overrides, seed."""
     files = {
@@ -43,8 +53,7 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
         for _, file, text in study.inputs()
     }
     return {
-        "tool": {"name": "mechdesign", "version": version("mechdesign")},
-        "libraries": {"python": platform.python_version()} | {name: version(name) for name in _LIBRARIES},
+        **_versions(),
         "command": command,
         "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
         **({"inputs": files} if files else {}),

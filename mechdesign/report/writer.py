@@ -56,9 +56,14 @@ def check_writable(directory: Path) -> None:
 
 
 def write(
-    directory: Path, study: Study, result: Result, verdicts: Sequence[Verdict], asked: Extras,
+    directory: Path,
+    study: Study,
+    result: Result,
+    verdicts: Sequence[Verdict],
+    asked: Extras,
+    jobs: int | None = None,
     progress: Progress = NULL,
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[str, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
@@ -88,7 +93,7 @@ def write(
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, asked)
+            drawn, warnings = pictures(study, result, asked, jobs)
         if asked.report:
             from mechdesign.report.page import section
 
@@ -196,7 +201,9 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
-def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, bytes], tuple[str, ...]]:
+def pictures(
+    study: Study, result: Result, asked: Extras, jobs: int | None = None
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
     For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
@@ -228,7 +235,7 @@ def pictures(study: Study, result: Result, asked: Extras) -> tuple[dict[str, byt
             from mechdesign.report.figures.kinematics import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
-        drawn, failed = render(drawings)
+        drawn, failed = render(drawings, jobs)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":
         del drawn[ANIMATION]

@@ -359,7 +359,7 @@ def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monk
     assert any(line.startswith("::error file=gate.yaml,line=16,col=") and "theta at most 80" in line for line in lines)
     assert "::warning file=gate.yaml::gate: kinematics: 50 %25 play, mind the gap" in lines
     at = lines.index("failed: 2 of 3 questions")
-    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["wrong", "gate"]
+    assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["gate", "wrong"]
 
 
 def test_inputs_of_one_name_are_told_apart(here, invoke):

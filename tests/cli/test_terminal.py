@@ -41,7 +41,7 @@ def at_terminal(folder, pause, *arguments, interrupt_after=None):
     """Run PROGRAM on a terminal of 80 columns; returns its exit code and everything it showed."""
     (folder / "slider.yaml").write_text(SLIDER)
     ours, theirs = pty.openpty()
-    environment = os.environ | {"COLUMNS": "80", "LINES": "40", "TERM": "xterm"}
+    environment = os.environ | {"COLUMNS": "80", "LINES": "40", "TERM": "xterm", "CI": ""}
     command = [sys.executable, "-c", PROGRAM.format(pause=pause), *arguments]
     process = subprocess.Popen(command, cwd=folder, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
     os.close(theirs)

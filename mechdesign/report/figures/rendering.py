@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.courier import LostWorkerError
 from mechdesign.errors import explain
-from mechdesign.parallel import map_chunks
+from mechdesign.parallel import map_chunks, worker_count
 
 # To the files of one picture: their bytes by their names.
 Drawing = Callable[[], dict[str, bytes]]
@@ -61,10 +61,11 @@ def _draw(key: int, name: str) -> dict[str, bytes] | str:
         return explain(error)[1]
 
 
-def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Call every drawing; on Linux in two forked processes, for Matplotlib draws on one processor only.
+def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Call every drawing; on Linux in two forked processes, if two `jobs` may be done at a time.
 
-    The bytes do not depend on where they are drawn. What a process that was killed left out is drawn in this one.
+    Matplotlib draws on one processor only. The bytes do not depend on where they are drawn. What a process that was
+    killed left out is drawn in this one.
 
     Returns
     -------
@@ -80,8 +81,8 @@ def render(drawings: Mapping[str, Drawing]) -> tuple[dict[str, bytes], dict[str,
     _here[key] = drawings
     try:
         with suppress(LostWorkerError):
-            jobs = 2 if sys.platform == "linux" and len(names) >= FEWEST else 1
-            for name, drawn in zip(names, map_chunks(partial(_draw, key), names, jobs, processes=True), strict=True):
+            count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
+            for name, drawn in zip(names, map_chunks(partial(_draw, key), names, count, processes=True), strict=True):
                 found[name] = drawn
         found |= {name: _draw(key, name) for name in names if name not in found}
     finally:

@@ -7,6 +7,8 @@ from pathlib import Path
 from mechdesign.errors import StudyError, suggestion
 
 _FOLDER = Path(__file__).parent
+# The one that is taken where none is named.
+BUILT_IN = "two_link_arm"
 
 
 def templates() -> tuple[str, ...]:
@@ -14,7 +16,7 @@ def templates() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in _FOLDER.glob("*.yaml")))
 
 
-def template_path(name: str) -> Path:
+def template_path(name: str = BUILT_IN) -> Path:
     """File of a template.
 
     Raises
@@ -28,6 +30,6 @@ def template_path(name: str) -> Path:
     return _FOLDER / f"{name}.yaml"
 
 
-def template(name: str) -> str:
+def template(name: str = BUILT_IN) -> str:
     """Text of a template."""
     return template_path(name).read_text(encoding="utf-8")

@@ -1,0 +1,169 @@
+"""A table of studies on a terminal that shows what is under way, and what failed, while they are answered."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mechdesign.cli import terminal
+from mechdesign.cli.crew import Tell
+from mechdesign.cli.execution import OUTCOMES, Outcome
+from mechdesign.progress import Progress
+
+if TYPE_CHECKING:
+    from rich.live import Live
+    from rich.table import Table as Grid
+
+_OFTEN = 0.1  # seconds between two notes of how far something is, and between two pictures of the table
+_LAST = 5  # questions that were answered last and are shown
+_WIDTH = 24  # of a bar, in characters
+
+
+@dataclass(frozen=True)
+class Far:
+    """How far a question is: steps done of a total in a stage; none of them before its first stage."""
+
+    command: str
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+
+
+class Reported(Progress):
+    """Tells how far a question is, now and then."""
+
+    def __init__(self, command: str, tell: Tell) -> None:
+        self._command = command
+        self._tell = tell
+        self._stage = ""
+        self._done = self._total = 0
+        self._told = 0.0
+        self._say()
+
+    def start(self, total: int, what: str) -> None:
+        """Begin a stage."""
+        self._stage, self._done, self._total = what, 0, total
+        self._say()
+
+    def update(self, n: int) -> None:
+        """`n` more steps are done."""
+        self._done += n
+        if time.monotonic() - self._told > _OFTEN:
+            self._say()
+
+    def _say(self) -> None:
+        self._told = time.monotonic()
+        self._tell(Far(self._command, self._stage, self._done, self._total))
+
+
+class Board:
+    """The table: questions that failed and those answered last, and below them those under way.
+
+    It is on stderr, only on a terminal, and appears after a second; messages go above it. Use it as a context.
+    """
+
+    def __init__(self, *, quiet: bool) -> None:
+        self._wanted = not quiet and terminal.lively()
+        # What writes to stderr meanwhile may have put another stream in its place.
+        self._stream = sys.stderr
+        self._begun = time.monotonic()
+        self._live: Live | None = None
+        self._labels: Sequence[str] = ()
+        self._under_way: dict[int, tuple[float, Far]] = {}  # since when, and how far
+        self._failed: list[Outcome] = []
+        self._last: deque[Outcome] = deque(maxlen=_LAST)
+        self._ended = 0
+        self._shown = 0.0
+
+    def __enter__(self) -> Board:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            try:
+                self._live.stop()
+            finally:
+                self._live.console.show_cursor()
+
+    def start(self, labels: Sequence[str]) -> None:
+        """Begin with the studies of these names."""
+        self._labels = labels
+
+    def far(self, index: int, how: Far) -> None:
+        """A study's question is so far."""
+        since, before = self._under_way.get(index, (0.0, None))
+        if before is None or before.command != how.command:
+            since = time.monotonic()
+        self._under_way[index] = since, how
+        self.show()
+
+    def done(self, index: int, given: Outcome) -> None:
+        """A study's question is answered."""
+        self._under_way.pop(index, None)
+        (self._failed if given.exit_code else self._last).append(given)
+        self.show()
+
+    def end(self, index: int) -> None:
+        """A study is done with."""
+        self._under_way.pop(index, None)
+        self._ended += 1
+        self.show()
+
+    def say(self, words: str) -> None:
+        """Messages, above the table."""
+        if self._live is None:
+            print(words, end="", file=self._stream, flush=True)
+        elif words:
+            from rich.text import Text
+
+            self._live.console.print(Text(words.rstrip("\n")), soft_wrap=True)
+
+    def show(self) -> None:
+        """Show how things are."""
+        now = time.monotonic()
+        if self._live is not None:
+            if now - self._shown > _OFTEN:
+                self._shown = now
+                self._live.update(self._table(), refresh=True)
+        elif self._wanted and now - self._begun > terminal.DELAY:
+            from rich.console import Console
+            from rich.live import Live
+
+            console = Console(file=self._stream)
+            self._live = Live(console=console, auto_refresh=False, transient=True,
+                              redirect_stdout=False, redirect_stderr=False)  # fmt: skip
+            self._live.start()
+
+    def _table(self) -> Grid:
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table as Grid
+        from rich.text import Text
+
+        assert self._live is not None
+        grid = Grid(box=None, pad_edge=False, header_style="bold")
+        grid.add_column("study", no_wrap=True)
+        grid.add_column("question", no_wrap=True)
+        grid.add_column("outcome", no_wrap=True)
+        grid.add_column("seconds", justify="right", no_wrap=True)
+        # The head and two lines below; at least one of what is above.
+        room = max(1, self._live.console.height - 3 - len(self._under_way))
+        failed = self._failed[-room:]
+        last = [*self._last][len(failed) - room :] if room > len(failed) else []
+        for given in (*failed, *last):
+            word = Text(OUTCOMES[given.exit_code], style="red" if given.exit_code else "green")
+            grid.add_row(Text(given.study), given.command, word, f"{given.seconds:.1f}")
+        for index, (since, how) in sorted(self._under_way.items()):
+            bar = Grid.grid(padding=(0, 1))
+            bar.add_row(how.stage, ProgressBar(how.total, min(how.done, how.total), width=_WIDTH))
+            outcome = bar if how.total else Text("under way", style="dim")
+            grid.add_row(Text(self._labels[index]), how.command, outcome, f"{time.monotonic() - since:.1f}")
+        hidden = len(self._failed) - len(failed)
+        told = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
+        if self._failed:
+            told.insert(1, f"{len(self._failed)} failed" + f", {hidden} of them above" * bool(hidden))
+        grid.add_row(Text(told[0]), Text(told[1]), Text("; ".join(told[2:])), "")
+        return grid

@@ -1,0 +1,86 @@
+"""What became of many questions: a table, JUnit for CI, and a line for each that failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.cli.execution import OUTCOMES, Outcome
+from mechdesign.errors import printable, printable_lines
+from mechdesign.results import Column, Table
+
+if TYPE_CHECKING:
+    from junitparser import JUnitXml
+
+NAME = "summary.csv"  # of several studies, beside their folders
+
+
+def in_brief(given: Outcome) -> str:
+    """What a question failed by, in a line of the list of failures."""
+    why = [given.failed.splitlines()[0]] if given.failed else []
+    why += [str(verdict) for verdict in given.verdicts if not verdict.met]
+    return f"  {given.study}: {given.command}: {OUTCOMES[given.exit_code]}: {'; '.join(why)}"
+
+
+def summary(answers: Sequence[Outcome]) -> Table:
+    """What became of the questions, a row each."""
+
+    def met(given: Outcome) -> str:
+        return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
+
+    found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
+        "study": (str, lambda given: given.study),
+        "command": (str, lambda given: given.command),
+        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "exit_code": (int, lambda given: given.exit_code),
+        "requirements": (str, met),
+        "rows": (int, lambda given: given.rows),
+        "warnings": (int, lambda given: len(given.warnings)),
+        "directory": (str, lambda given: str(given.directory) if given.rows else ""),
+    }
+    columns = (
+        Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
+        for name, (kind, tell_of) in found.items()
+    )
+    return Table("summary", tuple(columns), meaning="what became of each question")
+
+
+def junit(answers: Sequence[Outcome]) -> str:
+    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
+
+    A requirement that is not met is a failure; whatever kept a command from its result is an error.
+    """
+    from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+
+    report = JUnitXml("mechdesign")
+    for study, group in groupby(answers, key=lambda given: given.study):
+        study = printable(study)
+        suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
+        for given in group:
+            case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
+            if given.exit_code > 1:
+                failed = printable_lines(given.failed)
+                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {given.exit_code}")
+                error.text = failed
+                case.result = [error]
+            if given.warnings:
+                case.system_out = "\n".join(f"warning: {printable(warning)}" for warning in given.warnings)
+            suite.add_testcase(case)
+            for verdict in given.verdicts:
+                case = TestCase(f"{given.command}: {printable(verdict.requirement)}", classname=name, time=0)
+                if not verdict.met:
+                    case.result = [Failure(printable(str(verdict)), type_="requirement")]
+                suite.add_testcase(case)
+        report.add_testsuite(suite)
+    return junit_text(report)
+
+
+def junit_text(report: JUnitXml) -> str:
+    """The text of a JUnit report, with its counts."""
+    report.update_statistics()  # type: ignore[no-untyped-call]
+    text = report.tostring()  # type: ignore[no-untyped-call]
+    body = text.decode() if isinstance(text, bytes) else str(text)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

@@ -1,0 +1,96 @@
+"""`watch`: answer the questions of a study again whenever it, or a file that it names, is saved."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from mechdesign.cli import batch, terminal
+from mechdesign.cli.execution import STANDARD_INPUT, load_source
+from mechdesign.cli.options import Options
+from mechdesign.commands import QUESTIONS
+from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggestion
+from mechdesign.study.text.inputs import FILES
+
+_LOOK = 0.2  # seconds between two looks at the files
+_NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\b")
+
+
+def watch(path: Path, commands: Sequence[str], options: Options) -> int:
+    """Answer a study's questions, or only some of them, now and after every change, until an interrupt.
+
+    Mistakes are told, and end nothing. Returns 0, or 130 if it was computing when it was interrupted.
+
+    Raises
+    ------
+    StudyError
+        If there is no such question, or the study is no file.
+    """
+    for command in commands:
+        if command not in QUESTIONS:
+            known = ", ".join(QUESTIONS)
+            raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {known}")
+    if path == STANDARD_INPUT or path.is_dir():
+        raise StudyError(f"{path}: is no file that could be watched")
+    files = {path}
+    with suppress(KeyboardInterrupt):
+        while True:
+            seen = _contents(files)
+            if batch.run([path], options, commands) == Interrupted.exit_code:
+                return Interrupted.exit_code
+            files = {path, *_named(path, options)}
+            seen = _contents(files - seen.keys()) | {file: seen[file] for file in files & seen.keys()}
+            names = ", ".join(sorted(map(str, files)))
+            terminal.say(
+                f"{path}: answered again when one of these is saved, until Ctrl-C: {names}", quiet=options.quiet
+            )
+            _await_change(seen)
+    return 0
+
+
+def _await_change(seen: dict[Path, bytes | None]) -> None:
+    """Return when a file holds something else, and has done so for two looks: an editor may still be writing."""
+    stamps = _stamps(seen)
+    changed = _contents(seen) != seen
+    while True:
+        time.sleep(_LOOK)
+        now = _stamps(seen)
+        if now == stamps and changed:
+            return
+        if now != stamps:
+            stamps, changed = now, _contents(seen) != seen
+
+
+def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
+    """What tells that a file was written, without reading it."""
+    stamps: list[tuple[int, int, int] | None] = []
+    for file in files:
+        try:
+            found = file.stat()
+            stamps.append((found.st_ino, found.st_size, found.st_mtime_ns))
+        except OSError:
+            stamps.append(None)
+    return stamps
+
+
+def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
+    contents: dict[Path, bytes | None] = {}
+    for file in files:
+        try:
+            contents[file] = file.read_bytes()
+        except OSError:
+            contents[file] = None
+    return contents
+
+
+def _named(path: Path, options: Options) -> set[Path]:
+    """Files that a study names; of one that is wrong, those that its text seems to name."""
+    try:
+        return {file for _, file, _ in load_source(path, options).inputs()}
+    except MechdesignError:
+        with suppress(OSError):
+            return {path.parent / name for name in _NAMES.findall(path.read_text(encoding="utf-8", errors="replace"))}
+        return set()

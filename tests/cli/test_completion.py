@@ -1,0 +1,64 @@
+"""Completion in a shell: of commands, studies, and values; it loads nothing heavy."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SHELL = shutil.which("bash")
+
+
+@pytest.mark.skipif(SHELL is None, reason="there is no bash")
+def test_bash_completes_what_is_typed(folder):
+    """The script that is installed, in a bash of its own: it defines a function that a Tab calls."""
+    (folder / "deep").mkdir()
+    (folder / "deep/other.yaml").touch()
+    (folder / "notes.txt").touch()
+    tools = folder / "tools"
+    tools.mkdir()
+    (tools / "mechdesign").write_text(f"#!{sys.executable}\nfrom mechdesign.__main__ import main\nmain()\n")
+    (tools / "mechdesign").chmod(0o755)
+    environment = os.environ | {"HOME": str(folder), "PATH": f"{tools}:{os.environ['PATH']}"}
+
+    def bash(script):
+        command = [SHELL, "--norc", "-c", f"{script}\ntrue"]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+
+    bash("mechdesign --install-completion")
+    assert "mechdesign" in (folder / ".bashrc").read_text()
+    typed = {
+        ("wat",): ["watch"],
+        ("run", "s"): ["slider.yaml"],
+        ("run", "slider.yaml", "deep/"): ["deep/other.yaml"],
+        # A shell completes these by itself.
+        ("run", "de"): [],
+        ("kinematics", "--style", "p"): ["paper"],
+        ("watch", "slider.yaml", "k"): ["kinematics"],
+        ("new", "f"): ["five_bar", "four_bar"],
+        ("docs", "comp"): ["compare"],
+    }
+    lines = [
+        f"COMP_WORDS=(mechdesign {' '.join(words)}); COMP_CWORD={len(words)}; "
+        '_mechdesign_completion mechdesign; echo "${COMPREPLY[@]}"'
+        for words in typed
+    ]
+    script = next(Path(folder).rglob("mechdesign.sh"))
+    told = bash("\n".join([f". {script}", *lines])).splitlines()
+    assert [line.split() for line in told] == list(typed.values())
+
+
+def test_completion_imports_nothing_heavy(folder):
+    code = (
+        "import sys\nfrom mechdesign.__main__ import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'scipy', 'matplotlib', 'pydantic', 'yaml'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    for words in ("run s", "docs comp"):
+        settings = {"_MECHDESIGN_COMPLETE": "complete_bash", "COMP_WORDS": f"mechdesign {words}", "COMP_CWORD": "2"}
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True, check=False)
+        assert not done.returncode, done.stderr
