@@ -105,8 +105,9 @@ class _Dask(Pool):
             self._client: Any = distributed.Client(self._cluster or address, timeout=_ANSWERS, set_as_default=False)
         except (OSError, ValueError, RuntimeError) as error:
             self._end()
-            what = "no cluster starts" if address == LOCAL else "no scheduler answers there"
-            raise StudyError(f"--executor {name}: {what}: {error}") from None
+            if address == LOCAL:
+                raise StudyError(f"--executor {name}: no cluster starts: {error}") from None
+            raise StudyError(f"--executor {name}: no scheduler answers there: {error}") from None
         try:
             self._client.wait_for_workers(1, timeout=_FIRST_WORKER)
         except TimeoutError:

@@ -74,8 +74,8 @@ def test_workers_end_with_their_parent(here, number):
             _, told = process.communicate(timeout=30)
             until(lambda: not any(map(alive, workers)), 5)
         finally:
-            for worker in filter(alive, workers):
-                os.kill(worker, signal.SIGKILL)
+            for each in filter(alive, (process.pid, *workers)):
+                os.kill(each, signal.SIGKILL)
     if number == signal.SIGKILL:
         assert process.returncode == -number
     else:

@@ -257,9 +257,10 @@ def _without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list
     study, poses, warnings = question.study, question.poses, []
     for centre in question.centres:
         for kind, text in _CENTRELESS.items():
-            count, row = marks[f"{centre.name} {kind}"]
-            if count:
-                where, first = f"in {count} of {poses.count} poses", pose_in_words(study, poses, row)
+            rows, row = marks[f"{centre.name} {kind}"]
+            if rows:
+                where = f"in {rows} of {poses.count} poses"
+                first = pose_in_words(study, poses, row)
                 warnings.append(f"{centre.one} and {centre.other}: {where} {text}; the first: {first}")
     return warnings
 
@@ -267,12 +268,13 @@ def _without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list
 def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
     """A warning where a valid pose has no target."""
     study, poses, warnings = question.study, question.poses, []
-    for name, (count, row) in marks.items():
-        output = name.removesuffix(_WITHOUT_TARGET)
-        if output != name and count:
+    for mark, (count, row) in marks.items():
+        output = mark.removesuffix(_WITHOUT_TARGET)
+        if output != mark and count:
+            name = f"{output}_error"
             warnings.append(
                 f"{count} of {poses.count} poses lie where the target of {output} has no value: their "
-                f"{output}_error is nan; the first: {pose_in_words(study, poses, row)}"
+                f"{name} is nan; the first: {pose_in_words(study, poses, row)}"
             )
     return warnings
 
