@@ -73,6 +73,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     bar, four = study_of(FIVE_BAR), study_of(FOUR_BAR)
     front = study_of(FIVE_BAR, "optimize.method=pareto", "optimize.evaluations=60",
                      "optimize.variables.a={from: 0.25, to: 0.27}")  # fmt: skip
+    held = study_of(FIVE_BAR, "optimize.subject_to=[{contains: {circle: 0.001, center: free}}]")
     ranged = study_of(ARM)
     cases = study_of(FOUR_BAR, "matrix={vary: {mechanism.links.rod.length: [85, 90]}, results: [kinematics.B.x.max]}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
@@ -83,6 +84,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     return (
         ("pieces", mechdesign.workspace(bar), bar),
         ("goals", mechdesign.optimize(bar), bar),
+        ("held", mechdesign.optimize(held), held),
         ("front", mechdesign.optimize(front), front),
         ("target", mechdesign.kinematics(bar), bar),
         ("path", mechdesign.workspace(four), four),
