@@ -394,16 +394,26 @@ def test_a_poor_environment(here):
     assert any(name.endswith(".png") for name in manifest["files"])
 
 
+ARM_IN_POSES = """
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: [O, P, 100]}
+  drives: [arm]
+  sketch: {P: [100, 0]}
+stiffness: {at: P, actuators: {arm: 4.0e+7}, sweep: {arm: {from: 0, to: 90, number: 90}}}
+"""
+
+
 def test_a_limit_of_memory(here, invoke):
-    """Nine million poses in 0.45 GB: a message, and what was there before."""
-    arguments = ("kinematics", "slider.yaml", "--no-plots", "--out", "out")
+    """The stiffness in nine million poses in 0.45 GB: a message, and what was there before."""
+    (here / "arm.yaml").write_text(ARM_IN_POSES, encoding="utf-8")
+    arguments = ("stiffness", "arm.yaml", "--no-plots", "--out", "out")
     assert invoke(*arguments).exit_code == 0
     old = contents(here / "out")
 
     def little():
         resource.setrlimit(resource.RLIMIT_AS, (450_000_000, 450_000_000))
 
-    great = ["--set", "kinematics.sweep.theta={from: 0, to: 90, number: 9000000}"]
+    great = ["--set", "stiffness.sweep.arm.number=9000000"]
     done = subprocess.run(
         [*COMMAND, *arguments, *great], capture_output=True, text=True, preexec_fn=little, check=False
     )
