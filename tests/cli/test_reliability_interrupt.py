@@ -19,7 +19,7 @@ ARM = Path(__file__).parents[2] / "configs" / "two_link_arm.yaml"
 
 
 def interrupted(folder, stage, *changes):
-    """Exit code and kilobytes of a command on a pseudo-terminal that is interrupted when it tells of a stage (a pattern)."""
+    """Exit code and kilobytes of a command on a pseudo-terminal, interrupted when it tells of a stage (a pattern)."""
     controller, terminal = pty.openpty()
     command = [sys.executable, "-m", "mechdesign", "reliability", str(ARM), "--out", str(folder)]
     command += [part for change in changes for part in ("--set", change)]
