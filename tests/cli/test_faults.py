@@ -217,7 +217,10 @@ def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
     took = time.monotonic() - begun
     new = contents(here / "new")
     broken = []
-    for part in np.random.default_rng(1).random(8):
+    # On a busy machine many come too early or too late.
+    for part in np.random.default_rng(1).random(60):
+        if len(broken) >= 8 and any(broken):
+            break
         shutil.rmtree(here / "out", ignore_errors=True)
         invoke(*arguments, "out", "--seed", 1)
         old = contents(here / "out")
