@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import Interrupted, StudyError, counted
-from mechdesign.experiments.cases import IMPOSSIBLE, Answered, Case, Number, Wanted, answers, commands_of, foresee
+from mechdesign.experiments.cases import (
+    IMPOSSIBLE,
+    Answered,
+    Case,
+    Number,
+    Wanted,
+    answers,
+    commands_of,
+    foresee,
+    seeded,
+    wanted_in,
+)
 from mechdesign.experiments.design import cases_of
 from mechdesign.journal import Journal, digest
 from mechdesign.parallel import one_thread
@@ -62,10 +73,7 @@ def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
         raise StudyError(
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
-    wanted = [
-        Wanted(each.result, tuple(each.where.items()), (_SECTION, "results", k))
-        for k, each in enumerate(matrix.results)
-    ]
+    wanted = wanted_in(_SECTION, matrix.results)
     if not commands_of(study, wanted):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
@@ -87,8 +95,7 @@ def sweep(
 
     Parameters, tables and errors are told at `mechdesign.sweep`, the door to it.
     """
-    if seed is not None:
-        study = replace(study, seed=seed, resolved=study.resolved | {"seed": seed})
+    study = seeded(study, seed)
     cases, wanted = prepared(study)
     progress.start(len(cases), "cases")
     found: list[Answered] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,7 @@ from mechdesign.results import Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose
 from mechdesign.study import Study
 from mechdesign.study.loading import load_document
+from mechdesign.study.schema.matrix import Named
 from mechdesign.study.schema.study_file import override
 from mechdesign.study.text.document import Document, KeyPath, Mark
 
@@ -114,6 +115,18 @@ class Wanted:
         if chosen.missing:
             raise UnknownColumnError(chosen.missing)
         return chosen
+
+
+def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:
+    """What a section of the study names as its results."""
+    return [
+        Wanted(each.result, tuple(each.where.items()), (section, "results", k)) for k, each in enumerate(results)
+    ]  # fmt: skip
+
+
+def seeded(study: Study, seed: int | None) -> Study:
+    """The study with another seed, also in its data, from which cases are loaded; None is its own."""
+    return study if seed is None else replace(study, seed=seed, resolved=study.resolved | {"seed": seed})
 
 
 class Number(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError
 from mechdesign.experiments.analysis import unit_of
-from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee
+from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, seeded, wanted_in
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.parallel import one_thread
@@ -63,10 +62,7 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
         raise StudyError(
             "sensitivities need a section of that name, e.g. sensitivities: {results: [GII], parameters: [r]}"
         )
-    wanted = [
-        Wanted(each.result, tuple(each.where.items()), ("sensitivities", "results", k))
-        for k, each in enumerate(section.results)
-    ]
+    wanted = wanted_in(SENSITIVITIES.name, section.results)
     found: list[Changing] = []
     problems: list[Problem] = []
     for k, each in enumerate(section.parameters):
@@ -110,8 +106,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
 
     Parameters, tables and errors are told at `mechdesign.sensitivities`, the door to it.
     """
-    if seed is not None:
-        study = replace(study, seed=seed, resolved=study.resolved | {"seed": seed})
+    study = seeded(study, seed)
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
     plain = replace(study, requirements=(), resolved=judged_by_none)
@@ -150,37 +145,27 @@ class Row:
 
 
 def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence[Answered]) -> Iterator[Row]:
-    middle = _values(found[:1])[0]
-    sides = _chunks(found[1:], len(STEPS))
-    slopes = {}
-    beside = {}
-    for each in numbers:
-        pair = list(islice(sides, 2))
-        slopes[each.name] = slope(middle, _values(pair[0]), _values(pair[1]), each.step)
-        beside[each.name] = next((one.failed for side in pair for one in side if one.failed), "")
+    values = np.array([[number.value for number in each.numbers] for each in found])
+    middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(wanted))
+    slopes = [slope(middle, pair[0], pair[1], each.step) for each, pair in zip(numbers, sides, strict=True)]
+    count = 2 * len(STEPS)
+    reasons = [next((one.failed for one in found[1 + k * count :][:count] if one.failed), "")
+               for k in range(len(numbers))]  # fmt: skip
     for k, result in enumerate(wanted):
-        for each in numbers:
-            value, error, below, above = (float(part[k]) for part in slopes[each.name])
+        for each, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
+            value, error, below, above = (float(part[k]) for part in found_slope)
             scale = abs(middle[k]) * _NOTHING / each.step
             doubt = ""
             if not math.isnan(below):
                 doubt = f"has a kink here; its slope is {below:.6g} below {each.value:g} and {above:.6g} above"
             elif math.isnan(value):
-                doubt = f"is not known near {each.value:g}: {beside[each.name] or found[0].failed or 'it is nan there'}"
+                doubt = f"is not known near {each.value:g}: {reason or found[0].failed or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
                     f"(few samples); another step may help, {{parameter: {each.given}, step: {10 * each.step:g}}}"
                 )
             yield Row(result.title, each.given, float(middle[k]), each.value, value, error, below, above, doubt)
-
-
-def _values(found: Sequence[Answered]) -> Floats:
-    return np.array([[number.value for number in each.numbers] for each in found])
-
-
-def _chunks(found: Sequence[Answered], size: int) -> Iterator[Sequence[Answered]]:
-    return (found[k : k + size] for k in range(0, len(found), size))
 
 
 def _table(rows: Sequence[Row], result_units: Sequence[str], numbers: Sequence[Changing]) -> Table:
