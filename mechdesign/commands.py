@@ -48,7 +48,7 @@ SWEEP = Command(
     "sweep",
     "Which cases meet what is required?",
     "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
-    room="experiments.analysis",
+    room="experiments.sweep",
     section="matrix",
 )
 SENSITIVITIES = Command(

@@ -3,12 +3,15 @@
 Linear algebra keeps to one thread: the matrices are small, and several workers share the processors.
 `--budget 30m` is how long the random searches of `tests/hunt` go on, `--cases` how many each looks at.
 What is imported and collected is never garbage: the collector need not go through it at every study.
+Signals are as on a terminal: where they are ignored, as of a job in the background, commands that are tested would
+ignore them too.
 """
 
 from __future__ import annotations
 
 import gc
 import os
+import signal
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -18,6 +21,9 @@ from hypothesis import settings
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
 # Of each generation of the garbage collector, in place of 700, 10, 10.

@@ -107,9 +107,9 @@ def _run(command: str, study: Sequence[Path] | None, **said: Any) -> int:
 
 
 def _check(study: Sequence[Path] | None, **said: Any) -> int:
-    from mechdesign.cli import batch
+    from mechdesign.cli.check import check
 
-    return batch.check(study, Options(command="check", **said))
+    return check(study, Options(command="check", **said))
 
 
 def _watch(file: Path, commands: Sequence[str] | None, **said: Any) -> int:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mechdesign.cli.batch import failure
 from mechdesign.cli.execution import ask
+from mechdesign.cli.ledger import failure
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError

@@ -12,8 +12,8 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError
-from mechdesign.experiments.analysis import unit_of
 from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, seeded, wanted_in
+from mechdesign.experiments.sweep import unit_of
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.parallel import one_thread

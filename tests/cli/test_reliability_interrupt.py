@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
@@ -15,6 +16,7 @@ pty = pytest.importorskip("pty")
 if not Path("/proc/self/status").exists():
     pytest.skip("memory is read from /proc", allow_module_level=True)
 
+SECONDS = 120
 ARM = Path(__file__).parents[2] / "configs" / "two_link_arm.yaml"
 
 
@@ -27,6 +29,9 @@ def interrupted(folder, stage, *changes):
     person = {**os.environ, "CI": "", "TERM": "xterm"}
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=terminal, env=person)
     os.close(terminal)
+    # A command that hears of no interrupt goes on for minutes.
+    end = Timer(SECONDS, process.kill)
+    end.start()
     told = b""
     while not re.search(stage, told):
         told += os.read(controller, 4096)
@@ -40,6 +45,7 @@ def interrupted(folder, stage, *changes):
         except OSError:
             break
     os.close(controller)
+    end.cancel()
     assert memory is not None
     return process.wait(), int(memory[1])
 

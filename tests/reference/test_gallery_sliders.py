@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.gallery import point, result_of, row, study_named, unit
 
-from mechdesign.experiments.analysis import sweep
+from mechdesign.experiments.sweep import sweep
 
 
 def test_slider_crank_has_the_published_motion() -> None:

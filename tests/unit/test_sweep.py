@@ -11,7 +11,7 @@ import pytest
 
 import mechdesign
 from mechdesign.errors import Interrupted, StudyError
-from mechdesign.experiments import analysis
+from mechdesign.experiments import sweep as room
 from mechdesign.experiments.design import cases_of
 from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Floats
@@ -126,7 +126,7 @@ def test_what_is_wrong_is_told_before_anything_is_computed(
     def computed(*_: object, **__: object) -> None:
         raise AssertionError("a case was computed")
 
-    monkeypatch.setattr(analysis, "answers", computed)
+    monkeypatch.setattr(room, "answers", computed)
     with pytest.raises(StudyError) as error:
         mechdesign.sweep(study_of(matrix))
     assert message in str(error.value)
@@ -141,7 +141,7 @@ def test_nothing_asked_of_a_case_is_an_error():
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     study = study_of({"vary": {R: [20, 30, 40]}})
     whole = mechdesign.sweep(study).main
-    answered, computed = analysis.answers, []
+    answered, computed = room.answers, []
 
     def stopped(*given: Any, **options: Any) -> Any:
         for each in answered(*given, **options):
@@ -150,7 +150,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
             if len(computed) == 2:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(analysis, "answers", stopped)
+    monkeypatch.setattr(room, "answers", stopped)
     path = tmp_path / "unfinished.npz"
     with pytest.raises(Interrupted) as interrupt:
         mechdesign.sweep(study, journal=Journal(path, {"origin": 1}))

@@ -1,0 +1,53 @@
+"""`check`: what studies say, and what is wrong with them, before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mechdesign.cli import terminal
+from mechdesign.cli.batch import found_studies
+from mechdesign.cli.docs import explained
+from mechdesign.cli.execution import claim, extras, folder, load_study
+from mechdesign.cli.options import Options
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import printable
+from mechdesign.experiments import sensitivities, sweep
+from mechdesign.mechanism.describe import describe
+from mechdesign.parallel import one_thread
+from mechdesign.report.requirements import foresee
+from mechdesign.report.writer import write_sketch
+from mechdesign.study.schema.reliability import in_words
+
+
+@one_thread()
+def check(paths: Sequence[Path] | None, options: Options) -> int:
+    """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
+    worst = 0
+    owners: dict[str, Path | None] = {}
+    asked = found_studies(paths)
+    for path in asked:
+        try:
+            study = load_study(path, options)
+            label = study.label
+            if not options.quiet:
+                clearances = in_words(study.reliability, study.mechanism.graph)
+                head = printable(f"{label}: {study.name}")
+                terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
+            for warning in study.warnings:
+                terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
+            foresee(study, COMMANDS, goals=True)
+            if study.matrix is not None:
+                sweep.prepared(study)
+            if study.sensitivities is not None:
+                sensitivities.prepared(study)
+            if not options.no_plots:
+                claim(owners, study)
+                directory = folder(study, "check", options, several=len(asked) > 1)
+                told = write_sketch(directory, study, extras("check", options))
+                terminal.say(f"{label}: {told}", quiet=options.quiet)
+        except Exception as error:
+            code, message = explained(error)
+            terminal.say(message)
+            worst = max(worst, code)
+    return worst

@@ -1,0 +1,179 @@
+"""What becomes of many studies: told in their order, summed up in one table, and judged by the worst."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mechdesign.cli import summary, terminal
+from mechdesign.cli.annotations import annotate, of_error
+from mechdesign.cli.board import Board, Far
+from mechdesign.cli.docs import explained
+from mechdesign.cli.execution import RESULTS, Outcome, Source
+from mechdesign.cli.options import Options
+from mechdesign.courier import LostWorkerError
+from mechdesign.errors import Interrupted, OutputError, counted
+from mechdesign.report.page import pages
+from mechdesign.report.tables import to_csv
+from mechdesign.report.writer import write_file
+from mechdesign.study import Study
+
+if TYPE_CHECKING:
+    from mechdesign.report.page.page import Entry
+
+_KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A study that could be read, for who reads it again and answers its questions."""
+
+    number: int  # in the order of the studies
+    source: Source
+    label: str
+    root: Path  # of the folders of its questions
+    questions: tuple[tuple[str, Path], ...]  # commands, and the folders of their results
+
+
+@dataclass(frozen=True)
+class Said:
+    """Messages about a study, and the question that they are about where it is answered."""
+
+    words: str
+    given: Outcome | None = None
+
+
+@dataclass(frozen=True)
+class End:
+    """The end of a study: what an index of the reports says of it, an exit code of the report, an interrupt."""
+
+    entry: Entry | None = None
+    exit_code: int = 0
+    interrupted: bool = False
+
+
+class Ledger:
+    """What becomes of studies: told in their order, in whatever order it is heard, and written in the end."""
+
+    def __init__(self, options: Options, count: int, board: Board) -> None:
+        self.options = options
+        self.board = board
+        self.several = count > 1
+        self.interrupted = False
+        self.stopped = False  # nothing more is begun
+        self._answers: list[list[Outcome]] = [[] for _ in range(count)]
+        self._entries: dict[int, Entry] = {}
+        self._tasks: Sequence[Task] = ()
+        self._words: list[list[str]] = []
+        self._ended: set[int] = set()  # indices of tasks
+        self._first = 0  # task that is not ended
+        self._left = count  # studies without an answer
+        self._exit_code = 0
+
+    def missing(self, number: int, given: Outcome) -> None:
+        """Note a study that could not be read, or was lost."""
+        self._answers[number].append(given)
+        self._left -= 1
+        self.stopped |= self.options.fail_fast
+        if self.options.report and self.several:
+            from mechdesign.report.page.page import Entry
+
+            self._entries[number] = Entry(given.study, given.study, [], failed=given.failed)
+
+    def begin(self, tasks: Sequence[Task]) -> None:
+        """Begin with the questions."""
+        self._tasks = tasks
+        self._words = [[] for _ in tasks]
+        self.board.start([task.label for task in tasks])
+
+    def note(self, index: int, note: Far | Said) -> None:
+        """Hear of a task how far it is, or a question's outcome."""
+        task = self._tasks[index]
+        if isinstance(note, Far):
+            self.board.far(index, note)
+            great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
+            note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
+        self._words[index].append(note.words)
+        if note.given is not None:
+            self._answers[task.number].append(note.given)
+            self.board.done(index, note.given)
+            self.stopped |= self.options.fail_fast and note.given.exit_code > 0
+        if index == self._first:
+            self._say()
+
+    def end(self, index: int, end: End | None) -> None:
+        """Note the end of a task; it may be heard once more."""
+        if index in self._ended:
+            return
+        self._ended.add(index)
+        self.board.end(index)
+        number = self._tasks[index].number
+        if end is None:
+            if not self.stopped:
+                with redirect_stderr(io.StringIO()) as words:
+                    given = failure(self._tasks[index].label, "run", Path(), LostWorkerError(_KILLED))
+                self._words[index].append(words.getvalue())
+                self.missing(number, given)
+        else:
+            self._exit_code = max(self._exit_code, end.exit_code)
+            self._left -= not end.interrupted
+            self.interrupted |= end.interrupted and not self.stopped
+            if end.entry is not None:
+                self._entries[number] = end.entry
+        while self._first in self._ended:
+            self._say()
+            self._first += 1
+
+    def _say(self) -> None:
+        for words in self._words[self._first]:
+            self.board.say(words)
+        self._words[self._first].clear()
+
+    def close(self) -> int:
+        """Tell what came out, write the summary, the JUnit file and the index, and give the exit code."""
+        options = self.options
+        answers = [given for study in self._answers for given in study]
+        lost = f"; {self._left} of {len(self._answers)} studies were not answered" if self.several else ""
+        if self.interrupted:
+            terminal.say(f"interrupted; what was finished is whole{lost}")
+            answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
+        elif self.stopped and self._left:
+            terminal.say(f"stopped at the first failure{lost}")
+        if options.junit is not None:
+            self._file(options.junit, summary.junit(answers).encode())
+        table = summary.summary(answers)
+        root = options.out or RESULTS
+        if self.several and any(given.written for given in answers):
+            self._file(root / summary.NAME, to_csv(table).encode())
+        terminal.show(table, as_json=options.json)
+        if any(entry.link for entry in self._entries.values()):
+            from mechdesign.report.page.page import index
+
+            if self._file(root / pages.INDEX, index([entry for _, entry in sorted(self._entries.items())])):
+                terminal.say(f"index of the reports in {root / pages.INDEX}", quiet=options.quiet)
+        told = [summary.in_brief(given) for given in answers if given.command and given.exit_code]
+        if len(table) > 1 and told:
+            terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
+        return max(self._exit_code, *(given.exit_code for given in answers))
+
+    def _file(self, path: Path, data: bytes) -> bool:
+        """Write a file about all studies; whether it is there, for the run goes on without it."""
+        try:
+            write_file(path, data)
+        except OutputError as error:
+            terminal.say(str(error))
+            self._exit_code = max(self._exit_code, explained(error)[0])
+            return False
+        return True
+
+
+def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
+    """Say why a question has no answer; returns that as its outcome."""
+    code, message = explained(error)
+    terminal.say(message if code == 2 else f"{label}: {command}: {message}")
+    annotate("error", of_error(error, message, study))
+    return Outcome(label, command, directory, code, 0, failed=message)
