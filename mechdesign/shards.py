@@ -163,6 +163,18 @@ def command_of(path: Path) -> str:
     return str(_read(path)[0]["command"])
 
 
+def origin_of(path: Path) -> Mapping[str, Any]:
+    """What decided the values of a shard: the study, the changes of it and the seed.
+
+    Raises
+    ------
+    StudyError
+        If the file is damaged.
+    """
+    origin: Mapping[str, Any] = _read(path)[0]["origin"]
+    return origin
+
+
 def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:
     """All shards in a folder, each of the same origin.
 

@@ -114,12 +114,31 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
             label = study.label
             claim(owners, study)
             root = folder(study, "", options, several=len(paths) > 1)
-            tasks.append(Task(number, origin, label, root, _places(only or questions(study), root, options)))
+            own = _as_in_shards(label, root, options) if options.command == MERGE else options
+            if own != options:
+                study = load_source(origin, own)
+            tasks.append(Task(number, origin, label, root, _places(only or questions(study), root, own), own))
         except Exception as error:
             ledger.missing(number, failure(label, "check", Path(), error, study))
             if ledger.stopped:
                 break
     return tasks
+
+
+def _as_in_shards(label: str, root: Path, options: Options) -> Options:
+    """The options with the changes and the seed of a study's shards, or of the results that they were merged to."""
+    if options.overrides or options.seed is not None:
+        return options
+    folders = [root, *sorted(each for each in root.glob("*") if each.is_dir())]
+    parts = [path for directory in folders for path in shards.found(directory)]
+    origins = [shards.origin_of(parts[0])] if parts else filter(None, map(manifest.read, folders))
+    for origin in origins:
+        changes, seed = origin.get("overrides"), origin.get("seed")
+        if isinstance(changes, list) and isinstance(seed, int):
+            if changes:
+                terminal.say(f"{label}: as its shards, with {', '.join(map(str, changes))}", quiet=options.quiet)
+            return replace(options, overrides=[*map(str, changes)], seed=seed)
+    return options
 
 
 def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
@@ -148,11 +167,11 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
     # Work that goes elsewhere goes from this process.
     count = min(jobs, len(tasks)) if sys.platform == "linux" and options.executor is None else 1
     if count > 1:
-        options = replace(options, jobs=jobs // count)
+        tasks = [replace(task, options=replace(task.options, jobs=jobs // count)) for task in tasks]
         if not options.resume:
             _import(tasks, options)
     ledger.begin(tasks)
-    work = partial(_study, options, ledger.several)
+    work = partial(_study, ledger.several)
     crew: Crew[Task, End] | Alone[Task, End]
 
     def heard(index: int, note: Far | Said) -> None:
@@ -185,8 +204,9 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
             import_module(f"{FIGURES}.{command}")
 
 
-def _study(options: Options, several: bool, task: Task, hear: Tell) -> End:
+def _study(several: bool, task: Task, hear: Tell) -> End:
     """Answer the questions of a study, and write its page however that ends."""
+    options = task.options
     words = io.StringIO()
     told: list[Outcome] = []
     ended = End()
@@ -213,7 +233,7 @@ def _study(options: Options, several: bool, task: Task, hear: Tell) -> End:
             told.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
-            ended = replace(ended, entry=_page(study, task, told, options, several=several))
+            ended = replace(ended, entry=_page(study, task, told, several=several))
         except Exception as error:
             code, message = explained(error)
             terminal.say(f"{study.label}: report: {message}")
@@ -236,8 +256,9 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     return given
 
 
-def _page(study: Study, task: Task, told: Sequence[Outcome], options: Options, *, several: bool) -> Entry | None:
+def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -> Entry | None:
     """Write the page of a study, and give its line of the index of several; without the option an older one goes."""
+    options = task.options
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None

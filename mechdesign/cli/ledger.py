@@ -37,6 +37,7 @@ class Task:
     label: str
     root: Path  # of the folders of its questions
     questions: tuple[tuple[str, Path], ...]  # commands, and the folders of their results
+    options: Options
 
 
 @dataclass(frozen=True)

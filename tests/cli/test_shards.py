@@ -46,10 +46,13 @@ def test_four_shards_merged_are_one_run(studies, invoke):
     counts = [len(each.values) for each in pickle.loads(kept).values()]
     assert len(counts) == 2
     assert all(counts)
-    assert invoke("merge", *names, *common, "--out", "parts").exit_code == 0
+    # The changes and the seed are those of the shards.
+    merged = invoke("merge", *names, "--no-plots", "--out", "parts")
+    assert merged.exit_code == 0
+    assert "two_link_arm: as its shards, with seed=3" in merged.stderr
     assert content("parts") == content("whole")
     # A second time there is nothing to do.
-    again = invoke("merge", *names, *common, "--out", "parts")
+    again = invoke("merge", *names, "--no-plots", "--out", "parts")
     assert again.exit_code == 0
     assert "they are whole" in again.stderr
 
@@ -61,6 +64,15 @@ def test_shards_of_one_command(studies, invoke, name):
     for k in (1, 2):
         assert invoke("reliability", *asked, "--out", "parts", "--shard", f"{k}/2").exit_code == 0
     assert invoke("merge", *asked, "--out", "parts").exit_code == 0
+    assert content("parts") == content("whole")
+
+
+def test_shards_of_cases_that_the_command_line_names(studies, invoke):
+    asked = ["sweep", "offset_slider_crank.yaml", "--no-plots", "--vary", "mechanism.parameters.r=1.2:1.6:0.2"]
+    assert invoke(*asked, "--out", "whole").exit_code == 0
+    for k in (1, 2):
+        assert invoke(*asked, "--out", "parts", "--shard", f"{k}/2").exit_code == 0
+    assert invoke("merge", "offset_slider_crank.yaml", "--no-plots", "--out", "parts").exit_code == 0
     assert content("parts") == content("whole")
 
 
