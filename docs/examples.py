@@ -25,10 +25,12 @@ import threading
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import yaml
+from forking import forked
 
 import mechdesign
 from mechdesign.errors import MechdesignError
@@ -51,10 +53,11 @@ _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 @dataclass
 class Page:
-    """A page of the site as its examples go: its folder, its files, what is wrong with it."""
+    """A page of the site as its examples go: its folder, its program, its files, what is wrong with it."""
 
     path: Path
     folder: Path
+    tools: Path
     study: str = ""
     names: dict[str, Any] = field(default_factory=dict)
     printed: str = ""
@@ -73,11 +76,13 @@ def merged(base: Any, part: Any) -> Any:
     return part
 
 
-def terminal(command: str, folder: Path) -> str:
-    """What a terminal shows of a command: first what goes to standard output, then the messages."""
+def terminal(command: str, folder: Path, tools: Path) -> str:
+    """What a terminal shows of a command: first what goes to standard output, then the messages.
+
+    `tools` is the folder of the program `mechdesign`.
+    """
     ours, theirs = pty.openpty()
-    tools = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    settings = os.environ | {"TERM": "dumb", "PATH": tools, "NO_COLOR": "1"}
+    settings = os.environ | {"TERM": "dumb", "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}", "NO_COLOR": "1"}
     with subprocess.Popen(
         command, shell=True, cwd=folder, env=settings, stdin=subprocess.DEVNULL, stdout=theirs, stderr=subprocess.PIPE
     ) as process:
@@ -151,7 +156,7 @@ def _commands(body: str) -> Iterator[tuple[str, str]]:
 def _console(page: Page, body: str, where: int) -> str:
     found = []
     for command, told in _commands(body):
-        shown = terminal(command, page.folder)
+        shown = terminal(command, page.folder, page.tools)
         if not agree(told, shown):
             page.fail(where, f"$ {command}\nshows\n{shown}where the page has\n{told}")
             told = shown
@@ -194,13 +199,13 @@ def _python(page: Page, body: str, where: int) -> None:
     page.printed = stream.getvalue()
 
 
-def _run(path: Path) -> tuple[str, list[str]]:
+def _run(tools: Path, path: Path) -> tuple[str, list[str]]:
     """The text of a page as it would be true, and what is wrong with it as it is."""
     folder = RUN / path.relative_to(ROOT).with_suffix("")
     # What an earlier run has left could make a page true that is not.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    page = Page(path, folder)
+    page = Page(path, folder, tools)
 
     def block(found: re.Match[str]) -> str:
         kind, body = found["kind"].strip(), found["body"]
@@ -230,16 +235,17 @@ def pages(names: Iterable[str] = ()) -> list[Path]:
 
 def wrong(paths: Iterable[Path]) -> list[str]:
     """Run the examples of these pages; what is wrong with them, in words."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return [words for _, told in pool.map(_run, paths) for words in told]
+    with forked() as tools, ThreadPoolExecutor(os.cpu_count()) as pool:
+        return [words for _, told in pool.map(partial(_run, tools), paths) for words in told]
 
 
 def main() -> None:
     """Write into the pages what their commands print now."""
-    for path in pages(sys.argv[1:]):
-        text, told = _run(path)
-        path.write_text(text, encoding="utf-8")
-        print(*told, sep="\n")
+    with forked() as tools:
+        for path in pages(sys.argv[1:]):
+            text, told = _run(tools, path)
+            path.write_text(text, encoding="utf-8")
+            print(*told, sep="\n")
 
 
 if __name__ == "__main__":
