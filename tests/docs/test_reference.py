@@ -78,7 +78,9 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     cases = study_of(FOUR_BAR, "matrix={vary: {mechanism.links.rod.length: [85, 90]}, results: [kinematics.B.x.max]}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
     slopes = study_of(
-        FOUR_BAR, "sensitivities={results: [kinematics.B.x.max], parameters: [mechanism.links.rod.length]}"
+        FOUR_BAR,
+        "kinematics={poses: [{crank: 30}], outputs: [B]}",
+        "sensitivities={results: [kinematics.B.x], parameters: [mechanism.links.rod.length]}",
     )
     stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
     return (

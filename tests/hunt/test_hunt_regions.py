@@ -63,8 +63,14 @@ def within(angle: np.ndarray, low: float, width: float) -> Flags:
     return np.asarray((angle - np.radians(low)) % (2 * np.pi) < np.radians(width))
 
 
-def cross(a: Complex, b: Complex) -> np.ndarray:
-    return np.asarray((np.conj(a) * b).imag)
+def cross(a: Complex | complex, b: Complex) -> np.ndarray:
+    return np.asarray(np.real(a) * b.imag - np.imag(a) * b.real)
+
+
+def determinant(bars: list[Complex], arms: list[complex]) -> np.ndarray:
+    """Of a platform's Jacobian, whose rows are the directions of the bars and their moments about the point."""
+    pairs = ((bars[1], bars[2]), (bars[2], bars[0]), (bars[0], bars[1]))
+    return np.asarray(sum(cross(arm, bar) * cross(*pair) for arm, bar, pair in zip(arms, bars, pairs, strict=True)))
 
 
 def told(z: Complex | complex) -> str:
@@ -250,10 +256,7 @@ def platform(rng: np.random.Generator) -> Robot | None:
         good, pins = feet(z, angle)
         arms = [corner * np.exp(1j * angle) for corner in corners]
         bars = [z + arms[k] - pins[k] for k in range(3)]
-        # The platform's Jacobian: directions of the bars and their moments about the point.
-        rows = np.array([[bar.real, bar.imag, cross(np.full(z.shape, arm), bar)] for bar, arm in
-                         zip(bars, arms, strict=True)])  # fmt: skip
-        return good, np.linalg.det(np.moveaxis(rows, (0, 1), (-2, -1)))
+        return good, determinant(bars, arms)
 
     half = 300.0
     point = somewhere(rng, solve, half)
@@ -447,9 +450,7 @@ def test_over_a_range_only_the_sketchs_piece_counts() -> None:
         good = np.all(
             [(np.abs(bar) > a) & (np.abs(bar) < b) for bar, a, b in zip(bars, low, high, strict=True)], axis=0
         )
-        rows = np.array([[bar.real, bar.imag, cross(np.full(z.shape, arm), bar)] for bar, arm in
-                         zip(bars, arms, strict=True)])  # fmt: skip
-        return good & (z.real**2 > 0.04), np.linalg.det(np.moveaxis(rows, (0, 1), (-2, -1)))
+        return good & (z.real**2 > 0.04), determinant(bars, list(arms))
 
     robot = Robot(DIVIDED, solve, 0.4 + 1j, 2.0)
     good = reached(robot, 12, same=True)
