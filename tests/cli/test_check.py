@@ -109,7 +109,7 @@ def test_checking_imports_no_solver_of_scipy(folder, arguments):
         "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
         "import json\njson.dump([name for name in sys.modules if '.' not in name], open('modules.json', 'w'))\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
     modules = set(json.loads((folder / "modules.json").read_text()))
     assert ("matplotlib" in modules) == (not arguments)

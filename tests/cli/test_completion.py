@@ -25,7 +25,7 @@ def test_bash_completes_what_is_typed(folder):
 
     def bash(script):
         command = [SHELL, "--norc", "-c", f"{script}\ntrue"]
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=120).stdout
 
     bash("mechdesign --install-completion")
     assert "mechdesign" in (folder / ".bashrc").read_text()
@@ -60,5 +60,7 @@ def test_completion_imports_nothing_heavy(folder):
     for words in ("run s", "docs comp"):
         settings = {"_MECHDESIGN_COMPLETE": "complete_bash", "COMP_WORDS": f"mechdesign {words}", "COMP_CWORD": "2"}
         command = [sys.executable, "-c", code]
-        done = subprocess.run(command, env=os.environ | settings, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            command, env=os.environ | settings, capture_output=True, text=True, check=False, timeout=120
+        )
         assert not done.returncode, done.stderr

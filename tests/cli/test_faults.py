@@ -173,7 +173,7 @@ def test_a_stream_that_cannot_be_written(here, stream, how):
     gate = SLIDER + "requirements: [{result: kinematics.theta, at_most: 80}]\n"
     (here / "gate.yaml").write_text(gate)
     command = [*COMMAND, "run", "slider.yaml", "gate.yaml", "--no-plots", "--junit", "junit.xml"]
-    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=spoil, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=spoil, check=False, timeout=120)
     lost = (stream, how) == (1, "full")
     assert done.returncode == (4 if lost else 1)
     assert 'tests="3"' in (here / "junit.xml").read_text()
@@ -390,7 +390,7 @@ def test_a_poor_environment(here):
     def few():
         resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
 
-    done = subprocess.run(command, env={"LC_ALL": "C"}, capture_output=True, preexec_fn=few, check=False)
+    done = subprocess.run(command, env={"LC_ALL": "C"}, capture_output=True, preexec_fn=few, check=False, timeout=120)
     assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
     manifest = json.loads((here / "aus/größe/größe/kinematics/manifest.json").read_text(encoding="utf-8"))
     assert manifest["study"]["name"] == "Größe → µm"
@@ -418,7 +418,12 @@ def test_a_limit_of_memory(here, invoke):
 
     great = ["--set", "stiffness.sweep.arm.number=9000000"]
     done = subprocess.run(
-        [*COMMAND, *arguments, *great], capture_output=True, text=True, preexec_fn=little, check=False
+        [*COMMAND, *arguments, *great],
+        capture_output=True,
+        text=True,
+        preexec_fn=little,
+        check=False,
+        timeout=120,
     )
     assert done.returncode == 4
     assert done.stderr.splitlines()[-1].startswith("not enough memory for this")

@@ -50,7 +50,7 @@ def test_help_imports_nothing_heavy(arguments):
         "heavy = {'numpy', 'scipy', 'matplotlib', 'pint', 'yaml', 'rich'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
 
 

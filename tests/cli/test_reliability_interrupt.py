@@ -47,7 +47,7 @@ def interrupted(folder, stage, *changes):
     os.close(controller)
     end.cancel()
     assert memory is not None
-    return process.wait(), int(memory[1])
+    return process.wait(60), int(memory[1])
 
 
 def test_a_billion_samples_interrupted(tmp_path):

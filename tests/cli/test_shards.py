@@ -162,6 +162,8 @@ def test_the_same_files_on_executors(studies, invoke):
     assert content("two") == content("here")
     pytest.importorskip("distributed")
     arguments = [*asked, "--out", "dask", "--executor", "dask:local", "--jobs", "2"]
-    done = subprocess.run([sys.executable, "-m", "mechdesign", *arguments], capture_output=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "mechdesign", *arguments], capture_output=True, check=True, timeout=120
+    )
     assert content("dask") == content("here")
     assert b"Traceback" not in done.stderr

@@ -205,7 +205,7 @@ def test_in_ci_there_are_plain_lines(studies, monkeypatch):
     ours, theirs = pty.openpty()
     command = [sys.executable, "-c", PROGRAM.replace("0.3", "0.015"), "run", "a.yaml", "slider.yaml", "--no-plots"]
     environment = os.environ | {"CI": "true"}
-    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=theirs, env=environment, check=True)
+    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=theirs, env=environment, check=True, timeout=120)
     os.close(theirs)
     told = os.read(ours, 65536)
     os.close(ours)

@@ -58,7 +58,7 @@ def at_terminal(folder, pause, *arguments, interrupt_after=None):
             process.send_signal(signal.SIGINT)
             interrupt_after = None
     os.close(ours)
-    return process.wait(), re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+    return process.wait(60), re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
 
 
 def test_a_table_with_what_there_is_room_for_and_where_the_rest_is(tmp_path):
@@ -107,7 +107,7 @@ def test_a_reader_that_has_had_enough_is_no_error(tmp_path):
     assert process.stderr is not None
     talk = process.stderr.read().decode()
     process.stderr.close()
-    assert process.wait() == 0, talk
+    assert process.wait(60) == 0, talk
     assert "Error" not in talk
 
 

@@ -40,7 +40,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the built site."""
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-n", "-W", "-q", "-d", str(folder / "doctrees"), str(ROOT / "docs")]
-    done = subprocess.run([*command, str(folder / "html")], capture_output=True, text=True, check=False)
+    done = subprocess.run([*command, str(folder / "html")], capture_output=True, text=True, check=False, timeout=400)
     assert done.returncode == 0, done.stderr
     return folder / "html"
 

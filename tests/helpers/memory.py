@@ -19,5 +19,7 @@ sys.exit(code)
 
 def peak_of(command: Sequence[str]) -> int:
     """Bytes that a command used at most; it must succeed."""
-    done = subprocess.run([sys.executable, "-S", "-c", _BETWEEN, *command], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", _BETWEEN, *command], capture_output=True, text=True, check=True, timeout=120
+    )
     return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)

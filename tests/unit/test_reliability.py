@@ -261,7 +261,7 @@ def test_moments_along_a_sweep_import_no_scipy(tmp_path: Path) -> None:
     code = (
         f"import sys, mechdesign; mechdesign.reliability(mechdesign.load({str(file)!r})); print('scipy' in sys.modules)"
     )
-    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120).stdout
     assert said.strip() == "False"
 
 

@@ -88,7 +88,7 @@ def test_pint_is_imported_only_for_an_uncommon_unit(tmp_path):
     study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")
     code = f"import sys, mechdesign; mechdesign.load({str(study)!r}); print('pint' in sys.modules)"
     code += f"; mechdesign.load({str(study)!r}, ['mechanism.links.arm.length=2 ft']); print('pint' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.split() == ["False", "True"]
 
 

@@ -43,7 +43,9 @@ def test_files_do_not_depend_on_threads(tmp_path):
         change = "workspace.indices=[inverse_condition, sigma_min]"
         arguments = ["workspace", str(study), "--quiet", "--out", str(tmp_path / threads), "--set", change]
         environment = os.environ | {"OPENBLAS_NUM_THREADS": threads}
-        subprocess.run([sys.executable, "-c", code, *arguments], env=environment, check=True, capture_output=True)
+        subprocess.run(
+            [sys.executable, "-c", code, *arguments], env=environment, check=True, timeout=120, capture_output=True
+        )
     ours, theirs = ({file.name: file.read_bytes() for file in (tmp_path / n).iterdir()} for n in ("1", "2"))
     assert ours == theirs
     assert any(name.endswith(".png") for name in ours)
