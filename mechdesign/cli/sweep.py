@@ -43,7 +43,12 @@ class Matrix:
         if self.vary or self.cases is not None:
             yield from (f"matrix.{key}=" for key in ("vary", "method", "samples", "cases"))
         if self.vary:
-            yield f"matrix.vary={json.dumps(dict(map(_varied, self.vary)))}"
+            varied = [_varied(each) for each in self.vary]
+            names = [name for name, _ in varied]
+            for name in names:
+                if names.count(name) > 1:
+                    raise StudyError(f"--vary {name} is given twice; list its values with commas between them")
+            yield f"matrix.vary={json.dumps(dict(varied))}"
         if self.cases is not None:
             beside = study.parent if study is not None else Path()
             yield f"matrix.cases={json.dumps(os.path.relpath(self.cases, beside))}"

@@ -31,6 +31,7 @@ from mechdesign.report.requirements import Verdict, in_words
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.study_file import entry
+from mechdesign.study.text.units import QUANTITY, Units
 
 _SECTION = "matrix"
 
@@ -79,7 +80,9 @@ def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
     foresee(study, wanted)
-    return cases, wanted
+    # What is required has its column.
+    required = requirement_names(study)
+    return cases, [each for each in wanted if each.title not in required]
 
 
 @one_thread()
@@ -180,7 +183,7 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
     for place, name in enumerate(name for name, _ in found.cases[0].changes):
         values = [case.changes[place][1] for case in found.cases[:count]]
-        yield Column(name, _array(values), unit_of(study, name), "varied")
+        yield Column(name, _array(values, study.units), unit_of(study, name), "varied")
     for k, name in enumerate(requirement_names(study)):
         verdicts = [each.verdicts[k] for each in answered]
         unit = next((each.unit for each in verdicts if each.unit), "")
@@ -195,9 +198,13 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     yield Column("reason", np.array([each.failed for each in answered]), "", "why the case failed")
 
 
-def _array(values: Sequence[Any]) -> NDArray[Any]:
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, dtype=float)
+def _array(values: Sequence[Any], units: Units) -> NDArray[Any]:
+    """Values as numbers, in these units, where each is one; else as words."""
+    numbers = [
+        units.convert(value) if isinstance(value, str) and QUANTITY.fullmatch(value) else value for value in values
+    ]
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
+        return np.array(numbers, dtype=float)
     return np.array([_text(value) for value in values])
 
 

@@ -55,6 +55,8 @@ def test_the_exit_code_is_the_worst_of_the_cases(study, invoke, values, code):
         (["--vary", "mechanism.parameters.rr=1:2:1"], '--vary: matrix.vary.mechanism.parameters.rr: the study has no'),
         (["--vary", f"{R}=1", "--results", "kinematics.B.y.max"], "--results: matrix.results.0: the result of"),
         (["--vary", f"{R}"], f"--vary {R}: is <dotted name>=START:STOP:STEP"),
+        (["--vary", f"{R}=1", "--vary", f"{R}=2"], f"--vary {R} is given twice"),
+        (["--vary", f"{R}=1", "--results", "GII,GII"], "--results: matrix.results: 'GII' is listed twice"),
         (["--vary", f"{R}=1", "--cases", "cases.csv"], "--vary and --cases contradict each other"),
         (["--vary", f"{R}=1:2", "--method", "latin_hypercub", "--samples", "4"], "did you mean 'latin_hypercube'?"),
         ([], "a sweep needs cases"),
