@@ -30,7 +30,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.report.requirements import Verdict, in_words
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.study_file import entry
+from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.text.units import QUANTITY, Units
 
 _SECTION = "matrix"
@@ -225,12 +225,18 @@ def requirement_names(study: Study) -> list[str]:
 
 
 def unit_of(study: Study, name: str) -> str:
-    """Unit of an entry, where it is a parameter or a number of the geometry; else nothing, or what the study says."""
+    """Unit of an entry, as far as the study or its format tell it."""
     keys = entry(study.resolved, name)
     for k in range(len(keys), 0, -1):
         if keys[:k] in study.kinds:
             return study.units.label(study.kinds[keys[:k]])
+    # What a short form stands for lies below it.
+    kinds = kinds_of(keys) | {kind for path, kind in study.kinds.items() if path[:-1] == keys}
+    if len(kinds) == 1:
+        return study.units.label(*kinds)
     section, *path = keys
+    if keys[:2] == ("reliability", "dimensions"):
+        return study.unit_of(str(keys[2])) or ""
     if section != "mechanism" or len(path) < 2:
         return ""
     kind, owner, *rest = path

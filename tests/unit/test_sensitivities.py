@@ -72,6 +72,25 @@ sensitivities:
     assert table["unit"].tolist() == ["mm/N", "mm/(N*mm/rad)"]
 
 
+def test_units_of_what_is_no_parameter_of_the_mechanism():
+    """Of a tolerance and of a section's numbers, in the short form too: without them the ratio has another unit."""
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0]}, beam: [O, P, 400]}
+  drives: {q: {angle: beam}}
+  sketch: {P: [400, 0]}
+stiffness: {at: P, sections: {s: {E: 210 GPa, width: 20, height: 40}}, elastic: {beam: s}, poses: [{q: 30}]}
+reliability: {dimensions: {"*.length": 0.06, q: 0.01}, poses: [{q: 30}], limits: {P.x: 0.05}, methods: [analytic]}
+sensitivities:
+  results: [stiffness.k_min]
+  parameters: [stiffness.sections.s.E, stiffness.sections.s.height, "reliability.dimensions.*.length",
+               reliability.dimensions.q]
+"""
+    _, table = rows(text)
+    assert table["at_unit"].tolist() == ["N/mm^2", "mm", "mm", "deg"]
+    assert table["unit"].tolist() == ["N/(mm*N/mm^2)", "N/(mm*mm)", "N/(mm*mm)", "N/(mm*deg)"]
+
+
 def differences(function, at, step):
     """What `slope` finds of a function of an array."""
     places = at + step * np.array([[0], [-1], [1]]) * STEPS

@@ -90,6 +90,8 @@ def test_labels(kind, label):
         ("mm/s", "N", "mm/(s*N)"),
         ("deg", "deg/s", "deg/(deg/s)"),
         ("", "mm/s", "1/(mm/s)"),
+        ("mm/(s*N)", "deg", "mm/(s*N*deg)"),
+        ("mm", "rad/(N*mm)", "mm/(rad/(N*mm))"),
         ("mm", "", "mm"),
     ],
 )

@@ -142,7 +142,7 @@ class Units:
         if not below:
             return above
         one, _, under = above.partition("/")
-        parts = [part.removeprefix("(").removesuffix(")") for part in (under, below) if part]
+        parts = [part[1:-1] if part.startswith("(") else part for part in (under, below) if part]
         under = "*".join(parts)
         return f"{one or '1'}/{f'({under})' if {'*', '/'} & {*under} else under}"
 
