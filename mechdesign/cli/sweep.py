@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mechdesign.cli.execution import ask
+from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.ledger import failure
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit
@@ -84,16 +84,18 @@ def _as_typed(error: StudyError) -> StudyError:
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
-    given = None
+    given, label = None, path.stem if path is not None else "study"
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
         return given.exit_code
-    except Interrupted:
+    except KeyboardInterrupt as error:
+        words = str(error) or "interrupted"
+        given = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
         raise
     except Exception as wrong:
         error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
-        given = failure(path.stem if path is not None else "study", "sweep", Path(), error)
+        given = failure(label, "sweep", Path(), error)
         return given.exit_code
     finally:
         if options.junit is not None and given is not None:

@@ -28,7 +28,7 @@ from mechdesign.journal import Journal, digest
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.requirements import Verdict, in_words
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import VARIED, Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.text.units import QUANTITY, Units
@@ -183,7 +183,7 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
     for place, name in enumerate(name for name, _ in found.cases[0].changes):
         values = [case.changes[place][1] for case in found.cases[:count]]
-        yield Column(name, _array(values, study.units), unit_of(study, name), "varied")
+        yield Column(name, _array(values, study.units), unit_of(study, name), VARIED)
     for k, name in enumerate(requirement_names(study)):
         verdicts = [each.verdicts[k] for each in answered]
         unit = next((each.unit for each in verdicts if each.unit), "")

@@ -140,6 +140,13 @@ def test_what_is_no_derivative_is_told():
     assert "cannot be assembled" in answer.warnings[0]
 
 
+def test_warnings_of_the_cases_are_told():
+    whole = "kinematics={sweep: {crank: {from: 0, to: 360, step: 90}}, outputs: [B.x]}"
+    asked = "sensitivities={results: [kinematics.extremes.B.x.range], parameters: [r]}"
+    answer, _ = rows(SLIDER, asked, "mechanism.parameters.l=39.9", whole)
+    assert any("of 13 cases have warnings; the first: kinematics: " in warning for warning in answer.warnings)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

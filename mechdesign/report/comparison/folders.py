@@ -10,6 +10,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from mechdesign.commands import SWEEP
 from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import (
@@ -24,7 +25,7 @@ from mechdesign.report.comparison.differences import (
 )
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.report.tables import from_csv
-from mechdesign.results import Table
+from mechdesign.results import VARIED, Table
 from mechdesign.study.text.document import leaves, read
 
 _POSE_KEYS = ("poses", "sweep", "path")
@@ -213,8 +214,14 @@ def _table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
 
 
 def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], Any]:
-    """Coordinates that a study gives for a command's poses, by default those of `kinematics`, and their values."""
+    """Coordinates that a study gives for a command's poses, by default those of `kinematics`, and their values.
+
+    Of a sweep the entries that vary.
+    """
     resolved = content["study"].get("resolved") or {}
+    if command == SWEEP.name:
+        columns = [each for about in content["tables"].values() for each in about["columns"]]
+        return frozenset(each["name"] for each in columns if each["meaning"] == VARIED), resolved.get(SWEEP.section)
     for section in (resolved.get(command), resolved.get("kinematics")):
         poses = {key: section[key] for key in _POSE_KEYS if section.get(key)} if isinstance(section, dict) else {}
         if not poses:
