@@ -89,8 +89,8 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
         return given.exit_code
-    except KeyboardInterrupt as error:
-        words = str(error) or "interrupted"
+    except KeyboardInterrupt as stop:
+        words = str(stop) or "interrupted"
         given = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
         raise
     except Exception as wrong:
