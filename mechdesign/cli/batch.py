@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import io
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr
@@ -70,7 +71,7 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
     """
     if not paths:
         return [None]
-    found: dict[Path | None, None] = {}
+    found: dict[str, Path] = {}
     for path in paths:
         here = [path]
         if path.is_dir():
@@ -79,8 +80,9 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
             here = sorted(map(Path, glob.glob(str(path), recursive=True)))
         if not here:
             raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
-        found |= dict.fromkeys(here)
-    return list(found)
+        for file in here:
+            found.setdefault(os.path.abspath(file), file)
+    return [*found.values()]
 
 
 @one_thread()

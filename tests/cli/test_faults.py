@@ -341,7 +341,7 @@ def test_folders_and_patterns(here, invoke):
     (here / "deep/notes.txt").write_text("none")
     (here / "deep/.gitlab-ci.yml").write_text("stages: [test]")
     (here / "deep/c.yaml").rename(here / "deep/c.yml")
-    done = invoke("run", "deep", "deep/[ab].yaml", "deep/c.yml", "--no-plots", "--out", "out")
+    done = invoke("run", "deep", "deep/[ab].yaml", here / "deep/c.yml", "--no-plots", "--out", "out")
     assert done.exit_code == 0, done.stderr
     assert [row.split(",")[0] for row in done.stdout.splitlines()] == ["study", "a", "b", "c"]
     assert (here / "out/summary.csv").read_text() == done.stdout
