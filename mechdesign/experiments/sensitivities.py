@@ -163,9 +163,11 @@ def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence
             elif math.isnan(value):
                 doubt = f"is not known near {each.value:g}: {reason or found[0].failed or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
+                # Roughness wants longer steps, a curve that bends within them shorter ones.
+                other = each.step * 10 if each.step <= _PART * abs(each.value) else each.step / 10
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
-                    f"(few samples); another step may help, {{parameter: {each.given}, step: {10 * each.step:g}}}"
+                    f"(few samples); another step may help, {{parameter: {each.given}, step: {other:g}}}"
                 )
             yield Row(result.title, each.given, float(middle[k]), each.value, value, error, below, above, doubt)
 

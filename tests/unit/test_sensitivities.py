@@ -140,6 +140,20 @@ def test_what_is_no_derivative_is_told():
     assert "cannot be assembled" in answer.warnings[0]
 
 
+def test_another_step_is_shorter_where_that_given_is_long():
+    text = """
+mechanism:
+  parameters: {g: 100}
+  links: {ground: {O: [0, 0], D: [g, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {outputs: [rocker.angle]}
+sensitivities: {results: kinematics.extremes.rocker.angle.range, parameters: {parameter: g, step: 40}}
+"""
+    answer, _ = rows(text)
+    assert "another step may help, {parameter: g, step: 4}" in answer.warnings[0]
+
+
 def test_warnings_of_the_cases_are_told():
     whole = "kinematics={sweep: {crank: {from: 0, to: 360, step: 90}}, outputs: [B.x]}"
     asked = "sensitivities={results: [kinematics.extremes.B.x.range], parameters: [r]}"
