@@ -18,7 +18,7 @@ from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Floats, Ints, evenly
 from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column
 from mechdesign.study import Study
@@ -481,4 +481,4 @@ def _solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
 
 def _rows(poses: Poses, most: int) -> Ints:
     rows = poses.groups[0].rows
-    return rows[np.unique(np.linspace(0, len(rows) - 1, most).round().astype(np.intp))]
+    return rows[evenly(len(rows), most)]

@@ -13,9 +13,10 @@ from mechdesign.analyses.poses import solve_pose, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
+from mechdesign.numerics.arrays import evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
+from mechdesign.report.figures.framing import column_width, fit, framed, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
@@ -54,7 +55,7 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
         if (scene := pose(mechanism, solved)) is not None:
             panels.append((words, solved, 0))
             return _compose(study, panels, travels([*scenes, scene]))
-    some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
+    some = evenly(len(sweep.rows), _POSES).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
     if first is not None:
@@ -139,7 +140,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return (style.width() - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
+    return column_width(columns), _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
 
 
 def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:
