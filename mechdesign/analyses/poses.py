@@ -333,7 +333,7 @@ def continuous(
     )
     if len(coarse):
         begins = known[at[coarse]]
-        moved[:, coarse] = _on_the_way(angles, given, begins, begins + 1, parts[at[coarse]], solve)
+        moved[:, coarse] = _on_the_way(angles, given, begins, parts[at[coarse]], solve)
     # Whole turns from each of some poses on, counted anew on every line of a grid.
     heads = np.flatnonzero(starts)
     begins = np.concatenate([heads, at + 1])
@@ -366,10 +366,9 @@ def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
 
 
 def _on_the_way(
-    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, ends: Ints,
-    parts: Ints, solve: Solve,
-) -> Floats:  # fmt: skip
-    """How far each angle turns between pairs of poses, shape (angles, pairs); nearest where the way does not close."""
+    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, parts: Ints, solve: Solve
+) -> Floats:
+    """How far each angle turns to the next pose, shape (angles, begins); the nearest way where it does not close."""
     found = np.empty((len(angles), len(begins)))
     number = np.maximum(parts, 2)
     pending = np.arange(len(begins))
@@ -377,12 +376,12 @@ def _on_the_way(
         count = int(number[pending].min())
         at = pending[number[pending] == count]
         left = [pending[number[pending] > count]]
-        for first in range(0, len(at), max(1, POSES_AT_ONCE // (count + 1))):
-            pairs = at[first : first + max(1, POSES_AT_ONCE // (count + 1))]
+        most = max(1, POSES_AT_ONCE // (count + 1))
+        for first in range(0, len(at), most):
+            pairs = at[first : first + most]
             way = np.linspace(0.0, 1.0, count + 1)
-            between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
-            configuration = solve(between, begins[pairs, None])
-            turned = np.stack([np.broadcast_to(configuration.value(c), configuration.shape) for c in angles])
+            between = [v[begins[pairs], None] * (1 - way) + v[begins[pairs] + 1, None] * way for v in given]
+            turned = _values_of(angles, solve(between, begins[pairs, None]))
             steps = wrap(np.diff(turned, axis=-1))
             closed = np.isfinite(steps).all(axis=(0, 2))
             sure = (np.abs(steps) < SURE_TURN).all(axis=(0, 2))

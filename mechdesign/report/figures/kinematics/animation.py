@@ -29,19 +29,17 @@ _MAX_FRAME = 160
 
 
 def animation(result: Result) -> bytes:
-    """The GIF of a study's sweep or path; no bytes for lists and grids of poses, which are no motion."""
-    sweep = Sweep.of(result.drawn["motion"])
-    return gif(sweep) if sweep.poses.motion and len(sweep.valid) else b""
+    """The valid poses of a sweep or path as an endless GIF; back again where it does not end where it began.
 
-
-def gif(sweep: Sweep) -> bytes:
-    """The valid poses of a motion as an endless GIF; back again where it does not end where it began.
-
-    At most `FRAMES` frames. Poses that are not valid have none; the title says how many.
+    At most `FRAMES` frames. Poses that are not valid have none; the title says how many. Lists and grids of poses are
+    no motion, and give no bytes.
 
     Matplotlib draws what stands still once and what moves in every frame; Pillow gives all frames one small palette, so
     that a frame stores only what changed: a tenth of the time and the bytes of `matplotlib.animation.PillowWriter`.
     """
+    sweep = Sweep.of(result.drawn["motion"])
+    if not sweep.poses.motion or not len(sweep.valid):
+        return b""
     valid, closed = in_order(sweep), sweep.closed
     # A closed motion begins again with its last pose; another shows its inner poses twice.
     most = FRAMES + 1 if closed else FRAMES // 2 + 1

@@ -40,16 +40,9 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     section, mechanism = study.workspace, study.mechanism
     assert section is not None
     configuration: Configuration = result.drawn["along"]
-    reached = [configuration.point(point) for point in mechanism.points]
-    before = known(result.drawn)
-    extent = np.concatenate(
-        [
-            region.places(),
-            *(place[np.isfinite(place)] for place in reached),
-            sketch_places(study),
-            places_before(before),
-        ]
-    )
+    reached, before = np.concatenate([configuration.point(point) for point in mechanism.points]), known(result.drawn)
+    extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
+                             places_before(before)])  # fmt: skip
     where = f" at {region.title}" if region.title else ""
     title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
     page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
@@ -75,11 +68,11 @@ def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, befor
     study, shown = parts[0][1], [region for _, _, region in parts]
     assert study.workspace is not None
     poses = [_pose_inside(own, region) for _, own, region in parts]
-    reached = [np.ravel(each.point(point)) for each in poses for point in study.mechanism.points]
-    places = np.concatenate([*(region.places() for region in shown), *(z[np.isfinite(z)] for z in reached),
-                             places_before(before)])  # fmt: skip
+    reached = np.concatenate([np.ravel(each.point(point)) for each in poses for point in study.mechanism.points])
+    everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
+                                 places_before(before)])  # fmt: skip
     title = f"workspace of point {study.workspace.point}, {title}"
-    page = sheet(study, places, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
+    page = sheet(study, everywhere, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
     for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
         fill(axes, region.local)
         draw_mechanism(axes, own.mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)

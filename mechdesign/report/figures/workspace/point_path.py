@@ -44,9 +44,8 @@ def _path(study: Study, path: Table, before: Before | None) -> Figure:
     assert section is not None
     z = places(path)
     title = f"path of point {section.point}, by its speed over the drive's"
-    page = sheet(
-        study, np.concatenate([z, sketch_places(study), places_before(before)]), [""], title, bar=True, pad=ROOM
-    )
+    reached = np.concatenate([z, sketch_places(study), places_before(before)])
+    page = sheet(study, reached, [""], title, bar=True, pad=ROOM)
     (axes,) = page.axes
     ratio = path["speed_ratio"]
     top, tail = _ends(ratio)
@@ -68,13 +67,8 @@ def _speed(study: Study, path: Table) -> Figure:
     parts = pieces(path)
     looks = zip(style.PALETTE * len(parts), DASHES * len(parts), strict=False)
     for rows, (color, dashes) in zip(parts, looks, strict=False):
-        axes.plot(
-            path[drive][rows],
-            path["speed_ratio"][rows],
-            color=color,
-            linestyle=dashes,
-            label=f"piece {int(path['piece'][rows[0]])}",
-        )
+        name = f"piece {int(path['piece'][rows[0]])}"
+        axes.plot(path[drive][rows], path["speed_ratio"][rows], color=color, linestyle=dashes, label=name)
     top, tail = _ends(path["speed_ratio"])
     axes.set_ylim(0, 1.3 * top if tail else None)
     axes.set_title("Speed of the point over that of the drive", loc="left")

@@ -59,14 +59,8 @@ def _region(
     before: Before | None,
 ) -> Figure:  # fmt: skip
     mechanism, tables = study.mechanism, [table for _, table in found]
-    page = sheet(
-        study,
-        np.concatenate([*map(places, tables), sketch_places(study), places_before(before)]),
-        titles,
-        title,
-        bar=False,
-        pad=ROOM,
-    )
+    reached = np.concatenate([*map(places, tables), sketch_places(study), places_before(before)])
+    page = sheet(study, reached, titles, title, bar=False, pad=ROOM)
     seen: set[str] = set()
     for axes, (held, table) in zip(page.axes, found, strict=True):
         draw_before(axes, before, held)
