@@ -330,15 +330,13 @@ def _allocate(
 ) -> None:
     assert section.allocate is not None
     for name in section.allocate.cost:
+        path: KeyPath = ("reliability", "allocate", "cost", name)
         if name in dimensions and dimensions[name].measured is not None:
-            message = "what is measured is held as it is: its tolerance is not allocated"
-            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
-        known = [*dimensions, *clearances]
-        checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
-                      at_key=True)  # fmt: skip
+            checker.report(path, "what is measured is held as it is: its tolerance is not allocated", at_key=True)
+        checker.known(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
         if name in clearances and clearances[name].fit is not None:
             message = "a fit is not allocated: its classes come in steps; give 'radial' or 'diametral', or no cost"
-            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
+            checker.report(path, message, at_key=True)
     if not section.limits:
         checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
     wide = any(d.sigma if d.tolerance is None else d.ends[0] < d.ends[1]
