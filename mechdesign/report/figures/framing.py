@@ -90,7 +90,7 @@ def framed(
 
 def column_width(columns: int, gap: float = LEFT) -> float:
     """Width of each of some windows side by side, by the gap between them; inches."""
-    return (style.width() - RIGHT - LEFT - gap * (columns - 1)) / columns
+    return (style.width() - LEFT - RIGHT - gap * (columns - 1)) / columns
 
 
 def tiled(
