@@ -84,11 +84,11 @@ def framed(
     places: Complexes | Iterable[complex], unit: str, *, height: float, above: float = ABOVE, pad: float = PAD
 ) -> tuple[Figure, Axes]:
     """A figure with one window as wide as the page; `above` it, inches are left for a title."""
-    figure, (axes,) = windows(fit(places, column_width(1), height, pad), unit, above=above)
+    figure, (axes,) = windows(fit(places, style.width() - LEFT - RIGHT, height, pad), unit, above=above)
     return figure, axes
 
 
-def column_width(columns: int, gap: float = LEFT) -> float:
+def column_width(columns: int, gap: float) -> float:
     """Width of each of some windows side by side, by the gap between them; inches."""
     return (style.width() - LEFT - RIGHT - gap * (columns - 1)) / columns
 

@@ -16,7 +16,7 @@ from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
-from mechdesign.report.figures.framing import column_width, fit, framed, windows
+from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
 from mechdesign.results import Result
@@ -140,7 +140,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
 
 def _room(columns: int, rows: int) -> tuple[float, float]:
     """Largest width and height of a panel, inches."""
-    return column_width(columns), _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
+    return (style.width() - RIGHT - LEFT * columns) / columns, _MAX_STACKED_HEIGHT if rows > 1 else _MAX_HEIGHT
 
 
 def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: int = 0) -> None:

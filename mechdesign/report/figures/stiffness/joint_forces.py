@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, column_width, fit, windows
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import (
     Along,
     along,
@@ -192,7 +192,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
     # As of the curves: what grows without bounds near a singularity is left out.
     places = np.append(known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)], 0.0)
     columns, unit = len(some), study.units.label("force")
-    window = fit(places, column_width(columns), _HODOGRAPH, 0.2)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
     labels = [f"{each.name.split(', ')[0]}: {each.words}" for each in joints]
     rows = -(-len(labels) // fitting(labels))
     figure, panels = windows(window, "", columns, columns, above=0.28, top=0.34,

@@ -14,7 +14,7 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import column_width
+from mechdesign.report.figures.framing import LEFT, RIGHT
 from mechdesign.report.figures.panels import (
     Along,
     Plane,
@@ -74,7 +74,7 @@ def directions_figure(study: Study, result: Result) -> Figure | None:
               for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
     words = f"{force:g} {style.printed(study.units.label('force'))}"
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
-    wide = column_width(min(len(scenes), 2))
+    wide = (style.width() - RIGHT) / min(len(scenes), 2) - LEFT
     # Broken between coordinates only.
     named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, poses, int(row), 4)) for row in rows]
     where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]

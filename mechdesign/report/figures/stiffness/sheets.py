@@ -12,18 +12,7 @@ from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import (
-    ABOVE,
-    BELOW,
-    LEFT,
-    MAX_HEIGHT,
-    RIGHT,
-    TITLE,
-    column_width,
-    fit,
-    framed,
-    windows,
-)
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, TITLE, fit, framed, windows
 from mechdesign.study import Poses, Study
 
 # Inches.
@@ -49,7 +38,8 @@ def panels_of_poses(
     columns = 1 if style.narrow() else min(count, 2)
     heading = style.folded(heading[0].upper() + heading[1:], 11.0, style.width() - LEFT - RIGHT)
     # All of them on a page of paper.
-    window = fit(places, column_width(columns), MAX_HEIGHT if count == 1 else min(3.2, 8.0 * columns / count))
+    tall = MAX_HEIGHT if count == 1 else min(3.2, 8.0 * columns / count)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, tall)
     above = _PANEL_TITLE * lines + ABOVE
     top = _HEADING + style.line(11.0) * heading.count("\n")
     figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=top,
