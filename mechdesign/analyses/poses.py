@@ -447,31 +447,20 @@ class Keeper:
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:
-    """Solve what a picture shows of a motion that no analysis was asked for.
-
-    Raises
-    ------
-    MechdesignError
-        Where the coordinates given do not determine the mechanism.
-    """
+    """Solve what a picture shows of a motion that no analysis was asked for; raises as `solve_rows`."""
     poses = study_poses(study, "kinematics")
     rows = _rows(poses, most)
-    return Shown(study, poses, rows, _solve_rows(study, poses, rows))
+    return Shown(study, poses, rows, solve_rows(study, poses, rows))
 
 
-def solve_pose(study: Study, poses: Poses, row: int) -> Configuration:
-    """One of some poses.
+def solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
+    """Poses that give the same coordinates.
 
     Raises
     ------
     MechdesignError
-        Where the coordinates given do not determine the mechanism.
+        Where these do not determine the mechanism.
     """
-    return _solve_rows(study, poses, np.array([row]))
-
-
-def _solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
-    """Poses that give the same coordinates."""
     names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
     given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import solve_pose, solve_shown
+from mechdesign.analyses.poses import solve_rows, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
@@ -83,7 +83,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     row = int(np.nanargmax(failure)) if samples is None else samples.pose
     # A line may be broken between coordinates only.
     words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-    return words, solve_pose(study, poses, row)
+    return words, solve_rows(study, poses, np.array([row]))
 
 
 def sketch_figure(study: Study) -> Figure:

@@ -76,7 +76,8 @@ _KINDS = (
 def poses_figure(study: Study, result: Result) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
     found: SpecialPoses = result.drawn["special"]
-    if not found.shown or not (found.special or found.rates or study_centres(found) or result.drawn["poses"].listed):
+    centres = list(found.shown[0].centres) if found.shown else []
+    if not found.shown or not (found.special or found.rates or centres or result.drawn["poses"].listed):
         return None
     sweep = Sweep.of(result.drawn["motion"])
     mechanism, points = study.mechanism, _pointing(study)
@@ -94,7 +95,6 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
     columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=_PAGE, least=_MIN_HEIGHT)
     titles = [_title(each, found.rates, int(window.width * _LETTERS_AN_INCH)) for each in found.shown]
     above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
-    centres = study_centres(found)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
     heading = style.folded(_heading(found, result), 11, style.width() - LEFT - RIGHT)
@@ -114,11 +114,6 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
                        size=_SYMBOLS)  # fmt: skip
     _draw_key(figure, study, heading, scales, window.scale, side, rows)
     return figure
-
-
-def study_centres(found: SpecialPoses) -> list[Centre]:
-    """Pairs of links whose instant centres are asked."""
-    return list(found.shown[0].centres) if found.shown else []
 
 
 def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:

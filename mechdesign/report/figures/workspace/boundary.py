@@ -196,8 +196,8 @@ def _lines(before: Before, held: Mapping[str, float] | None = None) -> list[Comp
     """Curves that end its region, for values of held coordinates if they are given; its path."""
     tables = before.result.tables
     if "path" in tables:
-        path = tables["path"]
-        return [places(path)[rows] for rows in pieces(path)]
+        z = places(tables["path"])
+        return [z[rows] for rows in pieces(tables["path"])]
     if "boundary" not in tables:
         return []
     edge = tables["boundary"]

@@ -79,8 +79,8 @@ def _deciding(study: Study, tables: Sequence[Table], titles: Sequence[str], name
     norm = Normalize(float(every.min()), float(every.max()))
     for axes, table in zip(page.axes, tables, strict=True):
         axes.add_patch(PathPatch(_area(table), facecolor="#F2F2F2", linewidth=0, zorder=0.5))
-        for rows in curves(table):
-            coloured(axes, places(table)[rows], table[name][rows], norm)
+        for rows, line in zip(curves(table), lines(table), strict=True):
+            coloured(axes, line, table[name][rows], norm)
     page.color_bar(ScalarMappable(norm, style.COLORMAP), label)
     return page.figure
 

@@ -62,7 +62,8 @@ def places(table: Table) -> Complexes:
 
 def lines(boundary: Table) -> list[Complexes]:
     """The curves of a boundary."""
-    return [places(boundary)[rows] for rows in curves(boundary)]
+    z = places(boundary)
+    return [z[rows] for rows in curves(boundary)]
 
 
 def pieces(path: Table) -> list[Ints]:
