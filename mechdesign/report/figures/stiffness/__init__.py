@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.stiffness.deflections import deflections_figure, free_motion_figure
+from mechdesign.report.figures.stiffness.deflections import deflections_figure, directions_figure
 from mechdesign.report.figures.stiffness.joint_forces import joint_force_figures
-from mechdesign.report.figures.stiffness.over_poses import curves_figure, directions_figure, map_figure
-from mechdesign.report.figures.stiffness.springs import springs_figure
+from mechdesign.report.figures.stiffness.over_poses import curves_figure, map_figure
+from mechdesign.report.figures.stiffness.springs import free_motion_figure, springs_figure
 from mechdesign.results import Result
 from mechdesign.study import Study
 

@@ -1,11 +1,15 @@
-"""How a mechanism deflects under loads, and how its body moves where nothing holds it."""
+"""How a mechanism deflects: under each of its loads, and where a force of any direction moves the asked point."""
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -17,15 +21,28 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism
-from mechdesign.report.figures.panels import legend_at_left, round_down
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, fit, windows
+from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.stiffness.joint_forces import load_in_words
-from mechdesign.report.figures.stiffness.sheets import panels_of_poses, posed, symbol_size
+from mechdesign.report.figures.stiffness.springs import LARGEST_MOVE
 from mechdesign.results import Result
 from mechdesign.study import Poses, Study
 
 MAX_LOADS = 4
-_LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
+MAX_DIRECTIONS = 4  # poses
+_LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
+_ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
+_LETTERS_AN_INCH = 14.5  # of a panel's title
+# Main axes of the ellipse: column, words, angle from that of k_max, colour and dashes.
+_MAIN_AXES: tuple[tuple[str, str, float, str, Any], ...] = (
+    ("k_min", "softest", np.pi / 2, style.VERMILION, "-"),
+    ("k_max", "stiffest", 0.0, style.BLUE, (0, (2, 1))),
+)
+# Inches.
+_PANEL_TITLE = 0.17  # a line
+_HEADING = 0.32
+_LEGEND = 0.3
 _PALE = "#D5DCE4"  # of the mechanism without load, in the legend
 # Shape functions of a deflected beam, cubic between its ends as bending makes it, at these parts of its length.
 _ALONG = np.linspace(0.0, 1.0, 25)
@@ -43,14 +60,14 @@ def deflections_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | Non
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
         return None
-    scales = [round_down(_LARGEST_MOVE * scene.span / max(size, 1e-300)) for size in sizes]
+    scales = [round_down(LARGEST_MOVE * scene.span / max(size, 1e-300)) for size in sizes]
     bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
     where = pose_in_words(study, poses, drawn.row)
-    figure, panels = panels_of_poses(study, places, len(loads), f"deflections, enlarged, at {where}")
+    figure, panels = _panels(study, places, len(loads), f"deflections, enlarged, at {where}")
     length = study.units.label("length")
     for k, (axes, lines, load, scale) in enumerate(zip(panels, bent, loads.tolist(), scales, strict=True)):
-        draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=symbol_size(len(panels)))
+        draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
         for line in lines:
             axes.plot(line.real, line.imag, color=style.INK, linewidth=1.8, zorder=5)
         moved, pen = lines[0][0], Pen(axes, order=5.5)
@@ -69,6 +86,28 @@ def deflections_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | Non
                                            (style.VERMILION, 1.8, "load"))]  # fmt: skip
     legend_at_left(figure, handles, len(handles))
     return figure
+
+
+def _panels(
+    study: Study, places: Complexes, count: int, heading: str, lines: int = 3
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
+    columns = 1 if style.narrow() else min(count, 2)
+    heading = style.folded(heading[0].upper() + heading[1:], 11.0, style.width() - LEFT - RIGHT)
+    # All of them on a page of paper.
+    tall = MAX_HEIGHT if count == 1 else min(3.2, 8.0 * columns / count)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, tall)
+    above = _PANEL_TITLE * lines + ABOVE
+    top = _HEADING + style.line(11.0) * heading.count("\n")
+    figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=top,
+                           below=BELOW + _LEGEND)  # fmt: skip
+    figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), heading, va="top", fontsize=11)
+    return figure, axes
+
+
+def _symbol_size(panels: int) -> float:
+    """Size of symbols, smaller where several drawings stand side by side."""
+    return 1.0 if panels == 1 else 0.7
 
 
 def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
@@ -139,29 +178,64 @@ def _beam(
     return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
 
 
-def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | None:
-    """The asked body moved both ways along its free twist, at the first pose that has one."""
-    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
-    scene = pose(study.mechanism, drawn.configuration)
-    if scene is None:
+def directions_figure(study: Study, result: Result) -> Figure | None:
+    """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
+    table, soft, poses = result.tables["stiffness"], result.tables["compliance"], result.drawn["poses"]
+    shown, section = result.drawn["shown"], study.stiffness
+    assert section is not None
+    index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
+    some = np.unique(np.linspace(0, len(index) - 1, min(MAX_DIRECTIONS, len(index))).astype(int))
+    posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
+    scenes = {k: scene for k, scene in posed.items() if scene is not None}
+    if not scenes:
         return None
-    at = scene.points[section.at]
-    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
-    turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
-    rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
-    shift = complex(table["free_x"][row], table["free_y"][row])
-    move = shift + 1j * turn * (rest - at)
-    scale = _LARGEST_MOVE * scene.span / max(float(np.abs(move).max()), 1e-300)
-    if turn:
-        # Turned about its instantaneous centre, so that it keeps its shape.
-        centre = at + 1j * shift / turn
-        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
-    else:
-        ways = [rest + way * scale * move for way in (1, -1)]
-    places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = posed(study, result.drawn["poses"], drawn, places, "free motion")
-    for line, dash in zip(ways, ("-", "--"), strict=True):
-        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
-                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
-    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    rows = shown.rows[list(scenes)]
+    soft_ends = 1 / table["k_min"][rows]
+    if not (np.isfinite(soft_ends).all() and (soft_ends > 0).all()):
+        return None
+    if soft_ends.max() < _ONE_SCALE * soft_ends.min():
+        soft_ends[:] = soft_ends.max()
+    force, span = _force(study), max(scene.span for scene in scenes.values())
+    scales = [force * round_down(_LARGEST_ELLIPSE * span / (force * end)) for end in soft_ends.tolist()]
+    turns, ellipses = np.exp(1j * np.linspace(0, 2 * np.pi, 361)), []
+    for row, scale in zip(rows, scales, strict=True):
+        xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
+        ellipses.append(scale * (xx * turns.real + xy * turns.imag + 1j * (xy * turns.real + yy * turns.imag)))
+    places = [[*scene.points.values(), *(scene.points[section.at] + ellipse)]
+              for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
+    words = f"{force:g} {style.printed(study.units.label('force'))}"
+    heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
+    wide = (style.width() - RIGHT) / min(len(scenes), 2) - LEFT
+    # Broken between coordinates only.
+    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, poses, int(row), 4)) for row in rows]
+    where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]
+    lines = 4 + max(words.count("\n") for words in where)
+    figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=lines)
+    units = study.units.label("stiffness"), study.units.label("angle")
+    shapes = zip(panels, scenes.items(), rows, scales, ellipses, where, strict=True)
+    for axes, (k, scene), row, scale, ellipse, words in shapes:
+        at = scene.points[section.at]
+        draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_symbol_size(len(panels)))
+        axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
+        axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
+        angle, said = float(table["k_angle"][row]) * study.units.angle_factor, []
+        for name, what, turn, color, dashes in _MAIN_AXES:
+            stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
+            line = at + scale / stiff * way * np.array([-1, 1])
+            axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
+            toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
+            said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
+        axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
+        said = [words, *said, f"drawn {scale / force:g} times as large"]
+        axes.set_title("\n".join(said), loc="left", fontsize=8.5)
+    handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
+               for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
+    legend_at_left(figure, handles, len(handles))
     return figure
+
+
+def _force(study: Study) -> float:
+    """The force of an ellipse: about the largest of the study's loads, or else one unit."""
+    assert study.stiffness is not None
+    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    return round_down(max(loads)) if any(loads) else 1.0

@@ -1,4 +1,4 @@
-"""The mechanism with its legs as equivalent springs [S4, Fig. 6]."""
+"""How the body is held in a pose: its legs as equivalent springs [S4, Fig. 6], and a motion that nothing holds."""
 
 from __future__ import annotations
 
@@ -11,20 +11,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import point_labels
+from mechdesign.report.figures.drawing import draw_mechanism, point_labels
+from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import quantity
-from mechdesign.report.figures.scene import Scene, pose
-from mechdesign.report.figures.stiffness.sheets import posed
+from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.results import Result
 from mechdesign.study import Poses, Study
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
 _COIL_SWING = 0.12  # half the width of a coil over its length
 _COIL_TURNS = 7
 _ORDER = 5.0  # above the mechanism
+LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
 
 def springs_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
@@ -117,3 +120,41 @@ def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
 def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
     options: dict[str, Any] = {"color": style.VERMILION, "solid_capstyle": "round", "solid_joinstyle": "round"} | look
     axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_ORDER + lift, **options))
+
+
+def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | None:
+    """The asked body moved both ways along its free twist, at the first pose that has one."""
+    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
+    scene = pose(study.mechanism, drawn.configuration)
+    if scene is None:
+        return None
+    at = scene.points[section.at]
+    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
+    turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
+    rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
+    shift = complex(table["free_x"][row], table["free_y"][row])
+    move = shift + 1j * turn * (rest - at)
+    scale = LARGEST_MOVE * scene.span / max(float(np.abs(move).max()), 1e-300)
+    if turn:
+        # Turned about its instantaneous centre, so that it keeps its shape.
+        centre = at + 1j * shift / turn
+        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
+    else:
+        ways = [rest + way * scale * move for way in (1, -1)]
+    places = np.concatenate([[*scene.points.values()], *ways])
+    figure, axes = posed(study, result.drawn["poses"], drawn, places, "free motion")
+    for line, dash in zip(ways, ("-", "--"), strict=True):
+        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
+                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    return figure
+
+
+def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
+    """The mechanism in a pose, in a window that holds these places, too."""
+    title = style.folded(f"{what} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
+    above = TITLE + style.line(11.0) * title.count("\n")
+    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=above)
+    axes.set_title(title, loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
+    return figure, axes
