@@ -102,10 +102,7 @@ def _changing(study: Study, each: Changed) -> Changing:
 
 @one_thread()
 def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Differentiate results of a study by central differences.
-
-    Parameters, tables and errors are told at `mechdesign.sensitivities`, the door to it.
-    """
+    """Differentiate results of a study by central differences; see `mechdesign.sensitivities`."""
     study = seeded(study, seed)
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}

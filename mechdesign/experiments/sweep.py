@@ -87,17 +87,10 @@ def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
 
 @one_thread()
 def sweep(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,
-) -> Result:
-    """Answer every case of a study's matrix.
-
-    Parameters, tables and errors are told at `mechdesign.sweep`, the door to it.
-    """
+) -> Result:  # fmt: skip
+    """Answer every case of a study's matrix; see `mechdesign.sweep`."""
     study = seeded(study, seed)
     cases, wanted = prepared(study)
     progress.start(len(cases), "cases")
