@@ -11,7 +11,7 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.region.rays import BATCH, SINGLE
 from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.results import Result
 
@@ -382,6 +382,75 @@ def test_the_area_is_the_same_from_everywhere(family: str, seed: int) -> None:
         for centre in centres
     ]
     assert areas == pytest.approx(np.full(3, areas[0]), rel=1e-5)
+
+
+# Limited expressions over an arm's angles and points, which no whole turn of an angle changes.
+TURNING = ["cos({n}*q1)", "sin({n}*q1 + q2)", "sin(q1)*l2", "A.y*P.x", "P.x*P.y", "cos({n}*q1) + cos({n}*q2)",
+           "sin(q1 + q2) + A.x/l1", "A.x - P.y"]  # fmt: skip
+
+
+def of_joints(text: str, lengths: np.ndarray, q1: np.ndarray, q2: np.ndarray) -> np.ndarray:
+    """An expression at angles of both joints (radians)."""
+    elbow = lengths[0] * np.exp(1j * q1)
+    hand = elbow + lengths[1] * np.exp(1j * (q1 + q2))
+    names = {"q1": q1, "q2": q2, "l1": lengths[0], "l2": lengths[1], "sin": np.sin, "cos": np.cos,
+             "A_x": elbow.real, "A_y": elbow.imag, "P_x": hand.real, "P_y": hand.imag}  # fmt: skip
+    return np.asarray(eval(text.replace(".", "_"), names) + 0 * q1)
+
+
+def swept(inside: Flags, lengths: np.ndarray, at: tuple[float, float]) -> tuple[float, float]:
+    """Area that cells of the joints' angles sweep, those that hang together with the cell `at` (radians), and doubt."""
+    rows, columns = inside.shape
+    ends = np.cos(np.linspace(0, np.pi, columns + 1))
+    size = lengths.prod() * 2 * np.pi / rows * -np.diff(ends)
+    label, _ = ndimage.label(np.concatenate([inside, inside]))
+    row, column = int(at[0] % (2 * np.pi) / (2 * np.pi) * rows), int(at[1] / np.pi * columns)
+    # Twice round, so that a piece over angle 0 is whole once.
+    own = label == label[row, column]
+    own |= label == label[row + rows, column]
+    whole = own[:rows] | own[rows:]
+    edge = whole ^ (ndimage.binary_erosion(np.concatenate([whole] * 3))[rows : 2 * rows])
+    return float((whole * size).sum()), EDGE * float((edge * size).sum())
+
+
+def test_arms_with_limited_expressions(seeds: Seeds) -> None:
+    """One design looked at closely and among many, against its joints' angles: P is at one pair of them only."""
+    for seed in seeds(2):
+        rng = np.random.default_rng(seed)
+        lengths = rng.uniform(4, 10, 2)
+        if rng.integers(2):
+            lengths[1] = lengths[0] * (1 + 10 ** rng.uniform(-4, -1))
+        text = str(rng.choice(TURNING)).format(n=rng.integers(1, 5))
+        q1, q2 = rng.uniform(0, 2 * np.pi), rng.uniform(0.3, 2.8)
+        value = of_joints(text, lengths, *(np.array([q]) for q in (q1, q2)))[0]
+        spread = np.ptp(of_joints(text, lengths, *rng.uniform(0, 2 * np.pi, (2, 500))))
+        low, high = value - spread * rng.uniform(0.02, 0.5), value + spread * rng.uniform(0.02, 0.5)
+        found = []
+        for cells in (CELLS, 2 * CELLS):
+            a, b = (np.arange(2 * cells) + 0.5) * np.pi / cells, (np.arange(cells) + 0.5) * np.pi / cells
+            values = of_joints(text, lengths, *np.meshgrid(a, b, indexing="ij"))
+            inside = (values > low) & (values < high)
+            found.append(swept(inside, lengths, (q1, q2)))
+            found.append((swept(ndimage.binary_dilation(inside), lengths, (q1, q2))[0], 0.0))
+        (area, doubt), (grown, _), (other, _), _ = found
+        elbow = lengths[0] * np.exp(1j * q1)
+        study = study_of(f"""
+mechanism:
+  parameters: {{l1: {lengths[0]:.17g}, l2: {lengths[1]:.17g}}}
+  links: {{ground: {{O: [0, 0]}}, upper: [O, A, l1], fore: [A, P, l2]}}
+  drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
+  measures: {{m: {text}}}
+  limits: [{{measure: m, min: {low:.17g}, max: {high:.17g}}}]
+  sketch: {{A: {told(elbow)}, P: {told(elbow + lengths[1] * np.exp(1j * (q1 + q2)))}}}
+workspace: {{point: P, indices: []}}
+""")
+        if abs(area - other) > doubt or abs(grown - area) > 3 * doubt:
+            continue
+        question = questions(study, 1e-4, ("area",))[0]
+        for effort in (SINGLE, BATCH):
+            got = answer(question, {}, 1, effort).values["area"][0]
+            # Limits along a row of cells are miscounted alike.
+            assert abs(got - area) <= 2 * doubt, (seed, text, effort, got, area, doubt)
 
 
 def reached(robot: Robot, degrees: float, same: bool) -> Flags:

@@ -13,7 +13,8 @@ import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.region.curves import workspace_nodes
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.analyses.region.rays import SINGLE
+from mechdesign.analyses.workspace.question import answer, questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 
@@ -332,6 +333,51 @@ workspace: {point: P, indices: []}
     found = design_area(text, "min: -0.622222", "l1=6.585 l2=7.825")
     # Each degree of the upper link sweeps as much.
     assert found == pytest.approx(4 * np.pi * 6.585 * 7.825 * np.arccos(-0.622222) / (3 * np.pi), rel=1e-4)
+
+
+SECTORS = """
+mechanism:
+  parameters: {l1: 10, l2: 6}
+  links: {ground: {O: [0, 0]}, upper: [O, A, l1], fore: [A, P, l2]}
+  drives: {q1: {angle: upper}, q2: {angle: fore, from: upper}}
+  sketch: {A: [5, 4], P: [5, 11]}
+  measures: {m: cos(3*q1)}
+workspace: {point: P, indices: []}
+"""
+
+
+@pytest.mark.parametrize("hand", ["[5, 11]", "[3, 8]"])
+@pytest.mark.parametrize(
+    ("measure", "limit", "sizes", "angle"),
+    [
+        ("cos(3*q1)", "min: -0.622222", (7.3814, 7.6676), 2 * np.arccos(-0.622222) / 3),
+        ("sin(q1)*l2", "min: 1.75663, max: 4.08739", (6.195, 6.177),
+         np.arcsin(4.08739 / 6.177) - np.arcsin(1.75663 / 6.177)),
+    ],
+    ids=["three sectors", "two sectors"],
+)  # fmt: skip
+def test_sectors_that_nearly_meet_beside_a_pin(
+    measure: str, limit: str, sizes: tuple[float, float], angle: float, hand: str
+) -> None:
+    """Beside the shoulder the links turn within less than there is between two samples, and between two rays."""
+    text = SECTORS.replace("cos(3*q1)", measure).replace("[5, 11]", hand)
+    exact = 2 * sizes[0] * sizes[1] * angle
+    assert design_area(text, limit, "l1={} l2={}".format(*sizes)) == pytest.approx(exact, rel=1e-7)
+    own = [f"mechanism.parameters.{name}={size}" for name, size in zip(("l1", "l2"), sizes, strict=True)]
+    alone = study_of(text, *own, f"mechanism.limits=[{{measure: m, {limit}}}]")
+    question = questions(alone, 1e-5, ("area",))[0]
+    assert answer(question, {}, 1, SINGLE).values["area"][0] == pytest.approx(exact, rel=1e-7)
+
+
+def test_a_gap_beside_where_the_arm_is_folded() -> None:
+    """A band of 12 degrees is left out: of a ray only what lies between its first two samples."""
+    sizes = 7.2289861088316592, 7.2385926641287055
+    text = SECTORS.replace("cos(3*q1)", "sin(q1)*l2").replace("[5, 4]", "[-4.856582373667923, -5.354609958667311]")
+    text = text.replace("[5, 11]", "[2.010778432041187, -7.642967299946909]")
+    low, high = -7.1967862454709373, -2.6680108679076726
+    found = design_area(text, f"min: {low}, max: {high}", "l1={} l2={}".format(*sizes))
+    exact = 2 * sizes[0] * sizes[1] * (np.arcsin(high / sizes[1]) - np.arcsin(low / sizes[1]))
+    assert found == pytest.approx(exact, rel=1e-6)
 
 
 def test_a_design_is_the_same_alone_and_in_a_batch() -> None:

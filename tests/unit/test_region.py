@@ -12,7 +12,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.region.panels import find_panels
 from mechdesign.analyses.region.rays import BATCH, SINGLE, Designs, Effort, trace
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.analyses.workspace.question import answer, questions
 
 ARM = """
 units: {length: dimensionless}
@@ -246,6 +246,21 @@ def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effor
     corners = [np.angle(k * np.sqrt(reach**2 - 0.15**2) * 1j - about) for k in (1, -1)]
     for angle in [*touching, *(corners if assembly == "any" else corners[:1])]:
         assert np.abs((ends - angle + np.pi) % (2 * np.pi) - np.pi).min() < 1e-12
+
+
+@pytest.mark.parametrize("effort", [BATCH, SINGLE], ids=["batch", "single"])
+def test_holes_smaller_than_a_cell_of_the_raster(effort: Effort) -> None:
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0], W: [7.1, 3.3], V: [-4.4, 6.2], U: [-6.3, -5.9]}, upper: [O, A, 10], fore: [A, P, 6]}
+  drives: {q1: {angle: upper}, q2: {angle: fore, from: upper}}
+  sketch: {A: [8, 6], P: [8, 12]}
+  limits: [{distance: [W, P], min: 0.05}, {distance: [V, P], min: 0.3}, {distance: [U, P], min: 0.004}]
+workspace: {point: P, indices: []}
+"""
+    exact = np.pi * (16**2 - 4**2 - 0.05**2 - 0.3**2 - 0.004**2)
+    found = answer(questions(study_of(text), 1e-4, ("area",))[0], {}, 1, effort).values["area"][0]
+    assert found == pytest.approx(exact, abs=1e-6)
 
 
 def test_few_samples_find_a_gap_between_them() -> None:

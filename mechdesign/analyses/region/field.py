@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, norm2
 from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -115,6 +115,24 @@ class Field:
 
         Those of the assembly come last and may be left out.
         """
+        return self.look(z, places, assembly)[0]
+
+    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
+        """All margins at samples `z` of rays, shape (samples, rays), and how far links turn between two of them.
+
+        Of links that which turns most, in chords of the unit circle, shape (samples - 1, rays); nan where unknown.
+        """
+        margins, configuration = self.look(z, places, assembly=True)
+        turned = np.zeros((len(z) - 1, *z.shape[1:]))
+        with np.errstate(invalid="ignore"):
+            for rotation in configuration.rotations:
+                if np.ndim(rotation):
+                    rotation = np.broadcast_to(rotation, z.shape)
+                    turned = np.maximum(turned, norm2(rotation[1:] - rotation[:-1]))
+        return margins, np.sqrt(turned)
+
+    def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
+        """Margins and what they are of."""
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             if self.plan.iterative:
                 configuration, fold_distance = self._poses(z, places, beyond=True)
@@ -138,7 +156,7 @@ class Field:
         stacked = np.empty((len(found), *z.shape))
         for row, margin in zip(stacked, found, strict=True):
             row[...] = margin
-        return stacked
+        return stacked, configuration
 
     @cached_property
     def labels(self) -> tuple[tuple[str, str], ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechdesign.analyses.region.breaks import TOGETHER, all_breaks
 from mechdesign.analyses.region.raster import Raster
-from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Intervals, ray_through, trace
+from mechdesign.analyses.region.rays import FARTHEST_TURN, SAME_ROOT, Designs, Intervals, ray_through, trace
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
@@ -83,11 +83,16 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     count, scan, number = designs.count, designs.scan, designs.effort.rays + 1
     raster = Raster.of(designs)
     least = raster.farthest
-    design = np.repeat(np.arange(count), number)
-    angle = np.tile(np.linspace(*scan, number), count)
+    every, (owner, hole) = np.arange(count), raster.holes
+    design, angle = np.repeat(every, number), np.tile(np.linspace(*scan, number), count)
+    if owner.size:
+        through = ray_through(hole - designs.about, scan[0])
+        met = through < scan[1]
+        rays = np.unique(np.concatenate([design + 1j * angle, (owner + 1j * through)[met]]))
+        design, angle = rays.real.astype(np.intp), rays.imag
     reach = np.where(least > 0, least, raster.reach)
     reach, intervals = _extent(designs, design, angle, reach, least)
-    owner = np.arange(count)
+    owner = every
     for _ in range(LOOKS):
         owner, hidden = raster.hidden(np.unique(owner), design, angle, intervals)
         rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
@@ -96,18 +101,26 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
         design, angle = rays.real.astype(np.intp), rays.imag
         reach, intervals = _extent(designs, design, angle, reach, least)
     found, breaks = all_breaks(designs, reach, intervals, design, angle)
-    every, fixed = np.repeat(np.arange(count), 2 + len(cuts)), np.tile([*scan, *cuts], count)
+    every, fixed = np.repeat(every, 2 + len(cuts)), np.tile([*scan, *cuts], count)
     owner, low, high = _between(every, fixed, found, breaks)
     some = np.arange(len(low))
     for _ in range(LOOKS):
-        # Two rays may be alike though two breaks lie between them: then others between them are not.
-        of, rays = np.repeat(owner[some], len(PROBES)), (low[some, None] + (high - low)[some, None] * PROBES).ravel()
-        counts = trace(designs, of, rays, reach[of]).counts.reshape(-1, len(PROBES))
-        unlike = (np.ptp(counts, axis=1) > 0) & ((high - low)[some] > NARROW)
+        # Two rays may be alike though two breaks lie between them: then others between them are not, or links jump.
+        of, rays = np.tile(owner[some], (len(PROBES), 1)), low[some] + (high - low)[some] * PROBES[:, None]
+        wide = (high - low)[some] > TOGETHER / PROBES[0]
+        traced = trace(designs, of.ravel(), rays.ravel(), reach[of.ravel()])
+        counts = traced.counts.reshape(rays.shape)
+        unlike = (np.ptp(counts, axis=0) > 0) & wide
+        panel, between, jumps = _turn_by_turn(designs, of, rays, traced, reach, wide & ~unlike)
+        unlike[panel] = True
         if not unlike.any():
             break
-        of, rays = (each.reshape(counts.shape)[unlike].ravel() for each in (of, rays))
+        of = np.concatenate([of[:, unlike].ravel(), owner[some[panel]]])
+        rays = np.concatenate([rays[:, unlike].ravel(), between])
+        order = np.lexsort((rays, of))
+        of, rays = of[order], rays[order]
         more, angles = all_breaks(designs, reach, trace(designs, of, rays, reach[of]), of, rays)
+        more, angles = np.concatenate([more, owner[some[panel[jumps]]]]), np.concatenate([angles, between[jumps]])
         found, breaks = np.concatenate([found, more]), np.concatenate([breaks, angles])
         owner, low, high = _between(every, fixed, found, breaks)
         some = np.flatnonzero(np.isin(owner, more))
@@ -118,6 +131,57 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
     return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
+
+
+def _turn_by_turn(
+    designs: Designs, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
+) -> tuple[Ints, Floats, Flags]:
+    """Further rays of panels whose rays are `alike`, where links lie otherwise at the ends of their intervals.
+
+    So many that from one of them to the next either the intervals are others or no link turns far, or else until they
+    are one: then the link jumps there. Rays of shape (rays, panels).
+
+    Returns
+    -------
+    (panel, angle, jumps)
+    """
+    counts = traced.counts.reshape(theta.shape)[0]
+    panel = np.flatnonzero(alike & (counts > 1))
+    most = int(counts[panel].max(initial=0))
+
+    def ends(traced: Intervals) -> Floats:
+        found = np.full((2, most, len(traced.beyond)), np.nan)
+        radii = traced.by_ray(traced.inner, traced.outer)[:, :most]
+        found[:, : radii.shape[1]] = radii
+        return found.reshape(2 * most, -1)
+
+    def turned(panel: Ints, theta: Floats, radii: Floats) -> Flags:
+        """Whether a link turns far from each ray to the next."""
+        z = designs.about + radii * np.exp(1j * theta[:, None])
+        owner = np.tile(design[0, panel], z.shape[1])
+        found = designs.field.sampled(z.reshape(len(z), -1), designs.of(owner))[1].reshape(len(z) - 1, *z.shape[1:])
+        return np.asarray((found > FARTHEST_TURN).any(axis=1))
+
+    panels, angles, jumps = [panel[:0]], [theta[0, :0]], [alike[:0]]
+    if panel.size:
+        radii = ends(traced).reshape(2 * most, *theta.shape).swapaxes(0, 1)[:, :, panel]
+        ray, which = np.nonzero(turned(panel, theta[:, panel], radii))
+        panel = panel[which]
+        pair, radii = theta[[ray, ray + 1], panel], radii[[ray, ray + 1], :, which].swapaxes(1, 2)
+    while panel.size:
+        middle, last = 0.5 * (pair[0] + pair[1]), pair[1] - pair[0] < TOGETHER
+        panels.append(panel)
+        angles.append(middle)
+        jumps.append(last)
+        panel, middle, pair, radii = panel[~last], middle[~last], pair[:, ~last], radii[:, :, ~last]
+        traced = trace(designs, design[0, panel], middle, reach[design[0, panel]])
+        like = traced.counts == counts[panel]
+        pair, radii = np.insert(pair, 1, middle, axis=0)[:, like], np.insert(radii, 1, ends(traced), axis=0)[:, :, like]
+        panel = panel[like]
+        half, which = np.nonzero(turned(panel, pair, radii))
+        panel = panel[which]
+        pair, radii = pair[[half, half + 1], which], radii[[half, half + 1], :, which].swapaxes(1, 2)
+    return np.concatenate(panels), np.concatenate(angles), np.concatenate(jumps)
 
 
 def _between(every: Ints, fixed: Floats, found: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:

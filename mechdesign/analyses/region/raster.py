@@ -8,7 +8,7 @@ that shares nothing with the integrals but the margins.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,11 @@ ROOM = 1e-6
 BLOCK = 1 << 17
 # Share of their area by which cells on the boundary may be miscounted, if they all err alike.
 EDGE = 0.5
+# Steps of the parabolas that lead to the lowest place of a margin, as parts of a cell, and the places of each.
+PARABOLAS = (1.0, 0.1)
+AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
+# Farthest that such a place is from a centre (cells).
+FARTHEST = 1.0
 # Times that a box is doubled whose outermost cells lie inside, where the mechanism's dimensions give no bound.
 DOUBLINGS = 12
 
@@ -31,13 +36,14 @@ class Raster:
 
     A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
     lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
-    the region, shape (designs, rows, columns).
+    the region, shape (designs, rows, columns). And places in holes that no centre met, with their designs.
     """
 
     designs: Designs
     low: Complexes
     cell: Complexes
     inside: Flags
+    holes: tuple[Ints, Complexes]
 
     @staticmethod
     def of(designs: Designs) -> Raster:
@@ -45,9 +51,13 @@ class Raster:
         cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
         for _ in range(DOUBLINGS):
-            found = Raster(designs, low, (high - low) / cells, np.zeros((designs.count, cells, cells), dtype=bool))
+            none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
+            blank = np.zeros((designs.count, cells, cells), dtype=bool)
+            found, holes = Raster(designs, low, (high - low) / cells, blank, none), [none]
             for some, z in found._centres(np.arange(designs.count)):
-                inside = designs.inside(z, some) & (ray_through(z - designs.about, begin) <= end)
+                inside, margins = designs.look(z, some)
+                holes.append(found._between_centres(some, z, margins, inside))
+                inside &= ray_through(z - designs.about, begin) <= end
                 found.inside[some] = inside.T.reshape(-1, cells, cells)
             rim = found.inside.copy()
             rim[:, 1:-1, 1:-1] = False
@@ -56,7 +66,39 @@ class Raster:
                 break
             size = np.where(open_, high - low, 0)
             low, high = low - 0.5 * size, high + 0.5 * size
-        return found
+        owners, places = zip(*holes, strict=True)
+        return replace(found, holes=(np.concatenate(owners), np.concatenate(places)))
+
+    def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
+        """Designs and places where a margin is negative, though at the centres of all cells around it is not.
+
+        Where a margin is lowest a parabola through the places around leads to the lowest: for squares of distances it
+        is exact.
+        """
+        size = self.inside.shape[1]
+        values = margins.reshape(len(margins), size, size, -1)
+        here = values[:, 1:-1, 1:-1]
+        low = np.repeat(inside.reshape(1, size, size, -1)[:, 1:-1, 1:-1], len(values), axis=0)
+        for beside in (values[:, 1:-1, :-2], values[:, 1:-1, 2:], values[:, :-2, 1:-1], values[:, 2:, 1:-1]):
+            low &= here <= beside
+        margin, row, column, lane = np.nonzero(low)
+        place, cell = z[(row + 1) * size + column + 1, lane], self.cell[some[lane]]
+        each, places = np.arange(len(lane)), self.designs.of(some[lane])
+        good = np.ones(len(lane), dtype=bool)
+        for step in PARABOLAS:
+            x, y = step * cell.real, step * cell.imag
+            around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
+            here, right, left, up, down, across = self.designs.field.margins(around, places)[margin, :, each].T
+            with np.errstate(invalid="ignore", divide="ignore"):
+                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
+                xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
+                det = xx * yy - xy * xy
+                dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
+                good &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
+                # The parabola falls half as far.
+                good &= here + gx * dx + gy * dy < 0
+            place = np.where(good, place + x * dx + 1j * y * dy, place)
+        return some[lane[good]], place[good]
 
     @property
     def area(self) -> tuple[Floats, Floats]:

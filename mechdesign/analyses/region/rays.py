@@ -29,6 +29,8 @@ QUADRATIC = 1e-13
 NARROWEST = 1e-10
 # As many samples at least where expressions are limited, which may turn often along a ray.
 OF_EXPRESSIONS = 48
+# Farthest that a link may turn from one sample to the next (a chord of the unit circle).
+FARTHEST_TURN = 0.5
 # First and last sample of an interval, as fractions of it.
 INSET = 1e-10
 FIVE = np.linspace(0.0, 1.0, 5)
@@ -105,15 +107,20 @@ class Designs:
 
     def inside(self, z: Complexes, design: Ints) -> Flags:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
+        return self.look(z, design)[0]
+
+    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
+        """Whether places lie in the region, as `inside`, and margins there, those of the assembly perhaps left out."""
         field, places = self.field, self.of(design)
         both = field.plan.iterative or not field.same_assembly
-        good = np.asarray((field.margins(z, places, assembly=both) > 0).all(axis=0))
+        found = field.margins(z, places, assembly=both)
+        good = np.asarray((found > 0).all(axis=0))
         if not both:
             # Determinants cost as much as all other margins: only where they decide.
             place, lane = np.nonzero(good)
             margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
             good[place, lane] = (margins > 0).all(axis=0)
-        return good
+        return good, found
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """Intersect a block of rays with the region, as `trace` does."""
@@ -259,15 +266,24 @@ def _others(
     radii = inner + fraction[:, None] * width
     rows = np.flatnonzero(~known.all(axis=1))
 
+    def look(lane: Ints, radius: Floats) -> tuple[Floats, Floats]:
+        z = start_of[owner[lane]] + radius * direction[owner[lane]]
+        values, turned = designs.field.sampled(z, {name: value[lane] for name, value in local.items()})
+        return without_known(values[rows], lane), turned
+
     def margins_at(lane: Ints, radius: Floats) -> Floats:
         z = start_of[owner[lane]] + radius * direction[owner[lane]]
-        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})[rows]
-        # Roots that are known have ended the intervals.
+        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
+        return without_known(values[rows], lane)
+
+    def without_known(values: Floats, lane: Ints) -> Floats:
+        """Roots that are known have ended the intervals."""
         margin, of = np.nonzero(known[rows][:, owner[lane]])
         values[margin, ..., of] = 1.0
         return values
 
-    values, noise = margins_at(np.arange(len(owner)), radii), designs.field.rounding[rows]
+    radii, values = _turn_by_turn(look, radii, SAME_ROOT * reach[owner])
+    noise = designs.field.rounding[rows]
     radii, values = _with_dips(margins_at, radii, _without_rounding(values, noise), noise)
     positive = values > 0
     lanes = np.flatnonzero(~positive.all(axis=(0, 1)) & (width > thin[owner]))
@@ -295,6 +311,48 @@ def _others(
     return _replace(found, cut_of, part, NARROWEST * reach)
 
 
+def _turn_by_turn(
+    look: Callable[[Ints, Floats], tuple[Floats, Floats]], radii: Floats, least: Floats
+) -> tuple[Floats, Floats]:
+    """Samples of margins, with so many more that between two of them no link turns far; none nearer than `least`.
+
+    Where a pin passes another one closely a link turns about it within as little of the ray as lies between the two.
+    """
+    values, turned = look(np.arange(radii.shape[1]), radii)
+    cell, lane = np.nonzero(turned > FARTHEST_TURN)
+    ends = np.stack([radii[cell, lane], radii[cell + 1, lane]])
+    lanes, places, found = [lane[:0]], [ends[0, :0]], [values[:, 0, :0]]
+    while True:
+        wide = ends[1] - ends[0] > least[lane]
+        lane, ends = lane[wide], ends[:, wide]
+        if not lane.size:
+            break
+        middle = 0.5 * (ends[0] + ends[1])
+        value, turned = look(lane, np.stack([ends[0], middle, ends[1]]))
+        lanes.append(lane)
+        places.append(middle)
+        found.append(value[:, 1])
+        half, which = np.nonzero(turned > FARTHEST_TURN)
+        lane, ends = lane[which], np.stack([ends[0], middle, ends[1]])[[half, half + 1], which]
+    return _with_more(radii, values, np.concatenate(lanes), np.concatenate(places), np.concatenate(found, axis=1))
+
+
+def _with_more(radii: Floats, values: Floats, lane: Ints, place: Floats, found: Floats) -> tuple[Floats, Floats]:
+    """Samples (margins, samples, lanes) with more of some lanes, of values `found`, in order outwards."""
+    if not len(lane):
+        return radii, values
+    order = np.argsort(lane, kind="stable")
+    lane, place, found = lane[order], place[order], found[:, order]
+    # As many more samples a lane, all at its end but those that were found.
+    slot = np.arange(len(lane)) - np.searchsorted(lane, lane)
+    most = int(slot.max(initial=-1)) + 1
+    more, more_values = np.repeat(radii[-1:], most, axis=0), np.repeat(values[:, -1:], most, axis=1)
+    more[slot, lane], more_values[:, slot, lane] = place, found
+    radii, values = np.concatenate([radii, more]), np.concatenate([values, more_values], axis=1)
+    order = np.argsort(radii, axis=0, kind="stable")
+    return np.take_along_axis(radii, order, axis=0), np.take_along_axis(values, order[None], axis=1)
+
+
 def _without_rounding(values: Floats, noise: Floats) -> Floats:
     """Margins (margins, samples, lanes) with samples below their `noise` given the sign of both neighbours."""
     beside, noise = np.sign(values[:, :-2]), noise[:, None, None]
@@ -309,8 +367,12 @@ def _with_dips(
 ) -> tuple[Floats, Floats]:
     """Samples of margins with those added at which a margin has the other sign than at the samples on both sides.
 
-    A local minimum above zero (or maximum below) is looked at where the slopes beside it admit a zero.
+    A local minimum above zero (or maximum below) is looked at where the slopes beside it admit a zero; also one that
+    must lie beside an end, where a leg may be stretched or folded.
     """
+    lane, place = _beside_ends(radii, values)
+    if lane.size:
+        radii, values = _with_more(radii, values, lane, place, margins_at(lane, place))
     before, here, after = values[:, :-2], values[:, 1:-1], values[:, 2:]
     left, right = radii[1:-1] - radii[:-2], radii[2:] - radii[1:-1]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -331,16 +393,32 @@ def _with_dips(
     place, value = dips(evaluate, radii[rows, lane], sign * values[margin, rows, lane], -noise[margin])
     hidden = value < -noise[margin]
     lane, place = lane[hidden], place[hidden]
-    order = np.argsort(lane, kind="stable")
-    lane, place = lane[order], place[order]
-    # As many more samples a lane, all at its end but those that were found.
-    slot = np.arange(len(lane)) - np.searchsorted(lane, lane)
-    most = int(slot.max(initial=-1)) + 1
-    more, more_values = np.repeat(radii[-1:], most, axis=0), np.repeat(values[:, -1:], most, axis=1)
-    more[slot, lane], more_values[:, slot, lane] = place, margins_at(lane, place)
-    radii, values = np.concatenate([radii, more]), np.concatenate([values, more_values], axis=1)
-    order = np.argsort(radii, axis=0, kind="stable")
-    return np.take_along_axis(radii, order, axis=0), np.take_along_axis(values, order[None], axis=1)
+    return _with_more(radii, values, lane, place, margins_at(lane, place))
+
+
+def _beside_ends(radii: Floats, values: Floats) -> tuple[Ints, Floats]:
+    """Lanes and places between the first, or the last, two samples where a margin falls far towards zero and rises.
+
+    By parabolas in the square root of the distance from the end, in which margins that end there are smooth.
+    """
+    every = np.arange(radii.shape[1])
+    last = (radii < radii[-1]).sum(axis=0)
+    lanes, places = [every[:0]], [radii[0, :0]]
+    for end, step in ((0 * last, 1), (last, -1)):
+        rows = np.clip(end + step * np.arange(3)[:, None], 0, len(radii) - 1)
+        x, f = radii[rows, every], values[:, rows, every]
+        root = np.sqrt(np.abs(x - x[0]))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            near, far = (f[:, 1] - f[:, 0]) / root[1], (f[:, 2] - f[:, 0]) / root[2]
+            bend = (far - near) / (root[2] - root[1])
+            slope = near - bend * root[1]
+            way, fall = -0.5 * slope / bend, 0.25 * slope * slope / np.abs(bend)
+            same, height = np.sign(f[:, 0]) == np.sign(f[:, 1]), np.abs(f[:, 0])
+            low = same & (bend * f[:, 0] > 0) & (way > 0) & (way < root[1]) & (2 * fall >= height)
+        margin, lane = np.nonzero(low)
+        lanes.append(lane)
+        places.append(x[0, lane] + step * way[margin, lane] ** 2)
+    return np.concatenate(lanes), np.concatenate(places)
 
 
 def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Intervals:

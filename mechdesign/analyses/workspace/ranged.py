@@ -20,6 +20,7 @@ import numpy as np
 from mechdesign.analyses.region.field import Field, Places
 from mechdesign.analyses.region.rays import NARROWEST, Designs, Intervals, intervals_between, trace
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
@@ -83,6 +84,10 @@ class Ranged(Field):
     def at(self, z: Complexes, value: Value, assembly: bool = True) -> Floats:
         """Margins at single values of the range, shape (margins, *z.shape)."""
         return self.sliced.margins(z, {VALUE: value}, assembly=assembly)
+
+    def sampled(self, z: Complexes, places: Places) -> tuple[Floats, Floats]:
+        """As `Field.sampled`; how far links turn at all values of the range is not known."""
+        return self.margins(z, places), np.zeros((len(z) - 1, *z.shape[1:]))
 
     def extreme(self, label: int) -> int:
         """Which of the extremes over the range is zero where a label ends the region."""
@@ -181,15 +186,15 @@ class Sliced(Field):
 
     which: int = 0
 
-    def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
-        """All margins at points `z`, shape (margins, *z.shape); nan where unknown."""
+    def look(self, z: Complexes, places: Places, assembly: bool) -> tuple[Floats, Configuration]:
+        """As `Field.look`."""
         sizes, held = dict(places), list[Value](self.held)
         held[self.which] = sizes.pop(VALUE)
         assert self.labels is not None
         # What is known of the sketch is copied, too.
         field = copy.copy(self)
         object.__setattr__(field, "held", tuple(held))
-        return Field.margins(field, z, sizes, assembly=assembly)
+        return Field.look(field, z, sizes, assembly)
 
 
 def _known(values: Floats) -> Floats:
@@ -256,9 +261,10 @@ class SomeDesigns(Designs):
         assert isinstance(self.field, Some)
         return self.field
 
-    def inside(self, z: Complexes, design: Ints) -> Flags:
-        """As `Designs.inside`."""
-        return np.asarray(self._over.deciding(z)[0][0] > 0)
+    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
+        """As `Designs.look`."""
+        height = self._over.deciding(z)[0]
+        return np.asarray(height[0] > 0), height
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
         """As `Designs.traced`: between places of each ray of which some samples of the range tell that they matter."""
