@@ -135,6 +135,8 @@ def test_a_shard_is_data_alone(tmp_path):
         (["--executor", "os:cpus"], "--executor os:cpus: module 'os' has no attribute 'cpus'"),
         (["--executor", "os:getcwd"], "--executor os:getcwd gives no concurrent.futures.Executor, but 'str'"),
         (["--executor", "os:mkdir"], "--executor os:mkdir: TypeError: "),
+        (["--executor", "sys:exit"], "--executor sys:exit: SystemExit"),
+        (["--executor", "..:two"], "--executor ..:two: TypeError: "),
         (["--executor", "dask:tcp://127.0.0.1:9"], "no scheduler answers there: "),
     ],
 )
