@@ -14,17 +14,16 @@ array([54.   , 27.547, 55.587, 62.41 ])
 In a notebook a study and a result show themselves; ``result.figure("paths")`` is one of its pictures, `figures` their
 names, `verdicts` what is met of what the study requires, and ``result.save("folder")`` writes what the command writes.
 
-The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics.
+The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics. Here nothing is
+imported: a signal that comes before the command can hear it ends it with a traceback.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from mechdesign.commands import QUESTIONS
-
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from mechdesign.door.questions import kinematics as kinematics
     from mechdesign.door.questions import load as load
     from mechdesign.door.questions import optimize as optimize
@@ -43,7 +42,10 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "requirements": "mechdesign.report.requirements",
-    **dict.fromkeys(("load", *QUESTIONS), "mechdesign.door.questions"),
+    **dict.fromkeys(
+        ("load", "kinematics", "workspace", "optimize", "reliability", "stiffness", "sweep", "sensitivities"),
+        "mechdesign.door.questions",
+    ),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 
@@ -54,6 +56,8 @@ def __getattr__(name: str) -> Any:
 
         return version("mechdesign")
     if name in _HOMES:
+        from importlib import import_module
+
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

@@ -218,6 +218,25 @@ def test_nothing_to_compare(folder, results, compared):
     assert "motion.csv: is not the table that its manifest describes" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("study", {"resolved": "a text"}),
+        ("tool", ["mechdesign"]),
+        ("requirements", [{"requirement": "x at most 1"}]),
+        ("tables", {"motion.csv": {"columns": [{"name": ["theta"], "unit": "", "meaning": ""}]}}),
+    ],
+)
+def test_a_manifest_of_another_hand_is_none(folder, results, compared, key, value):
+    for side in ("old", "new"):
+        results(f"{side}/kinematics", motion())
+    path = folder / "new/kinematics/manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    done, _ = compared()
+    assert done.exit_code == 2
+    assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+
+
 def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatch, invoke):
     monkeypatch.chdir(tmp_path)
     for name, jobs in (("old", 1), ("new", 2)):

@@ -10,6 +10,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from mechdesign.errors import StudyError
 from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import (
@@ -29,6 +31,37 @@ from mechdesign.study.text.document import leaves, read
 
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
+
+
+class _Column(BaseModel):
+    name: str
+    unit: str
+    meaning: str
+
+
+class _Table(BaseModel):
+    columns: list[_Column]
+
+
+class _Study(BaseModel):
+    resolved: dict[str, Any] = {}
+
+
+class _Verdict(BaseModel):
+    requirement: str
+    met: bool
+    worst: float | None = None
+
+
+class _Manifest(BaseModel):
+    """What is read of a manifest here."""
+
+    study: _Study
+    tables: dict[str, _Table]
+    requirements: list[_Verdict]
+    tool: dict[str, str] = {}
+    libraries: dict[str, str] = {}
+    inputs: dict[str, str] = {}
 
 
 def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
@@ -75,9 +108,11 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
     found = {}
     for path in sorted(root.rglob(manifest.NAME)):
         content = manifest.read(path.parent)
-        kinds = {"tables": dict, "study": dict, "requirements": list}
-        if content is None or not all(isinstance(content.get(name), kind) for name, kind in kinds.items()):
-            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again")
+        try:
+            _Manifest.model_validate(content, strict=True)
+        except ValidationError:
+            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again") from None
+        assert content is not None
         found[path.parent.relative_to(root).as_posix()] = content
     return found
 
