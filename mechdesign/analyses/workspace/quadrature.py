@@ -260,7 +260,8 @@ def _segments(designs: Designs, integrands: Sequence[Integrand], segments: Parts
         for j, integrand in enumerate(integrands):
             found[j, at], doubt[j, at] = RADII.apply(integrand.values(local) * measure)
         if not designs.field.same_assembly:
-            crossing[at] = _sign_change(v, 1 / np.broadcast_to(local.determinant, r.shape))
+            with np.errstate(divide="ignore"):
+                crossing[at] = _sign_change(v, 1 / np.broadcast_to(local.determinant, r.shape))
     return found, doubt, crossing
 
 
