@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from junitparser import JUnitXml
 
+from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import Tolerance
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.results import Column, Table
@@ -286,6 +287,26 @@ def test_verify_tells_files_whose_bytes_are_others(analysis, invoke, folder):
     done = invoke("run", "--verify", "old")
     assert done.exit_code == 1
     assert short(csv.DictReader(io.StringIO(done.stdout))) == {("motion", "", "bytes"), ("study.yaml", "", "bytes")}
+
+
+@pytest.mark.parametrize("damage", [None, "theta,B.x,valid\n0,1,1,1\n"])
+def test_verify_goes_on_after_a_table_that_cannot_be_read(analysis, invoke, folder, damage):
+    analysis(lambda study, **ignored: answer(tables=motion().tables))
+    for name in ("old/a", "old/b"):
+        invoke("kinematics", "slider.yaml", "--no-plots", "--out", name)
+    (folder / "old/a/motion.csv").unlink()
+    if damage is not None:
+        (folder / "old/a/motion.csv").write_text(damage)
+    done = invoke("run", "--verify", "old")
+    assert done.exit_code == 1
+    assert short(csv.DictReader(io.StringIO(done.stdout))) == {("motion", "", "bytes")}
+    assert "1 difference in 1 table" in done.stderr
+
+
+def test_a_huge_manifest_is_none(folder, monkeypatch):
+    monkeypatch.setattr(manifest, "_MOST_BYTES", 10)
+    (folder / "manifest.json").write_text('{"files": {}}')
+    assert manifest.read(folder) is None
 
 
 def test_verify_takes_no_other_study(results, invoke):

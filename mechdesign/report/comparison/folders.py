@@ -192,7 +192,7 @@ def compare_results(
             change = MISSING if name in before["tables"] else NEW
             found.differences.append(Difference(folder, table, "", change))
             continue
-        pair = _table(*old, name), _table(*new, name)
+        pair = read_table(*old, name), read_table(*new, name)
         given = [_given(each, command) for each in (before, after)]
         chosen = {}
         for column in pair[0].names:
@@ -223,7 +223,14 @@ def _verdict(told: Mapping[str, Any] | None) -> str:
     return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
 
 
-def _table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+def read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+    """A table of a folder, as its manifest describes it.
+
+    Raises
+    ------
+    StudyError
+        If it is another, or cannot be read.
+    """
     about = content["tables"][name]
     try:
         if Path(name).name != name:
