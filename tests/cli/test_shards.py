@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import mechdesign
 from mechdesign import shards
 from mechdesign.shards import FILE, Shard
 
@@ -107,6 +108,11 @@ def test_shards_that_cannot_be_merged(studies, invoke):
     told = invoke("merge", *asked)
     assert told.exit_code == 2
     assert "there are shards of " in told.stderr
+
+
+def test_a_shard_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(mechdesign.MechdesignError, match="the shard could not be written: No such file"):
+        shards.Taken(shards.Shard(1, 2)).write(tmp_path / "nowhere", {}, "run")
 
 
 def test_a_shard_is_data_alone(tmp_path):
