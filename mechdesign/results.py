@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import pandas
 
+# Meaning of a column of what varies over the cases of a sweep.
+VARIED = "varied"
 # Number of columns that a table's repr names.
 MAX_SHOWN = 8
 

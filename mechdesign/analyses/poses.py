@@ -18,7 +18,7 @@ from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Floats, Ints, evenly
 from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column
 from mechdesign.study import Study
@@ -333,7 +333,7 @@ def continuous(
     )
     if len(coarse):
         begins = known[at[coarse]]
-        moved[:, coarse] = _on_the_way(angles, given, begins, begins + 1, parts[at[coarse]], solve)
+        moved[:, coarse] = _on_the_way(angles, given, begins, parts[at[coarse]], solve)
     # Whole turns from each of some poses on, counted anew on every line of a grid.
     heads = np.flatnonzero(starts)
     begins = np.concatenate([heads, at + 1])
@@ -366,10 +366,9 @@ def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
 
 
 def _on_the_way(
-    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, ends: Ints,
-    parts: Ints, solve: Solve,
-) -> Floats:  # fmt: skip
-    """How far each angle turns between pairs of poses, shape (angles, pairs); nearest where the way does not close."""
+    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, parts: Ints, solve: Solve
+) -> Floats:
+    """How far each angle turns to the next pose, shape (angles, begins); the nearest way where it does not close."""
     found = np.empty((len(angles), len(begins)))
     number = np.maximum(parts, 2)
     pending = np.arange(len(begins))
@@ -377,12 +376,12 @@ def _on_the_way(
         count = int(number[pending].min())
         at = pending[number[pending] == count]
         left = [pending[number[pending] > count]]
-        for first in range(0, len(at), max(1, POSES_AT_ONCE // (count + 1))):
-            pairs = at[first : first + max(1, POSES_AT_ONCE // (count + 1))]
+        most = max(1, POSES_AT_ONCE // (count + 1))
+        for first in range(0, len(at), most):
+            pairs = at[first : first + most]
             way = np.linspace(0.0, 1.0, count + 1)
-            between = [v[begins[pairs], None] * (1 - way) + v[ends[pairs], None] * way for v in given]
-            configuration = solve(between, begins[pairs, None])
-            turned = np.stack([np.broadcast_to(configuration.value(c), configuration.shape) for c in angles])
+            between = [v[begins[pairs], None] * (1 - way) + v[begins[pairs] + 1, None] * way for v in given]
+            turned = _values_of(angles, solve(between, begins[pairs, None]))
             steps = wrap(np.diff(turned, axis=-1))
             closed = np.isfinite(steps).all(axis=(0, 2))
             sure = (np.abs(steps) < SURE_TURN).all(axis=(0, 2))
@@ -448,31 +447,20 @@ class Keeper:
 
 
 def solve_shown(study: Study, most: int = MAX_SHOWN_POSES) -> Shown:
-    """Solve what a picture shows of a motion that no analysis was asked for.
-
-    Raises
-    ------
-    MechdesignError
-        Where the coordinates given do not determine the mechanism.
-    """
+    """Solve what a picture shows of a motion that no analysis was asked for; raises as `solve_rows`."""
     poses = study_poses(study, "kinematics")
     rows = _rows(poses, most)
-    return Shown(study, poses, rows, _solve_rows(study, poses, rows))
+    return Shown(study, poses, rows, solve_rows(study, poses, rows))
 
 
-def solve_pose(study: Study, poses: Poses, row: int) -> Configuration:
-    """One of some poses.
+def solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
+    """Poses that give the same coordinates.
 
     Raises
     ------
     MechdesignError
-        Where the coordinates given do not determine the mechanism.
+        Where these do not determine the mechanism.
     """
-    return _solve_rows(study, poses, np.array([row]))
-
-
-def _solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
-    """Poses that give the same coordinates."""
     names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
     given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
@@ -481,4 +469,4 @@ def _solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
 
 def _rows(poses: Poses, most: int) -> Ints:
     rows = poses.groups[0].rows
-    return rows[np.unique(np.linspace(0, len(rows) - 1, most).round().astype(np.intp))]
+    return rows[evenly(len(rows), most)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from mechdesign.cli import terminal
 from mechdesign.errors import MechdesignError, Problem, StudyError
@@ -20,12 +21,20 @@ def annotate(level: str, problems: Iterable[Problem]) -> None:
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     for problem in problems:
-        # A text that is no file has a name in brackets.
-        file = "" if problem.file.startswith("<") else problem.file
-        place = {"file": file, "line": problem.line or "", "col": problem.column or ""}
+        # A text has a name in brackets, what an option says its name.
+        file = "" if problem.file.startswith(("<", "-")) else problem.file
+        place = {"file": _in_repository(file), "line": problem.line or "", "col": problem.column or ""}
         where = ",".join(f"{name}={str(value).translate(_PROPERTY)}" for name, value in place.items() if value)
-        message = ": ".join(filter(None, (problem.key, problem.message)))
+        option = problem.file if problem.file.startswith("-") else ""
+        message = ": ".join(filter(None, (option, problem.key, problem.message)))
         terminal.say(f"::{level}{' ' * bool(where)}{where}::{message.translate(_DATA)}")
+
+
+def _in_repository(file: str) -> str:
+    """A file as GitHub looks for it: from the top of what is checked out, wherever in it the command was given."""
+    top = os.environ.get("GITHUB_WORKSPACE", "")
+    path = Path(os.path.abspath(file))
+    return str(path.relative_to(top)) if file and top and path.is_relative_to(top) else file
 
 
 def of_error(error: Exception, message: str, study: Study | None = None) -> Sequence[Problem]:

@@ -41,10 +41,12 @@ def _guard() -> Iterator[None]:
     except typer.Exit:
         raise
     except Exception as error:
+        from mechdesign.cli.annotations import annotate, of_error
         from mechdesign.cli.docs import explained
 
         code, message = explained(error)
         print(message, file=sys.stderr)
+        annotate("error", of_error(error, message))
         raise typer.Exit(code) from None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import io
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING
 
 from mechdesign import shards
 from mechdesign.cli import terminal
-from mechdesign.cli.annotations import annotate, of_verdicts, of_warnings
 from mechdesign.cli.board import Board, Far, Reported
 from mechdesign.cli.crew import Alone, Crew, Tell
 from mechdesign.cli.docs import explained
@@ -47,6 +47,8 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
+_SUFFIXES = (".yaml", ".yml")  # of studies in a folder
+
 
 def questions(study: Study) -> tuple[str, ...]:
     """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
@@ -60,7 +62,7 @@ def questions(study: Study) -> tuple[str, ...]:
 
 
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
-    """Files of studies: those that are named, every ``*.yaml`` of a folder, and those of a pattern, each once.
+    """Files of studies, each once: those that are named, all of a folder (``*.yaml``, ``*.yml``), and of a pattern.
 
     Raises
     ------
@@ -69,17 +71,18 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
     """
     if not paths:
         return [None]
-    found: dict[Path | None, None] = {}
+    found: dict[str, Path] = {}
     for path in paths:
         here = [path]
         if path.is_dir():
-            here = sorted(file for file in path.glob("*.yaml") if file.is_file())
+            here = sorted(file for file in path.glob("[!.]*") if file.suffix in _SUFFIXES and file.is_file())
         elif glob.has_magic(str(path)) and not path.exists():
             here = sorted(map(Path, glob.glob(str(path), recursive=True)))
         if not here:
-            raise StudyError(f"{path}: there are no studies, which are files *.yaml")
-        found |= dict.fromkeys(here)
-    return list(found)
+            raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
+        for file in here:
+            found.setdefault(os.path.abspath(file), file)
+    return [*found.values()]
 
 
 @one_thread()
@@ -247,9 +250,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     try:
         with owned(directory):
             given = replace(answer(study, command, directory, options, progress), table=None)
-        tell(given, options)
-        annotate("error", of_verdicts(study, command, given.verdicts))
-        annotate("warning", of_warnings(study, command, given.warnings))
+        tell(given, study, options)
     except Exception as error:
         return failure(study.label, command, directory, error, study)
     return given

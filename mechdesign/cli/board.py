@@ -145,7 +145,8 @@ class Board:
 
         assert self._live is not None
         grid = Grid(box=None, pad_edge=False, header_style="bold")
-        grid.add_column("study", no_wrap=True)
+        # However long the names are, there is room for the rest.
+        grid.add_column("study", no_wrap=True, max_width=self._live.console.width // 4)
         grid.add_column("question", no_wrap=True)
         grid.add_column("outcome", no_wrap=True)
         grid.add_column("seconds", justify="right", no_wrap=True)

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from mechdesign.cli import terminal
+from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.batch import found_studies
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import claim, extras, folder, load_study
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import printable
+from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe
 from mechdesign.parallel import one_thread
 from mechdesign.report.requirements import foresee
 from mechdesign.report.writer import write_sketch
+from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
 
 
@@ -36,11 +39,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
-            foresee(study, COMMANDS, goals=True)
-            if study.matrix is not None:
-                sweep.prepared(study)
-            if study.sensitivities is not None:
-                sensitivities.prepared(study)
+            annotate("warning", study.warnings)
+            _foresee(study)
             if not options.no_plots:
                 claim(owners, study)
                 directory = folder(study, "check", options, several=len(asked) > 1)
@@ -49,5 +49,23 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
         except Exception as error:
             code, message = explained(error)
             terminal.say(message)
+            annotate("error", of_error(error, message))
             worst = max(worst, code)
     return worst
+
+
+def _foresee(study: Study) -> None:
+    """Find what requirements, matrix and sensitivities name and no result has: every such mistake in one go."""
+    looks: dict[Callable[[Study], object], bool] = {
+        partial(foresee, commands=COMMANDS, goals=True): True,
+        sweep.prepared: study.matrix is not None,
+        sensitivities.prepared: study.sensitivities is not None,
+    }
+    problems: dict[Problem, None] = {}
+    for look in [look for look, asked in looks.items() if asked]:
+        try:
+            look(study)
+        except StudyError as error:
+            problems |= dict.fromkeys(error.problems)
+    if problems:
+        raise StudyError([*problems])

@@ -88,9 +88,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--json, --quiet and --allow-files"
         )
     root = path.parent if path.name == manifest.NAME else path
-    recorded = folders.results(root)
-    if path != root:
-        recorded = {folder: content for folder, content in recorded.items() if folder == "."}
+    recorded = folders.results(path)
     if not recorded:
         raise StudyError(f"{path}: there is no {manifest.NAME}, nothing to verify")
     total = Comparison()

@@ -17,9 +17,10 @@ import mechdesign
 from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cli import terminal
+from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.options import STYLES, Options
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
-from mechdesign.errors import Interrupted, MechdesignError, StudyError, counted
+from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
 from mechdesign.parallel import Divided, divided, one_thread
@@ -317,8 +318,8 @@ def _journal(study: Study, command: str, directory: Path, options: Options) -> J
     return journal
 
 
-def tell(given: Outcome, options: Options) -> None:
-    """Say on stderr what came out; what is not met or failed is said even where quiet is wanted."""
+def tell(given: Outcome, study: Study, options: Options) -> None:
+    """Say on stderr, and to GitHub, what came out; what is not met or failed is said even where quiet is wanted."""
     who = f"{given.study}: {given.command}:"
     for warning in given.warnings:
         terminal.say(f"{who} warning: {warning}", quiet=options.quiet)
@@ -328,6 +329,9 @@ def tell(given: Outcome, options: Options) -> None:
         from mechdesign.cli.docs import look_up
 
         terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}".rstrip("\n"))
+        annotate("error", of_error(AssemblyError(given.failed), "", study))
+    annotate("error", of_verdicts(study, given.command, given.verdicts))
+    annotate("warning", of_warnings(study, given.command, given.warnings))
     if given.shard:
         terminal.say(f"{who} {given.shard}", quiet=options.quiet)
         return
@@ -382,9 +386,9 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
         if options.report:
             write_report(directory, study, [given], options)
     if given.shard:
-        tell(given, options)
+        tell(given, study, options)
         return given
     assert given.table is not None
     terminal.show(given.table, as_json=options.json, rest=directory / f"{given.table.name}.csv")
-    tell(given, options)
+    tell(given, study, options)
     return given

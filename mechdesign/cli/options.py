@@ -69,7 +69,9 @@ def _out(meaning: str) -> Parameter:
 
 
 STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
-STUDIES = _study(list[Path], "STUDY...", "The study files, folders of *.yaml or patterns; - is standard input.")
+STUDIES = _study(
+    list[Path], "STUDY...", "The study files, folders of them (*.yaml, *.yml) or patterns; - is standard input."
+)
 OUT = _out("Folder for tables, pictures and manifest. Default: results/<study>/<command>.")
 OUT_ALL = _out(
     "Folder that gets one folder a command (several studies: <study>/<command>, summary.csv). Default: results/<study>."

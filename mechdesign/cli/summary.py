@@ -82,5 +82,6 @@ def junit_text(report: JUnitXml) -> str:
     """The text of a JUnit report, with its counts."""
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
-    body = text.decode() if isinstance(text, bytes) else str(text)
+    # Jenkins' schema (junit-10.xsd of its xunit plugin) allows that count in suites alone.
+    body = text.decode().replace(' skipped="0"', "", 1)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

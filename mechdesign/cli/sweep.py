@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mechdesign.cli.execution import ask
+from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.ledger import failure
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit
@@ -43,7 +43,12 @@ class Matrix:
         if self.vary or self.cases is not None:
             yield from (f"matrix.{key}=" for key in ("vary", "method", "samples", "cases"))
         if self.vary:
-            yield f"matrix.vary={json.dumps(dict(map(_varied, self.vary)))}"
+            varied = [_varied(each) for each in self.vary]
+            names = [name for name, _ in varied]
+            for name in names:
+                if names.count(name) > 1:
+                    raise StudyError(f"--vary {name} is given twice; list its values with commas between them")
+            yield f"matrix.vary={json.dumps(dict(varied))}"
         if self.cases is not None:
             beside = study.parent if study is not None else Path()
             yield f"matrix.cases={json.dumps(os.path.relpath(self.cases, beside))}"
@@ -79,16 +84,18 @@ def _as_typed(error: StudyError) -> StudyError:
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
-    given = None
+    given, label = None, path.stem if path is not None else "study"
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
         return given.exit_code
-    except Interrupted:
+    except KeyboardInterrupt as stop:
+        words = str(stop) or "interrupted"
+        given = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
         raise
     except Exception as wrong:
         error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
-        given = failure(path.stem if path is not None else "study", "sweep", Path(), error)
+        given = failure(label, "sweep", Path(), error)
         return given.exit_code
     finally:
         if options.junit is not None and given is not None:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -77,13 +77,15 @@ def _show_to_people(table: Table, rest: Path | None) -> None:
     columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
     heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
-    room = console.width
+    # A long word leaves room for what stands beside it.
+    room, widest = console.width, console.width // 2
     shown = 0
     for head, column, texts in zip(heads, table.columns, columns, strict=True):
-        room -= 2 + max(len(text) for text in (*head.splitlines(), *texts))
+        room -= 2 + min(widest, max(len(text) for text in (*head.splitlines(), *texts)))
         if room < 0 and shown:
             break
-        grid.add_column(Text(head), justify="right" if column.numeric else "left", no_wrap=True)
+        justify: Literal["right", "left"] = "right" if column.numeric else "left"
+        grid.add_column(Text(head), justify=justify, no_wrap=True, max_width=widest)
         shown += 1
     for row in zip(*columns[:shown], strict=True):
         grid.add_row(*(Text(text) for text in row))

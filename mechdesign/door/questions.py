@@ -66,12 +66,7 @@ def load(
 
 
 def kinematics(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
-    all_modes: bool = False,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL, all_modes: bool = False
 ) -> Answer:
     """How does it move? Positions, velocities, accelerations, the Jacobian and the limits of motion.
 
@@ -79,12 +74,8 @@ def kinematics(
     ----------
     study : Study
         Its poses are those of the section ``kinematics``; without one, a turn of its drive.
-    seed : ignored
-        Nothing is random.
-    jobs : int or None
-        Threads that solve a long sweep; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
+    seed, jobs, progress : optional
+        See `mechdesign`; nothing is random.
     all_modes : bool
         Whether to follow every other assembly of the same links as well.
 
@@ -135,10 +126,8 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     ----------
     study : Study
         With a section ``workspace`` that names the point.
-    seed, jobs : ignored
-        Nothing is random, and one region takes a moment.
-    progress : Progress
-        Is told how far the computation is.
+    seed, jobs, progress : optional
+        See `mechdesign`; nothing is random, and one region takes one thread.
 
     Returns
     -------
@@ -175,27 +164,17 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def optimize(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,
-) -> Answer:
+) -> Answer:  # fmt: skip
     """Which dimensions are best? The optimum for each set of weights, and every design [S1, eqs. 27, 28].
 
     Parameters
     ----------
     study : Study
         With a section ``optimize``: variables, and what is to be largest or smallest.
-    seed : int, optional
-        Of a search or a front, in place of the study's; a grid is not random.
-    jobs : int or None
-        Processes; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
-    journal : Journal, optional
-        Where finished designs are kept when the computation is interrupted, and found when it is begun anew.
+    seed, jobs, progress, journal : optional
+        See `mechdesign`; a search or a front is random, a grid is not.
 
     Returns
     -------
@@ -243,12 +222,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     ----------
     study : Study
         With a section ``reliability``: what varies, and the limits of errors.
-    seed : int, optional
-        Of the samples, in place of the study's; 0 is a seed.
-    jobs : int or None
-        Threads; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
+    seed, jobs, progress : optional
+        See `mechdesign`; samples are random.
 
     Returns
     -------
@@ -292,12 +267,8 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     ----------
     study : Study
         With a section ``stiffness``: where, and what is elastic.
-    seed : ignored
-        Nothing is random.
-    jobs : int or None
-        Threads; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
+    seed, jobs, progress : optional
+        See `mechdesign`; nothing is random.
 
     Returns
     -------
@@ -328,27 +299,17 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def sweep(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,
-) -> Answer:
+) -> Answer:  # fmt: skip
     """Which cases meet what is required? A row a case of the matrix, each answered as a study of its own.
 
     Parameters
     ----------
     study : Study
         With a section ``matrix``: which entries vary, and how.
-    seed : int, optional
-        Of random cases and of the random numbers in each, in place of the study's; 0 is a seed.
-    jobs : int or None
-        Processes, a case each; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
-    journal : Journal, optional
-        Keeps finished cases in a file; those it holds already are not computed again.
+    seed, jobs, progress, journal : optional
+        See `mechdesign`; cases that are drawn are random, and so is what is random in each.
 
     Returns
     -------
@@ -391,12 +352,8 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     ----------
     study : Study
         With a section ``sensitivities``: results, and the numbers that change.
-    seed : int, optional
-        Of the random numbers, in place of the study's, the same in every case; 0 is a seed.
-    jobs : int or None
-        Processes, a case each; None uses every processor. The result does not depend on them.
-    progress : Progress
-        Is told how far the computation is.
+    seed, jobs, progress : optional
+        See `mechdesign`; what is random is the same in every case.
 
     Returns
     -------

@@ -18,7 +18,7 @@ from mechdesign.parallel import map_chunks
 from mechdesign.report import requirements
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
-from mechdesign.rows import Chosen, UnknownColumnError, choose
+from mechdesign.rows import UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.loading import load_document
 from mechdesign.study.schema.matrix import Named
@@ -92,11 +92,15 @@ class Wanted:
         path = self.name.removeprefix(f"{self.command}.")
         head, _, statistic = path.rpartition(".")
         try:
-            chosen, statistic = self._chosen(result, path), ""
+            located(result, path)
+            statistic = ""
         except UnknownColumnError:
             if statistic not in STATISTICS or not head:
                 raise
-            chosen = self._chosen(result, head)
+            path = head
+        chosen = choose(result, path, dict(self.where))
+        if chosen.missing:
+            raise UnknownColumnError(chosen.missing)
         values = chosen.values[chosen.counts]
         if not values.size:
             return Number(float("nan"), chosen.table.column(chosen.column).unit)
@@ -109,12 +113,6 @@ class Wanted:
                 f"{self.name} has {values.size} rows; ask for {', '.join(forms[:-1])} or {forms[-1]}, or name its row"
             )
         return Number(float(values[0]), unit)
-
-    def _chosen(self, result: Result, path: str) -> Chosen:
-        chosen = choose(result, path, dict(self.where))
-        if chosen.missing:
-            raise UnknownColumnError(chosen.missing)
-        return chosen
 
 
 def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:

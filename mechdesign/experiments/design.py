@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.matrix import GRID, Values
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted
+from mechdesign.study.text.units import QUANTITY
 
 
 def cases_of(study: Study) -> list[Case]:
@@ -38,8 +39,17 @@ def cases_of(study: Study) -> list[Case]:
         assert matrix.samples is not None
         rows = _spread(matrix.vary, _cube(matrix.method, len(names), matrix.samples, study.seed))
     for name, column in zip(names, zip(*rows, strict=True), strict=True):
-        _try(study, name, column)
+        # Quantities as they are written, for their units must fit.
+        written = study.resolved["matrix"]["vary"][name] if matrix.vary is not None else ()
+        _try(study, name, [*column, *_parts(written)])
     return [Case(tuple(zip(names, row, strict=True))) for row in rows]
+
+
+def _parts(written: Any) -> Iterable[Any]:
+    """The numbers and texts that values of an entry are written with."""
+    if isinstance(written, str):
+        return [part.strip() for part in written.split(":")]
+    return written.values() if isinstance(written, dict) else written
 
 
 def _spread(vary: Mapping[str, Values], cube: Floats) -> tuple[tuple[Any, ...], ...]:
@@ -74,9 +84,12 @@ def _try(study: Study, name: str, values: Sequence[Any]) -> None:
     """
     place = dotted(entry(study.resolved, name))
     problems: list[Problem] = []
-    for text, value in {json.dumps(value): value for value in values}.items():
+    # Of quantities one of each unit.
+    tried = {(QUANTITY.fullmatch(str(value)) or {"unit": json.dumps(value)})["unit"]: value for value in values}
+    for value in tried.values():
         if isinstance(value, int | float) and not isinstance(value, bool):
             continue
+        text = json.dumps(value)
         try:
             variant(study, Case.of({name: value}))
         except StudyError as error:

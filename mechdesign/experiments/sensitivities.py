@@ -11,7 +11,7 @@ import numpy as np
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import SENSITIVITIES
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, seeded, wanted_in
 from mechdesign.experiments.sweep import unit_of
 from mechdesign.numerics.arrays import Floats
@@ -102,10 +102,7 @@ def _changing(study: Study, each: Changed) -> Changing:
 
 @one_thread()
 def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Differentiate results of a study by central differences.
-
-    Parameters, tables and errors are told at `mechdesign.sensitivities`, the door to it.
-    """
+    """Differentiate results of a study by central differences; see `mechdesign.sensitivities`."""
     study = seeded(study, seed)
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
@@ -120,8 +117,10 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     table = _table(rows, [each.unit for each in found[0].numbers], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
     failed = f"the study itself has no answer: {found[0].failed}" if found[0].failed else ""
-    doubts = tuple(f"{row.result} by {row.parameter}: {row.doubt}" for row in rows if row.doubt)
-    return Result(SENSITIVITIES.name, {table.name: table}, doubts, counts, failed)
+    told = [f"{row.result} by {row.parameter}: {row.doubt}" for row in rows if row.doubt]
+    if warned := [each.warnings[0] for each in found if each.warnings]:
+        told.append(f"{len(warned)} of {counted(len(found), 'case')} have warnings; the first: {warned[0]}")
+    return Result(SENSITIVITIES.name, {table.name: table}, told, counts, failed)
 
 
 @dataclass(frozen=True)
@@ -161,9 +160,11 @@ def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence
             elif math.isnan(value):
                 doubt = f"is not known near {each.value:g}: {reason or found[0].failed or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
+                # Roughness wants longer steps, a curve that bends within them shorter ones.
+                other = each.step * 10 if each.step <= _PART * abs(each.value) else each.step / 10
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
-                    f"(few samples); another step may help, {{parameter: {each.given}, step: {10 * each.step:g}}}"
+                    f"(few samples); another step may help, {{parameter: {each.given}, step: {other:g}}}"
                 )
             yield Row(result.title, each.given, float(middle[k]), each.value, value, error, below, above, doubt)
 

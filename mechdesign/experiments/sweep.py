@@ -28,9 +28,10 @@ from mechdesign.journal import Journal, digest
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.requirements import Verdict, in_words
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import VARIED, Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.study_file import entry
+from mechdesign.study.schema.study_file import entry, kinds_of
+from mechdesign.study.text.units import QUANTITY, Units
 
 _SECTION = "matrix"
 
@@ -79,22 +80,17 @@ def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
     foresee(study, wanted)
-    return cases, wanted
+    # What is required has its column.
+    required = requirement_names(study)
+    return cases, [each for each in wanted if each.title not in required]
 
 
 @one_thread()
 def sweep(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,
-) -> Result:
-    """Answer every case of a study's matrix.
-
-    Parameters, tables and errors are told at `mechdesign.sweep`, the door to it.
-    """
+) -> Result:  # fmt: skip
+    """Answer every case of a study's matrix; see `mechdesign.sweep`."""
     study = seeded(study, seed)
     cases, wanted = prepared(study)
     progress.start(len(cases), "cases")
@@ -180,7 +176,7 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
     for place, name in enumerate(name for name, _ in found.cases[0].changes):
         values = [case.changes[place][1] for case in found.cases[:count]]
-        yield Column(name, _array(values), unit_of(study, name), "varied")
+        yield Column(name, _array(values, study.units), unit_of(study, name), VARIED)
     for k, name in enumerate(requirement_names(study)):
         verdicts = [each.verdicts[k] for each in answered]
         unit = next((each.unit for each in verdicts if each.unit), "")
@@ -195,9 +191,13 @@ def _columns(study: Study, found: Cases) -> Iterator[Column]:
     yield Column("reason", np.array([each.failed for each in answered]), "", "why the case failed")
 
 
-def _array(values: Sequence[Any]) -> NDArray[Any]:
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, dtype=float)
+def _array(values: Sequence[Any], units: Units) -> NDArray[Any]:
+    """Values as numbers, in these units, where each is one; else as words."""
+    numbers = [
+        units.convert(value) if isinstance(value, str) and QUANTITY.fullmatch(value) else value for value in values
+    ]
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
+        return np.array(numbers, dtype=float)
     return np.array([_text(value) for value in values])
 
 
@@ -218,12 +218,18 @@ def requirement_names(study: Study) -> list[str]:
 
 
 def unit_of(study: Study, name: str) -> str:
-    """Unit of an entry, where it is a parameter or a number of the geometry; else nothing, or what the study says."""
+    """Unit of an entry, as far as the study or its format tell it."""
     keys = entry(study.resolved, name)
     for k in range(len(keys), 0, -1):
         if keys[:k] in study.kinds:
             return study.units.label(study.kinds[keys[:k]])
+    # What a short form stands for lies below it.
+    kinds = kinds_of(keys) | {kind for path, kind in study.kinds.items() if path[:-1] == keys}
+    if len(kinds) == 1:
+        return study.units.label(*kinds)
     section, *path = keys
+    if keys[:2] == ("reliability", "dimensions"):
+        return study.unit_of(str(keys[2])) or ""
     if section != "mechanism" or len(path) < 2:
         return ""
     kind, owner, *rest = path

@@ -15,6 +15,11 @@ Ints = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
+def evenly(count: int, most: int) -> Ints:
+    """Indices of some of `count`, at most so many, spread evenly from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
+
+
 @dataclass(frozen=True, eq=False)
 class Lanes:
     """A record of arrays whose last axes are of the same length."""

@@ -14,6 +14,7 @@ from mechdesign.indices import INDEX_NAMES
 from mechdesign.reference.entries import Entry
 from mechdesign.study import Units, schema
 from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Model, Read, meaning
 from mechdesign.study.text.forms import properties
 
@@ -52,15 +53,6 @@ def _models(annotation: Any) -> Iterator[tuple[type[Model], str]]:
             yield model, star + stars
 
 
-def _reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
-    """What reads the values in an annotation, outside of other models."""
-    for each in (*metadata, *get_args(annotation)):
-        if isinstance(each, Read):
-            yield each
-        elif get_args(each):
-            yield from _reads(each)
-
-
 def entries() -> Iterator[Entry]:
     """An entry for each key, and one for each word that a key chooses out of a list."""
     forms = schema()
@@ -69,7 +61,7 @@ def entries() -> Iterator[Entry]:
         said = key.model.said(key.name)
         inner = list(_models(key.field.annotation))
         model = forms if key.model is StudyFile else forms["$defs"][key.model.__name__]
-        reads = list(_reads(key.field.annotation, key.field.metadata))
+        reads = list(fields.reads(key.field.annotation, key.field.metadata))
         words = _words(reads)
         about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
         # Of local indices there is more to say: `mechdesign.reference.sources.indices`.
@@ -99,7 +91,7 @@ def _within(models: Iterable[tuple[type[Model], str]]) -> Iterator[tuple[str, st
     """Words that a section which stands alone may be written as, instead of a mapping."""
     for model, stars in models:
         for field in model.model_fields.values() if model.short and not stars else ():
-            yield from _words(_reads(field.annotation, field.metadata))
+            yield from _words(fields.reads(field.annotation, field.metadata))
 
 
 def _unit(reads: Sequence[Read]) -> str:

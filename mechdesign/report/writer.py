@@ -235,7 +235,7 @@ def pictures(
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if asked.animate:
-            from mechdesign.report.figures.kinematics import animation
+            from mechdesign.report.figures.kinematics.animation import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
         drawn, failed = render(drawings, jobs)

@@ -101,6 +101,21 @@ requirements: [{result: kinematics.B.q, at_least: 0}, {result: optimize.scores, 
     assert invoke("check", "slider.yaml", "--no-plots", *change).exit_code == 0
 
 
+def test_requirements_matrix_and_sensitivities_are_checked_in_one_go(folder, invoke):
+    (folder / "slider.yaml").write_text(
+        SLIDER
+        + """\
+requirements: [{result: kinematics.B.z, at_least: 1}]
+matrix: {vary: {mechanism.parameters.r: [30, 40]}, results: [kinematics.B.y]}
+sensitivities: {results: [kinematics.B.x.max], parameters: [q]}
+"""
+    )
+    done = invoke("check", "slider.yaml", "--no-plots", "--quiet")
+    assert done.exit_code == 2
+    keys = [line.split(": ")[1] for line in done.stderr.splitlines()[:-1]]
+    assert keys == ["requirements.0", "matrix.results.0", "sensitivities.parameters.0"]
+
+
 @pytest.mark.parametrize("arguments", [["--no-plots"], []])
 def test_checking_imports_no_solver_of_scipy(folder, arguments):
     code = (

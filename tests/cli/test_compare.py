@@ -107,13 +107,32 @@ def test_what_rounding_leaves_of_zero_is_no_difference(results, compared):
 def test_tolerances(folder, results, compared, options, code):
     results("old", motion())
     results("new", motion(x=(1 / 3 + 1e-6, np.nan, 3.0)))
-    (folder / "wide.yaml").write_text(
-        "kinematics.*: {rtol: 0}\nkinematics.motion.B.x: {rtol: 1e-5}\nstiffness.K: {rtol: 1}\n"
-    )
+    (folder / "wide.yaml").write_text("kinematics.*: {rtol: 0}\nkinematics.motion.B.x: {rtol: 1e-5}\n")
     (folder / "narrow.yaml").write_text("'*.B.x': {rtol: 1e-7}\n")
     done, _ = compared(*options)
     assert done.exit_code == code
-    assert ("'stiffness.K' fits no column" in done.stderr) == ("wide.yaml" in options)
+
+
+@pytest.mark.parametrize(("allowed", "code"), [(1e9, 2), (0, 1)])
+def test_a_tolerance_that_fits_nothing_does_not_pass(folder, results, compared, allowed, code):
+    """A column that is mistyped beside a pattern for all would let everything pass."""
+    results("old", motion())
+    results("new", motion(x=(1 / 3, np.nan, 4.0)))
+    (folder / "allowed.yaml").write_text(f"'*': {{atol: {allowed}}}\nkinematics.motion.B.xx: {{rtol: 1e-3}}\n")
+    done, _ = compared("--tolerances", "allowed.yaml")
+    assert done.exit_code == code
+    assert "'kinematics.motion.B.xx' fits no column" in done.stderr
+
+
+def test_a_manifest_is_the_result_that_it_describes(folder, results, invoke):
+    results("old", motion())
+    results("new/deep", motion(x=(1 / 3, np.nan, 4.0)))
+    for old in ("old/manifest.json", "old"):
+        done = invoke("compare", old, "new/deep/manifest.json")
+        assert (done.exit_code, done.stdout.splitlines()[1:]) == (
+            1,
+            [".,motion,B.x,moved,1,1,0.333333333333,3,4,theta 90,mm"],
+        )
 
 
 def test_a_wrong_tolerance_is_told_with_its_place(folder, results, compared):

@@ -384,12 +384,14 @@ def test_folders_and_patterns(here, invoke):
     for name in ("b", "a", "c"):
         (here / f"deep/{name}.yaml").write_text(SLIDER)
     (here / "deep/notes.txt").write_text("none")
-    done = invoke("run", "deep", "deep/[ab].yaml", "deep/c.yaml", "--no-plots", "--out", "out")
+    (here / "deep/.gitlab-ci.yml").write_text("stages: [test]")
+    (here / "deep/c.yaml").rename(here / "deep/c.yml")
+    done = invoke("run", "deep", "deep/[ab].yaml", here / "deep/c.yml", "--no-plots", "--out", "out")
     assert done.exit_code == 0, done.stderr
     assert [row.split(",")[0] for row in done.stdout.splitlines()] == ["study", "a", "b", "c"]
     assert (here / "out/summary.csv").read_text() == done.stdout
     (here / "empty").mkdir()
-    for nothing in ("empty", "deep/*.yml"):
+    for nothing in ("empty", "deep/*.yamll"):
         done = invoke("run", nothing)
         assert (done.exit_code, "no studies" in done.stderr) == (2, True)
 
@@ -408,6 +410,31 @@ def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monk
     assert "::warning file=gate.yaml::gate: kinematics: 50 %25 play, mind the gap" in lines
     at = lines.index("failed: 2 of 3 questions")
     assert [line.split(":")[0].strip() for line in lines[at + 1 :]] == ["gate", "wrong"]
+
+
+def test_every_command_tells_github_with_paths_from_its_workspace(here, invoke, monkeypatch):
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    monkeypatch.setenv("GITHUB_WORKSPACE", str(here.parent))
+    (here / "gate.yaml").write_text(SLIDER + "requirements: [{result: kinematics.theta, at_most: 80}]\n")
+    (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))
+
+    def told(*arguments):
+        lines = invoke(*arguments, "--no-plots").stderr.splitlines()
+        return [line for line in lines if line.startswith("::")]
+
+    place = f"::error file={here.name}/"
+    for command in (["run"], ["kinematics"], ["sweep", "--vary", "mechanism.parameters.r=30"]):
+        (line,) = told(command[0], "gate.yaml", *command[1:])
+        assert line.startswith(f"{place}gate.yaml,line=14,col=16::requirements.0: requirement: kinematics.theta")
+    for command in ("run", "kinematics", "check"):
+        (line,) = told(command, "wrong.yaml")
+        assert line.startswith(f"{place}wrong.yaml,line=6,col=19::mechanism.links.crank.2: ")
+        # An option is no file.
+        (line,) = told(command, "gate.yaml", "--set", "kinematics.rate=3")
+        assert line.startswith("::error::--set kinematics.rate=3: kinematics.rate: unknown key")
+    lines = told("kinematics", "slider.yaml", "--set", "kinematics={poses: [{theta: 0}, {B.x: 900}]}")
+    (line,) = [line for line in lines if line.startswith("::error")]
+    assert line.startswith(f"{place}slider.yaml::pose B.x = 900 mm")
 
 
 def test_inputs_of_one_name_are_told_apart(here, invoke):

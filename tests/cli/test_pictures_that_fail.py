@@ -24,7 +24,7 @@ def failing(*arguments, **options):
         ("figures.kinematics", "curves_figure", "motion.png", "motion"),
         ("figures.kinematics", "paths_figure", "paths.png", "paths"),
         ("figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
-        ("figures.kinematics", "animation", "motion.gif", "motion.gif"),
+        ("figures.kinematics.animation", "animation", "motion.gif", "motion.gif"),
         ("figures.kinematics", "figures", "motion.png paths.png", "of kinematics"),
     ],
 )

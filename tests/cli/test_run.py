@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from xml.etree import ElementTree
 
 import pytest
 from junitparser import JUnitXml
@@ -166,6 +167,24 @@ def test_names_cannot_spoil_json_pages_or_annotations(studies, analysis, invoke,
         assert [line for line in lines if not line.isprintable()] == [], path
         if path.name == "manifest.json":
             assert json.loads(path.read_text(encoding="utf-8"))["study"]["name"] == hostile
+
+
+def test_junit_has_what_the_schema_of_jenkins_allows(studies, analysis, invoke):
+    """The attributes of junit-10.xsd of its xunit plugin, which refuses a file with others."""
+    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    invoke("run", "slider.yaml", "wrong.yaml", "--no-plots", "--junit", "report.xml")
+    allowed = {
+        "testsuites": {"name", "time", "tests", "failures", "errors"},
+        "testsuite": {"name", "time", "tests", "failures", "errors", "skipped"},
+        "testcase": {"name", "time", "classname"},
+        "failure": {"type", "message"},
+        "error": {"type", "message"},
+        "system-out": set(),
+    }
+    found = [*ElementTree.parse("report.xml").iter()]
+    assert {each.tag for each in found} == {"testsuites", "testsuite", "testcase", "error", "system-out"}
+    for each in found:
+        assert {*each.keys()} <= allowed[each.tag], each.tag
 
 
 def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, invoke):

@@ -55,6 +55,8 @@ def test_the_exit_code_is_the_worst_of_the_cases(study, invoke, values, code):
         (["--vary", "mechanism.parameters.rr=1:2:1"], '--vary: matrix.vary.mechanism.parameters.rr: the study has no'),
         (["--vary", f"{R}=1", "--results", "kinematics.B.y.max"], "--results: matrix.results.0: the result of"),
         (["--vary", f"{R}"], f"--vary {R}: is <dotted name>=START:STOP:STEP"),
+        (["--vary", f"{R}=1", "--vary", f"{R}=2"], f"--vary {R} is given twice"),
+        (["--vary", f"{R}=1", "--results", "GII,GII"], "--results: matrix.results: 'GII' is listed twice"),
         (["--vary", f"{R}=1", "--cases", "cases.csv"], "--vary and --cases contradict each other"),
         (["--vary", f"{R}=1:2", "--method", "latin_hypercub", "--samples", "4"], "did you mean 'latin_hypercube'?"),
         ([], "a sweep needs cases"),
@@ -81,6 +83,28 @@ def test_run_answers_the_matrix_of_a_study(study, invoke):
     assert invoke("run", "--verify", "results/press").exit_code == 0
     wrong = invoke("check", "press.yaml", "--no-plots", "--set", "matrix.results=[kinematics.B.xx.max]")
     assert wrong.exit_code == 2
+
+
+def test_cases_of_two_sweeps_are_compared_by_what_varies(study, invoke):
+    for name, values in (("old", "30,35"), ("new", "25,30,35")):
+        invoke("sweep", "press.yaml", "--vary", f"{R}={values}", "--no-plots", "--out", name)
+    done = invoke("compare", "old", "new")
+    assert done.exit_code == 1
+    told = [(row["column"], row["change"], row["rows"], row["row"]) for row in rows(done.stdout)]
+    assert told == [("", "new", "1", f"{R} 25"), ("case", "moved", "2", f"{R} 30")]
+
+
+def test_an_interrupted_sweep_leaves_its_report(study, invoke, monkeypatch):
+    (study / "report.xml").write_text("that of yesterday")
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mechdesign.experiments.sweep.answers", interrupted)
+    done = invoke("sweep", "press.yaml", "--vary", f"{R}=25,30", "--no-plots", "--junit", "report.xml")
+    assert done.exit_code == 130
+    (case,) = ElementTree.parse(study / "report.xml").findall(".//testcase")
+    assert case.find("error").get("type") == "exit code 130"
 
 
 def test_github_shows_requirements_that_cases_do_not_meet(study, invoke, monkeypatch):

@@ -1,13 +1,22 @@
 """What a person at a terminal sees, and what Ctrl-C does, in a process of its own on a pseudo-terminal."""
 
+import io
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.live import Live
+
+from mechdesign.cli import terminal
+from mechdesign.cli.board import Board, Far
+from mechdesign.cli.execution import Outcome
+from mechdesign.cli.summary import summary
 
 from .conftest import SLIDER, answer
 
@@ -72,6 +81,24 @@ def test_a_table_with_what_there_is_room_for_and_where_the_rest_is(tmp_path):
     assert "motion.csv" in shown
     assert "0.142857" in shown
     assert "0.142857142857" not in shown
+
+
+def test_a_long_name_leaves_room_for_what_became_of_it(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    terminal.show(summary([Outcome("long " * 20, "kinematics", Path(), 1, 0)]), as_json=False)
+    assert "requirement not met" in capsys.readouterr().out
+
+
+def test_the_table_of_what_is_under_way_has_room_for_it():
+    board = Board(quiet=False)
+    board._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    board.start(["long " * 30, "b"])
+    board.far(0, Far("reliability", "samples", 1, 4))
+    board.done(1, Outcome("b", "kinematics", Path(), 1, 0))
+    board._live.console.print(board._table())
+    text = board._live.console.file.getvalue()
+    assert all(word in text for word in ("kinematics", "requirement not met", "reliability", "samples", "1 failed"))
 
 
 def test_no_bar_for_what_is_quick_and_one_for_what_is_not(tmp_path):

@@ -7,10 +7,11 @@ from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics import curves_figure, figures, in_order
+from mechdesign.report.figures.kinematics import curves_figure, figures
+from mechdesign.report.figures.kinematics.animation import in_order
+from mechdesign.report.figures.kinematics.transmission import transmission_figure
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import Sweep, ranks
-from mechdesign.report.figures.transmission import transmission_figure
 
 FOUR_BAR = """
 mechanism:

@@ -72,6 +72,25 @@ sensitivities:
     assert table["unit"].tolist() == ["mm/N", "mm/(N*mm/rad)"]
 
 
+def test_units_of_what_is_no_parameter_of_the_mechanism():
+    """Of a tolerance and of a section's numbers, in the short form too: without them the ratio has another unit."""
+    text = """
+mechanism:
+  links: {ground: {O: [0, 0]}, beam: [O, P, 400]}
+  drives: {q: {angle: beam}}
+  sketch: {P: [400, 0]}
+stiffness: {at: P, sections: {s: {E: 210 GPa, width: 20, height: 40}}, elastic: {beam: s}, poses: [{q: 30}]}
+reliability: {dimensions: {"*.length": 0.06, q: 0.01}, poses: [{q: 30}], limits: {P.x: 0.05}, methods: [analytic]}
+sensitivities:
+  results: [stiffness.k_min]
+  parameters: [stiffness.sections.s.E, stiffness.sections.s.height, "reliability.dimensions.*.length",
+               reliability.dimensions.q]
+"""
+    _, table = rows(text)
+    assert table["at_unit"].tolist() == ["N/mm^2", "mm", "mm", "deg"]
+    assert table["unit"].tolist() == ["N/(mm*N/mm^2)", "N/(mm*mm)", "N/(mm*mm)", "N/(mm*deg)"]
+
+
 def differences(function, at, step):
     """What `slope` finds of a function of an array."""
     places = at + step * np.array([[0], [-1], [1]]) * STEPS
@@ -119,6 +138,27 @@ def test_what_is_no_derivative_is_told():
     assert np.isnan(table["derivative"][0])
     assert "is not known near 20.1" in answer.warnings[0]
     assert "cannot be assembled" in answer.warnings[0]
+
+
+def test_another_step_is_shorter_where_that_given_is_long():
+    text = """
+mechanism:
+  parameters: {g: 100}
+  links: {ground: {O: [0, 0], D: [g, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+kinematics: {outputs: [rocker.angle]}
+sensitivities: {results: kinematics.extremes.rocker.angle.range, parameters: {parameter: g, step: 40}}
+"""
+    answer, _ = rows(text)
+    assert "another step may help, {parameter: g, step: 4}" in answer.warnings[0]
+
+
+def test_warnings_of_the_cases_are_told():
+    whole = "kinematics={sweep: {crank: {from: 0, to: 360, step: 90}}, outputs: [B.x]}"
+    asked = "sensitivities={results: [kinematics.extremes.B.x.range], parameters: [r]}"
+    answer, _ = rows(SLIDER, asked, "mechanism.parameters.l=39.9", whole)
+    assert any("of 13 cases have warnings; the first: kinematics: " in warning for warning in answer.warnings)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,8 @@ import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.panels import plane, quantity, round_down
-from mechdesign.report.figures.stiffness import Coil, figures
+from mechdesign.report.figures.stiffness import figures
+from mechdesign.report.figures.stiffness.springs import Coil
 from mechdesign.results import Result
 
 

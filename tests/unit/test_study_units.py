@@ -83,6 +83,22 @@ def test_labels(kind, label):
     assert Units().label(kind) == label
 
 
+@pytest.mark.parametrize(
+    ("above", "below", "ratio"),
+    [
+        ("mm", "deg", "mm/deg"),
+        ("mm/s", "N", "mm/(s*N)"),
+        ("deg", "deg/s", "deg/(deg/s)"),
+        ("", "mm/s", "1/(mm/s)"),
+        ("mm/(s*N)", "deg", "mm/(s*N*deg)"),
+        ("mm", "rad/(N*mm)", "mm/(rad/(N*mm))"),
+        ("mm", "", "mm"),
+    ],
+)
+def test_a_unit_over_another(above, below, ratio):
+    assert Units.ratio(above, below) == ratio
+
+
 def test_pint_is_imported_only_for_an_uncommon_unit(tmp_path):
     study = tmp_path / "study.yaml"
     study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")

@@ -19,6 +19,7 @@ from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE = "kinematics.extremes.B.x.range"
 R, L = "mechanism.parameters.r", "mechanism.parameters.l"
+CRANK = "mechanism.links.crank.2"
 
 
 def study_of(matrix: dict[str, Any], **more: Any) -> Any:
@@ -85,6 +86,21 @@ def test_words_of_a_random_design_come_equally_often():
     assert (words.count("side"), words.count("follow")) == (5, 5)
 
 
+def test_what_is_required_has_one_column_and_its_limits_in_pictures():
+    result = mechdesign.sweep(study_of({"vary": {R: [25, 45]}, "results": [STROKE, "kinematics.rod.angle.max"]}))
+    names = result.main.names
+    assert len(names) == len(set(names))
+    assert result.drawn["results"][STROKE] == (70, None)
+
+
+def test_quantities_in_a_file_of_cases_are_numbers(tmp_path: Path):
+    (tmp_path / "cases.csv").write_bytes(f"\ufeff{R};{L}\r\n4 cm;100\r\n\r\n25;0.12 m\r\n".encode())
+    (tmp_path / "study.yaml").write_text(SLIDER_CRANK + "matrix: {cases: cases.csv}\n")
+    table = mechdesign.sweep(mechdesign.load(tmp_path / "study.yaml")).main
+    assert (table[R].tolist(), table[L].tolist()) == ([40, 25], [100, 120])
+    np.testing.assert_allclose(table[STROKE], [80, 50], rtol=1e-9)
+
+
 def test_cases_of_a_file(tmp_path: Path):
     (tmp_path / "cases.csv").write_text(f"{R},mechanism.branch\n# longer\n40,side\n25,follow\n40,side\n")
     (tmp_path / "study.yaml").write_text(SLIDER_CRANK + "matrix: {cases: cases.csv}\n")
@@ -101,6 +117,12 @@ def test_cases_of_a_file(tmp_path: Path):
         ({"vary": {"mechansim.parameters.r": [1]}}, "the study has no mechansim; did you mean 'mechanism'?"),
         ({"vary": {"kinematics.sweep.crank.stp": [1]}}, "no kinematics.sweep.crank.stp; did you mean 'step'?"),
         ({"vary": {"mechanism.branch": ["side", "folow"]}}, "did you mean 'follow'?"),
+        ({"vary": {CRANK: [1, "2 deg"]}}, "'2 deg' is an angle, where a length is expected"),
+        ({"vary": {CRANK: "1 deg:3 deg:1 deg"}}, "'1 deg' is an angle, where a length is expected"),
+        (
+            {"vary": {R: [1]}, "results": [{"result": "kinematics.extremes.max", "where": {"output": "B.z"}}]},
+            "no row of extremes has output B.z; did you mean 'B.x'?",
+        ),
         ({"vary": {R: [1, 1]}}, "the number 1 is listed twice"),
         ({"vary": {R: "1:2"}}, "a grid needs a step"),
         ({"vary": {R: "2:1:1"}}, "1 is not above 2"),

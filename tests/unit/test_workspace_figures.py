@@ -8,7 +8,10 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.report.figures import style
-from mechdesign.report.figures.workspace import figures, index_columns, inscribed_figure, loops
+from mechdesign.report.figures.workspace import figures
+from mechdesign.report.figures.workspace.boundary import inscribed_figure
+from mechdesign.report.figures.workspace.index_maps import index_columns
+from mechdesign.report.figures.workspace.ranged import loops
 from mechdesign.report.figures.workspace.regions import fate, regions
 from mechdesign.results import Column, Result, Table
 

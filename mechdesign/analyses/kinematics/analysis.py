@@ -53,17 +53,9 @@ ASTRAY = 1e-3
 
 @one_thread()
 def kinematics(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
-    all_modes: bool = False,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL, all_modes: bool = False
 ) -> Result:
-    """Solve every pose of the study's kinematics.
-
-    Parameters, tables and errors are told at `mechdesign.kinematics`, the door to it.
-    """
+    """Solve every pose of the study's kinematics; see `mechdesign.kinematics`."""
     question = motion_question(study)
     poses = question.poses
     if all_modes and len(poses.groups) > 1:

@@ -55,17 +55,10 @@ BETWEEN = 100
 
 @one_thread()
 def optimize(
-    study: Study,
-    *,
-    seed: int | None = None,
-    jobs: int | None = 1,
-    progress: Progress = NULL,
+    study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,
-) -> Result:
-    """Evaluate designs, and find the best one for each set of weights [S1, eqs. 27, 28].
-
-    Parameters, tables and errors are told at `mechdesign.optimize`, the door to it.
-    """
+) -> Result:  # fmt: skip
+    """Evaluate designs, and find the best for each set of weights [S1, eqs. 27, 28]; see `mechdesign.optimize`."""
     section = study.optimize
     if section is None or not section.variables:
         raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))

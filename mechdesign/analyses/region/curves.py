@@ -12,7 +12,7 @@ from mechdesign.analyses.region.pieces import Pieces
 from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, Intervals, ray_through
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
@@ -174,7 +174,7 @@ def _sectors(region: Region, panels: Panels, most: int, parts: list[Complexes]) 
     sectors = []
     for patch, fine in zip(found, finer if len(finer) == len(found) else found, strict=True):
         number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
-        kept = np.unique(np.linspace(0, len(patch.theta) - 1, min(number, len(patch.theta))).round().astype(int))
+        kept = evenly(len(patch.theta), number)
         begin = sum(len(grid) for grid in parts)
         parts.append(patch.grid(region.about)[kept])
         sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid(region.about)))

@@ -43,10 +43,7 @@ _Groups = Sequence[tuple[SolvedPoses, DriveRates]]
 
 @one_thread()
 def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Errors of a study's outputs from its tolerances and clearances.
-
-    Parameters, tables and errors are told at `mechdesign.reliability`, the door to it.
-    """
+    """Errors of a study's outputs from its tolerances and clearances; see `mechdesign.reliability`."""
     keep_freed_memory()
     sources, warnings = find_sources(study)
     section = study.reliability

@@ -21,7 +21,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import LOADS
+from mechdesign.study.schema.variation import LOADS
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.study.schema.reliability import LOADS
+from mechdesign.study.schema.variation import LOADS
 
 ORDERS = ("position", "velocity", "acceleration")
 

@@ -14,6 +14,7 @@ from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
+from scipy.special import betaincinv, ndtr, ndtri
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
@@ -67,6 +68,10 @@ class Marginal(ABC):
     def at(self, u: Floats) -> Floats:
         """Deviations at values of a standard normal variable, increasing, in the shape of `u`."""
 
+    def _from_ends(self, u: Floats, inward: Floats) -> Floats:
+        """Deviations so far from the end of the tolerance on the side of `u`, where small probabilities keep digits."""
+        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+
     def widened(self, factor: float) -> Self:
         """The law of a tolerance as many times as wide, about the same middle."""
         half = 0.5 * factor * (self.high - self.low)
@@ -115,8 +120,6 @@ class TruncatedNormal(Marginal):
         return np.asarray(self.mean + self.sigma * drawn)
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtr, ndtri
-
         # In the lower tail, where small probabilities keep their digits.
         tail = ndtr(-SIGMAS)
         below = ndtri(tail + ndtr(-np.abs(u)) * (1.0 - 2.0 * tail))
@@ -133,10 +136,7 @@ class Uniform(Marginal):
         return self.low + (self.high - self.low) * rng.random(count)
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtr
-
-        inward = (self.high - self.low) * ndtr(-np.abs(u))
-        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+        return self._from_ends(u, (self.high - self.low) * ndtr(-np.abs(u)))
 
 
 class Triangular(Marginal):
@@ -162,8 +162,6 @@ class Triangular(Marginal):
         return rng.triangular(self.low, self.mode, self.high, count)
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtr
-
         width, rise = self.high - self.low, self.mode - self.low
         below, above = ndtr(u), ndtr(-u)
         climb = self.low + np.sqrt(below * width * rise)
@@ -214,13 +212,11 @@ class UniformFit(_OfFit):
         return self.mean, self.sigma**2, 0.0, Uniform.fourth * (hole**4 + shaft**4) + 6.0 * (hole * shaft) ** 2
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtr
-
         width, wider, narrower = self.high - self.low, max(self.hole, 1.0 - self.hole), min(self.hole, 1.0 - self.hole)
         tail = ndtr(-np.abs(u))
         rising = np.sqrt(2.0 * wider * narrower * tail)
         inward = width * np.where(2.0 * wider * tail < narrower, rising, 0.5 * narrower + wider * tail)
-        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+        return self._from_ends(u, inward)
 
 
 def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Marginal:
@@ -249,11 +245,9 @@ class Beta(Marginal):
         return self.low + (self.high - self.low) * rng.beta(*self.shape, count)
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import betaincinv, ndtr
-
         (a, b), width, tail = self.shape, self.high - self.low, ndtr(-np.abs(u))
         inward = width * np.where(u < 0, betaincinv(a, b, tail), betaincinv(b, a, tail))
-        return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
+        return self._from_ends(u, inward)
 
 
 @dataclass(frozen=True)
@@ -283,8 +277,6 @@ class Measured(Marginal):
         return self._quantile(rng.random(count))
 
     def at(self, u: Floats) -> Floats:
-        from scipy.special import ndtr
-
         return self._quantile(ndtr(u))
 
     def _quantile(self, share: Floats) -> Floats:

@@ -25,8 +25,7 @@ from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import LOADS
-from mechdesign.study.schema.variation import Clearance
+from mechdesign.study.schema.variation import LOADS, Clearance
 
 # Largest deviation, in radians or in sizes of the mechanism.
 MAX_DEVIATION = 1e6

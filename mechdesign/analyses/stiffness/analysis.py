@@ -79,10 +79,7 @@ class Body:
 
 @one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Stiffness of a body or a pin at every pose of the study [S4].
-
-    Parameters, tables and errors are told at `mechdesign.stiffness`, the door to it.
-    """
+    """Stiffness of a body or a pin at every pose of the study [S4]; see `mechdesign.stiffness`."""
     body = ask(study)
     poses = study_poses(study, "stiffness")
     progress.start(poses.count, "poses")

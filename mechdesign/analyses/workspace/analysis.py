@@ -60,10 +60,7 @@ ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; re
 
 @one_thread()
 def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
-    """Reachable region of a point: indices (GII, GRI, SUI), local indices on a grid, and the boundary.
-
-    Parameters, tables and errors are told at `mechdesign.workspace`, the door to it.
-    """
+    """Region that a point reaches, its indices, local ones on a grid, and its boundary; see `mechdesign.workspace`."""
     section = study.workspace
     if section is not None and study.mechanism.mobility == 1:
         return point_path(study)

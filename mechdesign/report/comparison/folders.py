@@ -12,7 +12,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from mechdesign.errors import StudyError
+from mechdesign.commands import SWEEP
+from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import (
     MISSING,
@@ -26,7 +27,7 @@ from mechdesign.report.comparison.differences import (
 )
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.report.tables import from_csv
-from mechdesign.results import Table
+from mechdesign.results import VARIED, Table
 from mechdesign.study.text.document import leaves, read
 
 _POSE_KEYS = ("poses", "sweep", "path")
@@ -70,9 +71,12 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     Raises
     ------
     StudyError
-        If they have no result in common, or what a folder holds is not what mechdesign writes.
+        If they have no result in common, or what a folder holds is not what mechdesign writes; or they are equal
+        while a pattern of the tolerances fits nothing, as one that was mistyped.
     """
     before, after = results(old), results(new)
+    # A manifest alone is the folder that it lies in.
+    old, new = (each.parent if each.name == manifest.NAME else each for each in (old, new))
     if not before.keys() & after.keys():
         there = [f"{root} has {', '.join(found) or 'none'}" for root, found in ((old, before), (new, after))]
         raise StudyError(f"nothing to compare: no result stands in both folders; {'; '.join(there)}")
@@ -90,7 +94,10 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     found.notes += [
         note if len(folders) == everywhere else f"{', '.join(folders)}: {note}" for note, folders in noted.items()
     ]
-    found.notes += [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
+    unfit = [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
+    if unfit and not found.differences:
+        raise StudyError([*map(Problem, unfit)])
+    found.notes += unfit
     found.moved.sort(key=lambda each: -each.share)
     return found
 
@@ -98,11 +105,15 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
 def results(root: Path) -> dict[str, dict[str, Any]]:
     """Manifests in and below a folder by the relative paths of their folders, ``.`` for the folder itself.
 
+    Of a manifest, itself alone.
+
     Raises
     ------
     StudyError
         If there is no such folder, or a manifest cannot be read.
     """
+    if root.name == manifest.NAME and root.is_file():
+        return {".": results(root.parent)["."]}
     if not root.is_dir():
         raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
     found = {}
@@ -245,8 +256,14 @@ def read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
 
 
 def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], Any]:
-    """Coordinates that a study gives for a command's poses, by default those of `kinematics`, and their values."""
+    """Coordinates that a study gives for a command's poses, by default those of `kinematics`, and their values.
+
+    Of a sweep the entries that vary.
+    """
     resolved = content["study"].get("resolved") or {}
+    if command == SWEEP.name:
+        columns = [each for about in content["tables"].values() for each in about["columns"]]
+        return frozenset(each["name"] for each in columns if each["meaning"] == VARIED), resolved.get(SWEEP.section)
     for section in (resolved.get(command), resolved.get("kinematics")):
         poses = {key: section[key] for key in _POSE_KEYS if section.get(key)} if isinstance(section, dict) else {}
         if not poses:

@@ -20,9 +20,8 @@ from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.labels import covered, paper, place_labels
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import LOADS
 from mechdesign.study.schema.stiffness import Profile
-from mechdesign.study.schema.variation import Dimension
+from mechdesign.study.schema.variation import LOADS, Dimension
 
 _HEIGHT = 4.6  # inches
 _TITLE = 0.42

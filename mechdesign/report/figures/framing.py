@@ -15,6 +15,7 @@ from mechdesign.report.figures import style
 PAD = 0.5  # inches around what is drawn, for symbols and names
 MIN_HEIGHT = 1.5  # inches, of a window
 MAX_HEIGHT = 5.3  # inches
+MAX_TILE_HEIGHT = 4.0  # inches, of one of several windows
 TITLE = 0.36  # inches above a window for a line of words
 # Inches beside a window; left and below for axis labels.
 LEFT = 0.78
@@ -85,3 +86,25 @@ def framed(
     """A figure with one window as wide as the page; `above` it, inches are left for a title."""
     figure, (axes,) = windows(fit(places, style.width() - LEFT - RIGHT, height, pad), unit, above=above)
     return figure, axes
+
+
+def column_width(columns: int, gap: float) -> float:
+    """Width of each of some windows side by side, by the gap between them; inches."""
+    return (style.width() - LEFT - RIGHT - gap * (columns - 1)) / columns
+
+
+def tiled(
+    places: Complexes, count: int, most: int, *, gap: float, pads: tuple[float, float], page: float, least: float
+) -> tuple[int, Window]:
+    """In how many columns (at most `most`) windows of one scale become largest, and the window of each.
+
+    In inches: the gap between columns, what is left free around the places in one column and in several, the height of
+    all rows together, about, and the least height of a window.
+    """
+
+    def window(columns: int) -> Window:
+        height = min(max(page / -(-count // columns), least), MAX_TILE_HEIGHT)
+        return fit(places, column_width(columns, gap), height, pads[columns > 1])
+
+    fitted = {columns: window(columns) for columns in range(1, min(count, most) + 1)}
+    return max(fitted.items(), key=lambda item: item[1].scale)

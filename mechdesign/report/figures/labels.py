@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from mechdesign.numerics.arrays import Complexes, Floats
 
+HALO = [withStroke(linewidth=2.2, foreground="white")]  # keeps names clear of the lines below them
 _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
 _NET = 4.5  # points between two places of what names keep off
@@ -107,7 +108,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
             label.text, (anchor.real, anchor.imag), xytext=tuple(offset), textcoords="offset points", ha="center",
             va="center", arrowprops=leader, color=label.color, fontsize=label.size,
             fontstyle="italic" if label.optional else "normal", zorder=order,
-            path_effects=[withStroke(linewidth=2.2, foreground="white")],
+            path_effects=HALO,
         )  # fmt: skip
 
 

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import solve_pose, solve_shown
+from mechdesign.analyses.poses import solve_rows, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
+from mechdesign.numerics.arrays import evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import Travel, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
@@ -54,7 +55,7 @@ def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -
         if (scene := pose(mechanism, solved)) is not None:
             panels.append((words, solved, 0))
             return _compose(study, panels, travels([*scenes, scene]))
-    some = np.unique(np.linspace(0, len(sweep.rows) - 1, _POSES).round().astype(int)).tolist()
+    some = evenly(len(sweep.rows), _POSES).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
     if first is not None:
@@ -82,7 +83,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     row = int(np.nanargmax(failure)) if samples is None else samples.pose
     # A line may be broken between coordinates only.
     words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-    return words, solve_pose(study, poses, row)
+    return words, solve_rows(study, poses, np.array([row]))
 
 
 def sketch_figure(study: Study) -> Figure:

@@ -23,7 +23,7 @@ from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.report.figures.workspace import regions_figure, workspace_figure
+from mechdesign.report.figures.workspace.boundary import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
 from mechdesign.results import Result, Table
 from mechdesign.study import Study

@@ -14,8 +14,8 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
-from mechdesign.report.figures.kinematics import draw_paths, paths_figure
+from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
+from mechdesign.report.figures.kinematics.paths import draw_paths, paths_figure
 from mechdesign.report.figures.panels import MAX_PANELS, abscissa, legend_below, tick_abscissa
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result, Table
@@ -100,7 +100,7 @@ def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
     places = np.concatenate([sweep.extent for sweep in sweeps])
     count = len(parts)
     columns = 1 if style.narrow() else count
-    wide = (style.width() - LEFT - RIGHT - _BESIDE * (columns - 1)) / columns
+    wide = column_width(columns, _BESIDE)
     window = fit(places, wide, _MAX_BESIDE if columns > 1 else 8.0 / count, 0.25)
     titles = [
         style.folded(words.replace("\n", ", "), 8.5, window.width)

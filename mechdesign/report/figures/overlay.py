@@ -25,7 +25,7 @@ _ORDER = 2.45  # below the paths of the study now
 _LEGEND_ROW = 0.2  # inches
 
 
-def draw_line(axes: Axes, places: Complexes, width: float = 1.3) -> None:
+def draw_line(axes: Axes, places: Complexes, width: float) -> None:
     """A curve of the study before."""
     axes.plot(places.real, places.imag, color=COLOR, linestyle=DASHES, linewidth=width, zorder=_ORDER)
 
@@ -44,13 +44,15 @@ def draw_sweep(axes: Axes, sweep: Sweep) -> None:
         draw_pose(axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]))
 
 
-def name_both(figure: Figure, before: Before, color: str = style.INK) -> None:
-    """A legend above all panels, for which the page is made higher."""
+def name_both(figure: Figure, before: Before | None) -> None:
+    """A legend above all panels, for which the page is made higher; none without a study before."""
+    if before is None:
+        return
     # As they are: a dollar would begin a formula.
     names = [printable(name).replace("$", r"\$") for name in before.names]
     labels = [f"{name} ({when})" for name, when in zip(names, ("now", "before"), strict=True)]
     columns = fitting(labels)
-    looks: tuple[dict[str, Any], ...] = ({"color": color}, {"color": COLOR, "linestyle": DASHES})
+    looks: tuple[dict[str, Any], ...] = ({"color": style.INK}, {"color": COLOR, "linestyle": DASHES})
     handles = [Line2D([], [], label=label, **look) for label, look in zip(labels, looks, strict=True)]
     style.grow(figure, above=0.1 + _LEGEND_ROW * (2 // columns))
     place = (LEFT / style.width() - 0.02, 1.0)

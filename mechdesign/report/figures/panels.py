@@ -10,10 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import LEFT
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses, Sector, Sectors
 
@@ -145,6 +147,14 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
         figure.legend(handles, labels, loc="lower center", ncols=fitting(labels), borderaxespad=0.2)
 
 
+def legend_at_left(figure: Figure, handles: Sequence[Line2D], columns: int, **look: Any) -> None:
+    """One legend at the bottom from the left edge of drawings on; a narrow page has as many columns as it holds."""
+    labels = [str(handle.get_label()) for handle in handles]
+    style.grow(figure, below=legend_room(labels))
+    figure.legend(handles, labels, loc="lower left", ncols=fitting(labels) if style.narrow() else columns,
+                  bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0), **look)  # fmt: skip
+
+
 def legend_room(labels: Sequence[str]) -> float:
     """Inches below the panels that a legend needs beyond those it needs on a wide page."""
     rows = (-(-len(labels) // fitting(labels, wide)) for wide in (style.width(), style.LOOKS["screen"].width))
@@ -222,7 +232,7 @@ def map_sheet(
     Of several held values a few, spread evenly; the colours of each part mean the same in all of its maps.
     """
     most = max(1, MAX_PANELS // len(parts))
-    some = np.unique(np.linspace(0, len(over.maps) - 1, min(len(over.maps), most)).round().astype(int))
+    some = evenly(len(over.maps), most)
     maps = [over.maps[k] for k in some]
     panels = [(", ".join(filter(None, (held, name))), sectors, part)
               for held, sectors in maps for part, (name, _) in enumerate(parts)]  # fmt: skip
@@ -267,7 +277,7 @@ def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: 
     sizes, shown = sizes[known], shown[known]
     if logarithmic:
         return np.asarray(np.log10(_powers(shown, sizes)))
-    return style.levels(float(shown.min()), _quantile(shown, sizes, 0.97), 9)
+    return style.levels(float(shown.min()), quantile(shown, sizes, 0.97), 9)
 
 
 def _map(
@@ -323,7 +333,7 @@ def node_areas(x: Floats, y: Floats) -> Floats:
     return np.asarray(np.abs(np.imag(np.conj(along) * across)))
 
 
-def _quantile(values: Floats, sizes: Floats, share: float) -> float:
+def quantile(values: Floats, sizes: Floats, share: float) -> float:
     """The value below which a share of the area lies."""
     order = np.argsort(values)
     below = np.cumsum(sizes[order])
@@ -335,7 +345,7 @@ def _powers(values: Floats, sizes: Floats) -> Floats:
 
     What holds on a twentieth of the area (`sizes`), as near a singularity, gets no levels of its own.
     """
-    smallest, largest = (max(_quantile(values, sizes, share), 1e-16) for share in (0.05, 0.95))
+    smallest, largest = (max(quantile(values, sizes, share), 1e-16) for share in (0.05, 0.95))
     if largest < _NARROW * smallest:
         even = style.levels(smallest, largest, 9)
         return np.asarray(even[even > 0])

@@ -14,14 +14,13 @@ from mechdesign.analyses.kinematics.rates import drive_rates
 from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import first
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, evenly
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import link_colors
-from mechdesign.report.figures.kinematics import PATH_LOOKS, curves_figure
+from mechdesign.report.figures.kinematics.curves import curves_figure
+from mechdesign.report.figures.kinematics.paths import path_looks
 from mechdesign.report.figures.panels import abscissa
-from mechdesign.report.figures.scene import Scene, Sweep, pose, ranks
+from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
 from mechdesign.report.page.roaming import roaming
 from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
@@ -66,13 +65,13 @@ def moving(study: Study, result: Result) -> Moving | None:
 def _motion(study: Study, result: Result, name: str) -> Moving | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(result.drawn["motion"])
-    some = np.unique(np.linspace(0, len(whole.rows) - 1, min(len(whole.rows), MAX_POSES)).round().astype(int))
+    some = evenly(len(whole.rows), MAX_POSES)
     shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
     sweep = Sweep.of(shown)
     if not len(sweep.valid) or len(sweep.rows) < 2:
         return None
     table, begin = result.tables["motion"], int(sweep.valid[0])
-    few = sweep.valid[np.unique(np.linspace(0, len(sweep.valid) - 1, _FEW_POSES).round().astype(int))]
+    few = sweep.valid[evenly(len(sweep.valid), _FEW_POSES)]
     scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
     # Guides reach farther than points.
     ends = [end for scene in scenes for guide in scene.guides for end in guide.ends(whole.travel, scene.span)]
@@ -100,14 +99,8 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
     sketcher = Sketcher(root, sheet, whole.mechanism, scene)
-    ranked, colors = ranks(study), link_colors(whole.mechanism)
-    lift = 2 - max(ranked.values(), default=2)
-    owners: dict[str, str] = {}
-    for name in whole.mechanism.description.links:
-        for point in scene.link_points(name) if name != GROUND else ():
-            owners.setdefault(point, name)
-    for point, path in sorted(whole.traces.items(), key=lambda item: ranked[item[0]]):
-        sketcher.trace(path, colors[owners[point]], *PATH_LOOKS[min(ranked[point] + lift, 2)])
+    for look in path_looks(whole):
+        sketcher.trace(look.path, look.color, look.width, look.share)
     sketcher.draw(whole.travel)
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))

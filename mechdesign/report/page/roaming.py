@@ -14,13 +14,14 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Ints
+from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
-from mechdesign.report.figures.workspace import contours, index_columns, index_norm
+from mechdesign.report.figures.workspace.boundary import solved_inside
+from mechdesign.report.figures.workspace.index_maps import contours, index_columns, index_norm
 from mechdesign.report.figures.workspace.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
 from mechdesign.report.page.linkage import Sheet, Sketcher, add
 from mechdesign.report.page.tracks import Moving, Numbers, places
@@ -75,7 +76,7 @@ def roaming(study: Study, result: Result) -> Moving | None:
             _map(layer, sheet, region, index, norm)
         _boundary(layer, sheet, region)
     sketcher = Sketcher(root, sheet, mechanism, scene)
-    few = np.unique(np.linspace(0, len(rows) - 1, _NAMED_POSES).round().astype(int)).tolist()
+    few = evenly(len(rows), _NAMED_POSES).tolist()
     scenes = list(filter(None, (pose(mechanism, configuration, index) for index in few)))
     sketcher.draw(travels([scene, *scenes]))
     sketcher.names([scene, *scenes])
@@ -88,12 +89,7 @@ def roaming(study: Study, result: Result) -> Moving | None:
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
     """Rows of the region's grid, at most one in each of even cells, and the poses there."""
-    assert study.workspace is not None
-    point, local = study.workspace.point, region.local
-    given = {f"{point}.x": local["x"], f"{point}.y": local["y"], **region.held}
-    plan = study.mechanism.plan(tuple(given))
-    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
-    configuration = plan.solve(np.broadcast_arrays(*values), limits=False)
+    local, configuration = region.local, solved_inside(study, region)
     z = local["x"] + 1j * local["y"]
     known = np.flatnonzero(configuration.valid)
     z, corner = z[known], complex(z.real.min(), z.imag.min())

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from mechdesign.errors import StudyError
@@ -143,6 +143,18 @@ class Named(Judged):
     """
 
 
+def _each_once(results: tuple[Named, ...]) -> tuple[Named, ...]:
+    for k, named in enumerate(results):
+        if named in results[:k]:
+            raise failure(f"{shown(named.name)} is listed twice")
+    return results
+
+
+Results = Annotated[
+    tuple[Named, ...], fields.BeforeValidator(fields.as_list), AfterValidator(_each_once), fields.OrShort()
+]
+
+
 class MatrixSection(fields.Model):
     """Cases of the study, each answered whole: entries that vary, in a grid or at random, or a file of cases."""
 
@@ -157,7 +169,7 @@ class MatrixSection(fields.Model):
     """Number of cases of ``latin_hypercube`` and ``sobol``, which the seed chooses; at most |MAX_CASES|. Example: 64"""
     cases: str | None = None
     """CSV file, beside the study, whose first line names entries; each line below is a case. Example: cases.csv"""
-    results: Annotated[tuple[Named, ...], fields.BeforeValidator(fields.as_list), fields.OrShort()] = ()
+    results: Results = ()
     """Results of every case that are listed besides the requirements. Example: [kinematics.mu.min, GII]"""
 
     @model_validator(mode="after")

@@ -8,28 +8,29 @@ the pin moves in another one.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
-from mechdesign.errors import StudyError
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.model import MEASURED
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
-from mechdesign.study.schema.iso_tolerances import ToleranceClassError
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
-from mechdesign.study.schema.variation import CLEARANCE_ROUNDING, Clearance, Dimension, ToleranceClass
+from mechdesign.study.schema.variation import (
+    LOADS,
+    Clearance,
+    Dimension,
+    ToleranceClass,
+    check_clearance,
+    check_dimensions,
+)
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 DEFAULT_METHODS = ("analytic", "monte_carlo")
-# Components of a random load, and their kinds of quantity.
-LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 # What the names of errors of positions, velocities and accelerations end in.
 SUFFIXES = ("", "_velocity", "_acceleration")
 
@@ -225,11 +226,11 @@ class ReliabilitySection(MotionSection):
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
         meant = _links_of_points(checker, self)
-        dimensions = _dimensions(checker, self)
+        dimensions = check_dimensions(checker, self.dimensions)
         clearances = {
             point: right
             for point, clearance in self.clearances.items()
-            if (right := _clearance(checker, point, clearance, meant.get(point))) is not None
+            if (right := check_clearance(checker, point, clearance, meant.get(point))) is not None
         }
         for name, limit in self.limits.items():
             _limit(checker, self, name, limit)
@@ -329,15 +330,13 @@ def _allocate(
 ) -> None:
     assert section.allocate is not None
     for name in section.allocate.cost:
+        path: KeyPath = ("reliability", "allocate", "cost", name)
         if name in dimensions and dimensions[name].measured is not None:
-            message = "what is measured is held as it is: its tolerance is not allocated"
-            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
-        known = [*dimensions, *clearances]
-        checker.known(name, known, "dimension or clearance that varies,", ("reliability", "allocate", "cost", name),
-                      at_key=True)  # fmt: skip
+            checker.report(path, "what is measured is held as it is: its tolerance is not allocated", at_key=True)
+        checker.known(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
         if name in clearances and clearances[name].fit is not None:
             message = "a fit is not allocated: its classes come in steps; give 'radial' or 'diametral', or no cost"
-            checker.report(("reliability", "allocate", "cost", name), message, at_key=True)
+            checker.report(path, message, at_key=True)
     if not section.limits:
         checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
     wide = any(d.sigma if d.tolerance is None else d.ends[0] < d.ends[1]
@@ -345,62 +344,6 @@ def _allocate(
     if not wide and not section.allocate.cost:
         message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
         checker.report(("reliability", "allocate"), message)
-
-
-def _clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
-    path: KeyPath = ("reliability", "clearances", point)
-    mechanism, report = checker.mechanism, checker.report
-    _radius(checker, clearance, path)
-    if point in mechanism.slides:
-        return _slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
-    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
-        return None
-    if clearance.length is not None:
-        report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
-    links = mechanism.owners[point]
-    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
-    if len(held) < 2:
-        report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
-    # Where the study does not say, the pin moves in the last link that no output or limit means.
-    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
-    if link not in links:
-        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
-    elif clearance.effect == "length":
-        binary = mechanism.links[link]
-        if point not in (binary.from_, binary.to) or binary.telescopic:
-            message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
-            report((*path, "effect"), message)
-    return clearance.model_copy(update={"link": link})
-
-
-def _slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath, *, tilts: bool) -> Clearance:
-    for key in {"link", "effect"} & clearance.model_fields_set:
-        checker.report((*path, key), f"a slide's clearance has no {key!r}: its slider shifts across the line")
-    if tilts and clearance.length is None:
-        message = "the slider tilts in its guide as far as its 'length' along the line lets it; give that too"
-        checker.report(path, message, at_key=True)
-    elif not tilts and clearance.length is not None:
-        checker.report((*path, "length"), "a pin in a slot does not tilt; leave it out")
-    return clearance
-
-
-def _radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
-    """Check how the clearance's size varies."""
-    report = checker.report
-    checker.kind((*path, "tolerance"), "length")
-    if clearance.fit is not None:
-        if "tolerance" in clearance.model_fields_set:
-            report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
-        if clearance.distribution not in ("normal", "uniform"):
-            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
-    spread = clearance.radius_spread
-    if spread is not None and clearance.radius + spread.ends[0] < -CLEARANCE_ROUNDING:
-        factor = 1.0 if clearance.radial is not None else 2.0
-        size, lowest = factor * clearance.radius, clearance.tolerance[0]
-        message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
-        report((*path, "tolerance"), message)
-    if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
-        report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")
 
 
 def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
@@ -425,95 +368,6 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
         report(path, message, at_key=True)
     else:
         checker.coordinate(base, path, at_key=True, order=order)
-
-
-def _dimensions(checker: Checker, section: ReliabilitySection) -> dict[str, Dimension]:
-    """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
-    found: dict[str, Dimension] = {}
-    parameters, report = checker.parameters, checker.report
-    for name, dimension in section.dimensions.items():
-        path: KeyPath = ("reliability", "dimensions", name)
-        if "*" in name or "?" in name:
-            matching = parameters.match(name)
-            if not matching:
-                report(path, f"no dimension matches {name!r}", at_key=True)
-            for place in matching:
-                if place not in section.dimensions:
-                    found[place] = _dimension(checker, place, dimension, path)
-            continue
-        if name in parameters.formulas:
-            message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
-            report(path, message, at_key=True)
-        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
-        if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
-            found[name] = _dimension(checker, name, dimension, path)
-    return found
-
-
-def _dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
-    """Check a dimension and give it the deviations of its class."""
-    if dimension.distribution == "lognormal":
-        nominal = checker.parameters.nominal.get(name)
-        if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
-            checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
-    if name not in checker.parameters.nominal:
-        kinds = {**checker.mechanism.driven_kinds, **LOADS}
-        quantity = checker.places[name].quantity if name in checker.places else kinds[name]
-        for key in (dimension.kind, "nominal"):
-            checker.kind((*path, key), quantity)
-    if dimension.measured is not None:
-        _measured(checker, name, dimension, path)
-    if not isinstance(dimension.tolerance, ToleranceClass):
-        if dimension.leg is not None:
-            checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
-        return dimension
-    given = dimension.tolerance
-    try:
-        given = replace(given, ends=_of_class(checker, name, given, dimension.leg))
-    except ToleranceClassError as error:
-        alone = "" if name == path[-1] else f"{name} has no such tolerance and needs one of its own: "
-        checker.report(path, f"{alone}{error}", at_key=True)
-    return dimension.model_copy(update={"tolerance": given})
-
-
-def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
-    """Deviations of a parameter or place by its class."""
-    parameters, places = checker.parameters, checker.places
-    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
-    # Bounds of the motion and numbers in measures are no dimensions of a part.
-    kinds = {places[place].quantity for place, slope in slopes.items()
-             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
-    if len(kinds) != 1 or "none" in kinds:
-        raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
-    if kinds == {"length"}:
-        if leg is not None:
-            raise ToleranceClassError("the leg is that of an angle; a length has its own size")
-        return given.of_length(parameters.nominal[name] if name in parameters.nominal else places[name].nominal)
-    found = given.of_angle(leg or given.millimetre)
-    if leg is None:
-        raise ToleranceClassError(
-            f"{given.text} of an angle goes by the length of its shorter leg; say which: "
-            f"{{tolerance: {given.text}, leg: 50}}"
-        )
-    return found
-
-
-def _measured(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
-    parameters, optimize = checker.parameters, checker.parts.get("optimize")
-    nominal = parameters.nominal.get(name, 0.0)
-    if name in checker.places:
-        nominal = checker.places[name].nominal / parameters.factors[name]
-    try:
-        dimension.deviations(nominal, checker.folder)
-    except StudyError as error:
-        checker.report((*path, "measured"), str(error))
-    designed = optimize.variables if optimize is not None else ()
-    if dimension.nominal is None and name in parameters.moved(designed) | parameters.moved_places(designed):
-        message = (
-            f"optimize changes {name!r}: say by 'nominal' what the measured values deviate from, so that the "
-            "deviations are those of every design"
-        )
-        checker.report(path, message, at_key=True)
 
 
 def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:

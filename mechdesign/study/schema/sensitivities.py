@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import model_validator
 
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.matrix import Named
+from mechdesign.study.schema.matrix import Results
 from mechdesign.study.schema.optimize import check_result
 from mechdesign.study.text import fields
 
@@ -34,7 +34,7 @@ class Changed(fields.Model):
 class SensitivitiesSection(fields.Model):
     """Derivatives of results with respect to numbers of the study, by central differences."""
 
-    results: Annotated[tuple[Named, ...], fields.BeforeValidator(fields.as_list), fields.OrShort()]
+    results: Results
     """Results of any command, named as in ``matrix``. Example: [kinematics.mu.min, GII]"""
     parameters: Annotated[tuple[Changed, ...], fields.BeforeValidator(fields.as_list), fields.OrShort()]
     """Numbers of the study that change. Example: [r, {parameter: e, step: 0.5}]"""

@@ -177,3 +177,9 @@ def entry(data: Any, name: str) -> KeyPath:
             raise StudyError(f"the study has no {dotted(path[: k + 1])}{hint}")
         here = (here[key] if has(here, key) else None) or {}
     return path
+
+
+def kinds_of(keys: KeyPath) -> set[str]:
+    """Kinds (of `units.KINDS`) of the number at a path, as far as the format itself tells them."""
+    field = schema_fields(StudyFile, keys[:-1]).get(str(keys[-1]))
+    return {read.kind for read in fields.reads(field.annotation, field.metadata) if read.kind} if field else set()

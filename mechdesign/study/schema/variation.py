@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from mechdesign.errors import StudyError
+from mechdesign.mechanism.model import MEASURED
 from mechdesign.numerics.arrays import Floats
+from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.iso_tolerances import (
     ToleranceClassError,
     angle_deviations,
@@ -20,10 +23,13 @@ from mechdesign.study.schema.iso_tolerances import (
 )
 from mechdesign.study.schema.paths import read_column
 from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import QuantityError
 
+# Components of a random load, and their kinds of quantity.
+LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 DISTRIBUTIONS = {
     "normal": "normal; the tolerance is three standard deviations",
     "truncated_normal": "as normal, and cut at the ends of the tolerance",
@@ -270,3 +276,149 @@ class Clearance(fields.Model):
         factor = 1.0 if self.radial is not None else 0.5
         low, high = (factor * end for end in self.tolerance)
         return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
+
+
+def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> dict[str, Dimension]:
+    """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
+    found: dict[str, Dimension] = {}
+    parameters, report = checker.parameters, checker.report
+    for name, dimension in dimensions.items():
+        path: KeyPath = ("reliability", "dimensions", name)
+        if "*" in name or "?" in name:
+            matching = parameters.match(name)
+            if not matching:
+                report(path, f"no dimension matches {name!r}", at_key=True)
+            for place in matching:
+                if place not in dimensions:
+                    found[place] = _check_dimension(checker, place, dimension, path)
+            continue
+        if name in parameters.formulas:
+            message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
+            report(path, message, at_key=True)
+        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
+        if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
+            found[name] = _check_dimension(checker, name, dimension, path)
+    return found
+
+
+def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
+    """Check a dimension and give it the deviations of its class."""
+    if dimension.distribution == "lognormal":
+        nominal = checker.parameters.nominal.get(name)
+        if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
+            checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+    if name not in checker.parameters.nominal:
+        kinds = {**checker.mechanism.driven_kinds, **LOADS}
+        quantity = checker.places[name].quantity if name in checker.places else kinds[name]
+        for key in (dimension.kind, "nominal"):
+            checker.kind((*path, key), quantity)
+    if dimension.measured is not None:
+        _check_measured(checker, name, dimension, path)
+    if not isinstance(dimension.tolerance, ToleranceClass):
+        if dimension.leg is not None:
+            checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
+        return dimension
+    given = dimension.tolerance
+    try:
+        given = replace(given, ends=_of_class(checker, name, given, dimension.leg))
+    except ToleranceClassError as error:
+        alone = "" if name == path[-1] else f"{name} has no such tolerance and needs one of its own: "
+        checker.report(path, f"{alone}{error}", at_key=True)
+    return dimension.model_copy(update={"tolerance": given})
+
+
+def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
+    """Deviations of a parameter or place by its class."""
+    parameters, places = checker.parameters, checker.places
+    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
+    # Bounds of the motion and numbers in measures are no dimensions of a part.
+    kinds = {places[place].quantity for place, slope in slopes.items()
+             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
+    if len(kinds) != 1 or "none" in kinds:
+        raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
+    if kinds == {"length"}:
+        if leg is not None:
+            raise ToleranceClassError("the leg is that of an angle; a length has its own size")
+        return given.of_length(parameters.nominal[name] if name in parameters.nominal else places[name].nominal)
+    found = given.of_angle(leg or given.millimetre)
+    if leg is None:
+        raise ToleranceClassError(
+            f"{given.text} of an angle goes by the length of its shorter leg; say which: "
+            f"{{tolerance: {given.text}, leg: 50}}"
+        )
+    return found
+
+
+def _check_measured(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
+    parameters, optimize = checker.parameters, checker.parts.get("optimize")
+    nominal = parameters.nominal.get(name, 0.0)
+    if name in checker.places:
+        nominal = checker.places[name].nominal / parameters.factors[name]
+    try:
+        dimension.deviations(nominal, checker.folder)
+    except StudyError as error:
+        checker.report((*path, "measured"), str(error))
+    designed = optimize.variables if optimize is not None else ()
+    if dimension.nominal is None and name in parameters.moved(designed) | parameters.moved_places(designed):
+        message = (
+            f"optimize changes {name!r}: say by 'nominal' what the measured values deviate from, so that the "
+            "deviations are those of every design"
+        )
+        checker.report(path, message, at_key=True)
+
+
+def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
+    """A clearance with the link that its pin moves in, which is not that `meant` by outputs; None without its joint."""
+    path: KeyPath = ("reliability", "clearances", point)
+    mechanism, report = checker.mechanism, checker.report
+    _check_radius(checker, clearance, path)
+    if point in mechanism.slides:
+        return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
+    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
+        return None
+    if clearance.length is not None:
+        report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
+    links = mechanism.owners[point]
+    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
+    if len(held) < 2:
+        report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
+    # Where the study does not say, the pin moves in the last link that no output or limit means.
+    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
+    if link not in links:
+        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
+    elif clearance.effect == "length":
+        binary = mechanism.links[link]
+        if point not in (binary.from_, binary.to) or binary.telescopic:
+            message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
+            report((*path, "effect"), message)
+    return clearance.model_copy(update={"link": link})
+
+
+def _check_slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath, *, tilts: bool) -> Clearance:
+    for key in {"link", "effect"} & clearance.model_fields_set:
+        checker.report((*path, key), f"a slide's clearance has no {key!r}: its slider shifts across the line")
+    if tilts and clearance.length is None:
+        message = "the slider tilts in its guide as far as its 'length' along the line lets it; give that too"
+        checker.report(path, message, at_key=True)
+    elif not tilts and clearance.length is not None:
+        checker.report((*path, "length"), "a pin in a slot does not tilt; leave it out")
+    return clearance
+
+
+def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
+    """Check how the clearance's size varies."""
+    report = checker.report
+    checker.kind((*path, "tolerance"), "length")
+    if clearance.fit is not None:
+        if "tolerance" in clearance.model_fields_set:
+            report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
+        if clearance.distribution not in ("normal", "uniform"):
+            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
+    spread = clearance.radius_spread
+    if spread is not None and clearance.radius + spread.ends[0] < -CLEARANCE_ROUNDING:
+        factor = 1.0 if clearance.radial is not None else 2.0
+        size, lowest = factor * clearance.radius, clearance.tolerance[0]
+        message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
+        report((*path, "tolerance"), message)
+    if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
+        report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")

@@ -11,11 +11,11 @@ import inspect
 import math
 import re
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import islice, pairwise
-from typing import Annotated, Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.fields import FieldInfo
@@ -212,6 +212,15 @@ class Read:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         return self.accepted() if callable(self.accepted) else dict(self.accepted)
+
+
+def reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
+    """What reads the values in an annotation, outside of other models."""
+    for each in (*metadata, *get_args(annotation)):
+        if isinstance(each, Read):
+            yield each
+        elif get_args(each):
+            yield from reads(each)
 
 
 def number(

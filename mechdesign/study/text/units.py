@@ -142,9 +142,9 @@ class Units:
         if not below:
             return above
         one, _, under = above.partition("/")
-        parts = [part.removeprefix("(").removesuffix(")") for part in (under, below) if part]
+        parts = [part[1:-1] if part.startswith("(") else part for part in (under, below) if part]
         under = "*".join(parts)
-        return f"{one or '1'}/{f'({under})' if '*' in under else under}"
+        return f"{one or '1'}/{f'({under})' if {'*', '/'} & {*under} else under}"
 
     def convert(self, text: str, kind: str | None = None) -> float:
         """Convert a quantity of a kind (a name of `KINDS`, or any) to the study's units.

@@ -12,14 +12,7 @@ from mechdesign.analyses.reliability.tables import Samples
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS, clear_of_ticks, legend_below, number, stack, title
-from mechdesign.report.figures.reliability.looks import (
-    Sampled,
-    apart,
-    channels,
-    heading,
-    look,
-    methods,
-)
+from mechdesign.report.figures.reliability.looks import Sampled, apart, channels, heading, look, methods
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6

@@ -16,10 +16,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from mechdesign.analyses.workspace.tables import curves
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
-from mechdesign.report.figures.panels import fitting, legend_room
+from mechdesign.report.figures.panels import legend_at_left
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
@@ -55,6 +55,22 @@ _BESIDE = 0.15  # of a panel without labels of its own
 _MAX_HEIGHT = 6.5
 
 
+def places(table: Table) -> Complexes:
+    """Where each row of a table lies."""
+    return np.asarray(table["x"] + 1j * table["y"])
+
+
+def lines(boundary: Table) -> list[Complexes]:
+    """The curves of a boundary."""
+    z = places(boundary)
+    return [z[rows] for rows in curves(boundary)]
+
+
+def pieces(path: Table) -> list[Ints]:
+    """Rows of each piece of a point's path."""
+    return [np.flatnonzero(path["piece"] == piece) for piece in np.unique(path["piece"])]
+
+
 @dataclass(frozen=True, eq=False)
 class Region:
     """The region for one value of each held coordinate: its row of the table of indices, and its part of the others.
@@ -73,8 +89,7 @@ class Region:
 
     def places(self) -> Complexes:
         """Every place of the region's grid and outline, and of what is left out."""
-        found = [table["x"] + 1j * table["y"] for table in (self.local, self.boundary, *(self.others or ()))]
-        return np.concatenate(found)
+        return np.concatenate([places(table) for table in (self.local, self.boundary, *(self.others or ()))])
 
 
 def grids(local: Table, column: str) -> Iterator[Grid]:
@@ -160,7 +175,7 @@ def loci(axes: Axes, region: Region) -> set[str]:
         return set()
     seen = set()
     every = [region.boundary, *(region.others or ())[1:]]
-    edge = np.concatenate([table["x"] + 1j * table["y"] for table in every])
+    edge = np.concatenate([places(table) for table in every])
     near = 1e-7 * float(np.abs(region.places()).max())
     for rows in curves(table):
         middle = complex(table["x"][rows[len(rows) // 2]], table["y"][rows[len(rows) // 2]])
@@ -214,11 +229,7 @@ class Sheet:
         entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)
                    for name, (color, dashes, width, words) in LOOKS.items() if name in seen]  # fmt: skip
         if entries:
-            labels = [str(entry.get_label()) for entry in entries]
-            style.grow(self.figure, below=legend_room(labels))
-            columns = fitting(labels) if style.narrow() else 4
-            self.figure.legend(handles=entries, loc="lower left", ncols=columns, columnspacing=1.4, borderaxespad=0.3,
-                               bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0))  # fmt: skip
+            legend_at_left(self.figure, entries, 4, columnspacing=1.4, borderaxespad=0.3)
 
     def color_bar(self, drawn: ScalarMappable, label: str, **options: Any) -> None:
         """What the colours of the panels mean."""

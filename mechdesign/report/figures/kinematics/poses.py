@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -13,13 +12,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
-from matplotlib.patheffects import withStroke
 
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, fit, windows
+from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
+from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.scene import Sweep, pose, ranks
 from mechdesign.results import Result
@@ -28,7 +27,6 @@ from mechdesign.study import Study
 _MAX_COLUMNS = 3
 _PAGE = 7.5  # inches, of all panels together, about
 _MIN_HEIGHT = 1.8  # inches, of a panel
-_MAX_HEIGHT = 4.0
 _GAP = 0.15  # inches between panels
 _PAD = 0.42  # inches around what is drawn
 _SYMBOLS = 0.75  # size of symbols
@@ -78,7 +76,8 @@ _KINDS = (
 def poses_figure(study: Study, result: Result) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
     found: SpecialPoses = result.drawn["special"]
-    if not found.shown or not (found.special or found.rates or study_centres(found) or result.drawn["poses"].listed):
+    centres = list(found.shown[0].centres) if found.shown else []
+    if not found.shown or not (found.special or found.rates or centres or result.drawn["poses"].listed):
         return None
     sweep = Sweep.of(result.drawn["motion"])
     mechanism, points = study.mechanism, _pointing(study)
@@ -93,14 +92,9 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
             places.append(np.array(tips, dtype=complex))
         places.append(np.array([z for z in each.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
     everything, count = np.concatenate(places), len(found.shown)
-    fitted = {
-        columns: fit(everything, *_room(columns, math.ceil(count / columns)), _PAD)
-        for columns in range(1, min(count, _MAX_COLUMNS) + 1)
-    }
-    columns, window = max(fitted.items(), key=lambda item: item[1].scale)
+    columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=_PAGE, least=_MIN_HEIGHT)
     titles = [_title(each, found.rates, int(window.width * _LETTERS_AN_INCH)) for each in found.shown]
     above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
-    centres = study_centres(found)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
     heading = style.folded(_heading(found, result), 11, style.width() - LEFT - RIGHT)
@@ -120,11 +114,6 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
                        size=_SYMBOLS)  # fmt: skip
     _draw_key(figure, study, heading, scales, window.scale, side, rows)
     return figure
-
-
-def study_centres(found: SpecialPoses) -> list[Centre]:
-    """Pairs of links whose instant centres are asked."""
-    return list(found.shown[0].centres) if found.shown else []
 
 
 def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:
@@ -165,12 +154,6 @@ def _scale(shown: Sequence[SpecialPose], points: Sequence[str], order: int, side
         usual = max(usual, float(np.nanmax(speeds, initial=0.0)) ** 2 / side)
     moves = largest > _STILL * usual
     return _LONGEST * side / largest if moves else 0.0
-
-
-def _room(columns: int, rows: int) -> tuple[float, float]:
-    """Largest width and height of a panel, inches."""
-    width = (style.width() - LEFT - RIGHT - _GAP * (columns - 1)) / columns
-    return width, min(max(_PAGE / rows, _MIN_HEIGHT), _MAX_HEIGHT)
 
 
 def _title(each: SpecialPose, rates: bool, letters: int) -> str:
@@ -225,7 +208,7 @@ def _draw_centres(axes: Axes, each: SpecialPose, centres: Sequence[Centre], lett
             away.append(textwrap.fill(f"centre of {centre.one}, {centre.other}: {where}", letters))
     if away:
         axes.text(0.02, 0.02, "\n".join(away), transform=axes.transAxes, fontsize=8, va="bottom", zorder=_ORDER + 1,
-                  path_effects=[withStroke(linewidth=2.2, foreground="white")])  # fmt: skip
+                  path_effects=HALO)  # fmt: skip
 
 
 def _centre_look(shape: str) -> dict[str, Any]:
