@@ -18,17 +18,16 @@ Every question takes a `seed` of its random numbers in place of the study's own 
 processes to compute on (None: every processor), on which no result depends; and a `progress` that is told how far the
 computation is. A `journal` keeps what is finished of a long one that is interrupted, and gives it when it begins anew.
 
-The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics.
+The names below are imported when they are first used, so that ``mechdesign --help`` loads no numerics. Here nothing is
+imported: a signal that comes before the command can hear it ends it with a traceback.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from mechdesign.commands import QUESTIONS
-
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from mechdesign.door.questions import kinematics as kinematics
     from mechdesign.door.questions import load as load
     from mechdesign.door.questions import optimize as optimize
@@ -47,7 +46,10 @@ if TYPE_CHECKING:
 _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "requirements": "mechdesign.report.requirements",
-    **dict.fromkeys(("load", *QUESTIONS), "mechdesign.door.questions"),
+    **dict.fromkeys(
+        ("load", "kinematics", "workspace", "optimize", "reliability", "stiffness", "sweep", "sensitivities"),
+        "mechdesign.door.questions",
+    ),
 }
 __all__ = sorted((*_HOMES, "__version__"))
 
@@ -58,6 +60,8 @@ def __getattr__(name: str) -> Any:
 
         return version("mechdesign")
     if name in _HOMES:
+        from importlib import import_module
+
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

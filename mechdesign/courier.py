@@ -7,10 +7,11 @@ worker, which keeps it by its digest.
 from __future__ import annotations
 
 import pickle
+import platform
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from functools import cache
 from hashlib import blake2b
@@ -35,7 +36,7 @@ _MOST_KEPT = 4
 
 
 class LostWorkerError(MechdesignError):
-    """A chunk of work ends each worker that takes it."""
+    """A chunk of work ends each worker that takes it, or there is nobody left to take it."""
 
 
 class Pool:
@@ -57,9 +58,26 @@ class Pool:
         self.close()
         self.executor = self._open()
 
+    def outcome(self, future: Future[Any]) -> Any:
+        """What a task gives, once it is there.
+
+        Raises
+        ------
+        LostWorkerError
+            If the executor dropped it.
+        """
+        try:
+            return future.result()
+        except (CancelledError, ConnectionError) as error:
+            raise LostWorkerError(f"the executor lost the work: {type(error).__name__} {error}".rstrip()) from error
+
     def close(self) -> None:
         """Drop the tasks not begun and wait for those under way."""
-        self.executor.shutdown(wait=True, cancel_futures=True)
+        try:
+            self.executor.shutdown(wait=True, cancel_futures=True)
+        except TypeError:
+            # Dask's does not know the second.
+            self.executor.shutdown(wait=False)
 
 
 @dataclass(eq=False)
@@ -88,7 +106,7 @@ class Courier(Generic[Item, Value]):
     Raises
     ------
     LostWorkerError
-        If a chunk ends each worker that takes it.
+        If a chunk ends each worker that takes it, or the executor takes no work or gives something else for it.
     """
 
     def __init__(self, pool: Pool, function: Callable[[list[Item]], list[Value]]) -> None:
@@ -151,12 +169,16 @@ class Courier(Generic[Item, Value]):
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
+        except Exception as error:
+            raise LostWorkerError(f"the executor takes no work: {type(error).__name__}: {error}") from error
 
     def _values(self, task: _Task) -> list[Value]:
-        found = task.future.result()
+        found = self._pool.outcome(task.future)
         if found is None:
             task.future = self._submit(task.items, self._content)
-            found = task.future.result()
+            found = self._pool.outcome(task.future)
+        if not isinstance(found, tuple) or len(found) != 2 or len(found[0]) != len(task.items):
+            raise LostWorkerError("the executor gives something else than the values of the work that it took")
         values, seconds = found
         self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
         return cast(list[Value], values)
@@ -185,9 +207,11 @@ def _is_loss(error: BaseException | None) -> bool:
 
 @cache
 def _version() -> str:
+    """What decides values, besides the work."""
     from importlib.metadata import version
 
-    return version("mechdesign")
+    python = ".".join(platform.python_version_tuple()[:2])
+    return ", ".join([f"Python {python}", *(f"{name} {version(name)}" for name in ("mechdesign", "numpy", "scipy"))])
 
 
 # In a worker: the functions that it got, by their digests.
@@ -197,7 +221,7 @@ _functions: dict[bytes, Callable[[list[Any]], list[Any]]] = {}
 def _perform(version: str, digest: bytes, content: bytes | None, items: list[Any]) -> tuple[list[Any], float] | None:
     """In a worker: the values of a function and how long they took, in seconds; None where it is not known here."""
     if version != _version():
-        raise MechdesignError(f"a worker has mechdesign {_version()}, not {version}; install the same version there")
+        raise MechdesignError(f"a worker has {_version()}, not {version}; install the same there")
     function = _functions.get(digest)
     if function is None:
         if content is None:

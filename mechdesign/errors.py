@@ -6,6 +6,7 @@ Each class maps to one exit code of the command line (`exit_code`).
 from __future__ import annotations
 
 import difflib
+import errno
 import re
 import traceback
 import unicodedata
@@ -215,6 +216,8 @@ def explain(error: Exception) -> tuple[int, str]:
         return error.exit_code, printable_lines(str(error))
     if _out_of_memory(error):
         return 4, "not enough memory for this; ask for fewer poses or samples at a time, or use --jobs 1"
+    if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
+        return 4, "too many files would be open at once; allow more, e.g. with `ulimit -n 1024`, or use --jobs 1"
     frames = [
         frame for frame in traceback.extract_tb(error.__traceback__) if "mechdesign" in Path(frame.filename).parts
     ]

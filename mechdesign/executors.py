@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import os
 import signal
 import socket
 import sys
 import time
-from concurrent.futures import Executor
+from concurrent.futures import CancelledError, Executor, Future, wait
 from itertools import chain
 from typing import Any
 from urllib.parse import urlsplit
 
-from mechdesign.courier import Pool
+from mechdesign.courier import LostWorkerError, Pool
 from mechdesign.errors import StudyError, counted
 from mechdesign.parallel import worker_count
 
 LOCAL = "local"
 _PORT = 8786  # of a scheduler, where none is said
-# Seconds that the address of a scheduler may take to answer, and its first worker to come.
+# Seconds that the address of a scheduler may take to answer, and that it may be without workers.
 _ANSWERS = 10
-_FIRST_WORKER = 60
+_NO_WORKERS = 60
+# More bytes than the first message of a scheduler has.
+_MOST_FIRST = 2**20
 # Of a scheduler that is started here: its clocks and profiles would take a twentieth of each processor.
 _OWN = {
     "distributed.scheduler.allowed-failures": 0,  # a chunk that ends its worker is found here
@@ -58,15 +61,17 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
     sys.path.insert(0, os.getcwd())
     try:
         found = getattr(importlib.import_module(module), factory)
-    except (ImportError, AttributeError, ValueError) as error:
+    except (ImportError, AttributeError) as error:
         raise StudyError(f"--executor {name}: {error}") from None
+    except Exception as error:
+        raise StudyError(f"--executor {name}: {type(error).__name__}: {error}") from None
     finally:
         sys.path.pop(0)
 
     def open_() -> Executor:
         try:
             executor = found()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise StudyError(f"--executor {name}: {type(error).__name__}: {error}") from None
         if not isinstance(executor, Executor):
             kind = type(executor).__name__
@@ -75,7 +80,7 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
 
     first = open_()
     # Those of the standard library say how many workers they have.
-    width = worker_count(jobs) if jobs is not None else getattr(first, "_max_workers", worker_count(None))
+    width = worker_count(jobs if jobs is not None else getattr(first, "_max_workers", None) or None)
     opened = chain([first], iter(open_, None))
     return Pool(lambda: next(opened), width)
 
@@ -89,7 +94,10 @@ class _Dask(Pool):
         except ImportError:
             message = "needs dask, which is not installed: pip install 'mechdesign[cluster]'"
             raise StudyError(f"--executor {name} {message}") from None
-        self._cluster: Any = None
+        self._name, self._cluster = name, None
+        # What it logs, with tracebacks, is told here in words.
+        for handler in logging.getLogger("distributed").handlers:
+            handler.setLevel(logging.CRITICAL + 1)
         try:
             if address == LOCAL:
                 with importlib.import_module("dask").config.set(_OWN):
@@ -109,10 +117,10 @@ class _Dask(Pool):
                 raise StudyError(f"--executor {name}: no cluster starts: {error}") from None
             raise StudyError(f"--executor {name}: no scheduler answers there: {error}") from None
         try:
-            self._client.wait_for_workers(1, timeout=_FIRST_WORKER)
+            self._client.wait_for_workers(1, timeout=_NO_WORKERS)
         except TimeoutError:
             self.close()
-            message = f"the scheduler has no workers after {counted(_FIRST_WORKER, 'second')}; start some"
+            message = f"the scheduler has no workers after {counted(_NO_WORKERS, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
         self._counted, self._threads = -_RECOUNT, 1
         if address != LOCAL:
@@ -124,9 +132,33 @@ class _Dask(Pool):
     def width(self) -> int:
         """Number of threads of the workers, which come and go."""
         if time.monotonic() - self._counted > _RECOUNT:
-            self._threads = max(1, sum(self._client.nthreads().values()))
+            self._threads = max(1, self._count())
             self._counted = time.monotonic()
         return self._threads
+
+    def _count(self) -> int:
+        try:
+            return sum(self._client.nthreads().values())
+        except Exception as error:
+            raise self._gone() from error
+
+    def _gone(self) -> LostWorkerError:
+        return LostWorkerError(f"--executor {self._name}: the scheduler does not answer any more")
+
+    def outcome(self, future: Future[Any]) -> Any:
+        """What a task gives; a scheduler without workers would wait for some for ever."""
+        since = time.monotonic()
+        while not wait([future], _RECOUNT).done:
+            if self._count():
+                since = time.monotonic()
+            elif time.monotonic() - since > _NO_WORKERS:
+                words = f"the scheduler has had no workers for {counted(_NO_WORKERS, 'second')}"
+                why = "the work may have ended them, as where memory runs out or mechdesign is not installed"
+                raise LostWorkerError(f"--executor {self._name}: {words}; {why}")
+        try:
+            return future.result()
+        except CancelledError as error:
+            raise self._gone() from error
 
     def renew(self) -> None:
         """The scheduler takes other workers itself."""
@@ -145,8 +177,8 @@ def _knock(address: str) -> None:
     """Whether anybody answers, found out sooner than by a client that tries again and again."""
     place = urlsplit(address if "://" in address else f"tcp://{address}")
     with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS) as stream:
-        # A scheduler speaks first.
-        if place.scheme == "tcp" and not stream.recv(1):
+        # A scheduler speaks first, and says how much.
+        if place.scheme == "tcp" and not 0 < int.from_bytes(stream.recv(8), "little") < _MOST_FIRST:
             raise OSError("it does not answer as one")
 
 

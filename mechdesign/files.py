@@ -141,7 +141,8 @@ def owned(directory: Path) -> Iterator[None]:
             directory.mkdir(parents=True, exist_ok=True)
             stream = _locked(directory / _LOCK)
         except OSError as error:
-            raise OutputError(f"{directory}: results cannot be written there: {error.strerror or error}") from error
+            message = f"{directory}: results cannot be written there: {error.strerror or error}; choose another --out"
+            raise OutputError(message) from error
         with _held(stream, directory / _LOCK):
             for left in _temporaries(directory):
                 left.unlink(missing_ok=True)
@@ -159,7 +160,7 @@ def _locked(path: Path) -> TextIO:
         stream = path.open("a+", encoding="utf-8")
         try:
             if fcntl is not None:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             with stream:
                 stream.seek(0)

@@ -12,12 +12,14 @@ import json
 import time
 import zlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 
+from mechdesign.errors import OutputError
 from mechdesign.files import replace
 from mechdesign.numerics.arrays import Floats
 
@@ -83,17 +85,19 @@ class Journal:
         self._rows.append(rows)
         self.words = list(words)
         if time.monotonic() - self._written > self._patience:
-            self.save()
+            # A disk that is full now may have room when it is tried again.
+            with suppress(OutputError):
+                self.save()
 
     def save(self) -> None:
         """Write what is finished, also what an earlier run finished and this one has not come to yet.
 
         Raises
         ------
-        OSError
+        OutputError
             If it cannot be written.
         """
-        begun = time.monotonic()
+        begun = self._written = time.monotonic()
         digests = [*self._digests, *(key for key, _ in reversed(self._found))]
         rows = [*self._rows, *(block for _, block in reversed(self._found))]
         if not rows:
@@ -107,8 +111,11 @@ class Journal:
             rows=np.concatenate(rows),
             words=np.array(json.dumps(self.words)),
         )
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        replace(self.path, [stream.getvalue()])
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            replace(self.path, [stream.getvalue()])
+        except OSError as error:
+            raise OutputError(f"{self.path}: could not be written: {error.strerror or error}") from error
         self._written = time.monotonic()
         self._patience = max(_INTERVAL, _MIN_RATIO * (self._written - begun))
 

@@ -213,10 +213,17 @@ def _in_order(pool: Executor, function: Callable[[Item], Value], items: Iterable
 def _forked(count: int) -> Executor:
     """Forked workers; a signal waits until they know what to do with it."""
     fork = multiprocessing.get_context("fork")
-    pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_settle_in, initargs=(os.getpid(),))
-    with undisturbed():
-        # The first work forks all of them.
-        pool.submit(os.getpid)
+    others = multiprocessing.active_children()
+    try:
+        pool = ProcessPoolExecutor(count, mp_context=fork, initializer=_settle_in, initargs=(os.getpid(),))
+        with undisturbed():
+            # The first work forks all of them.
+            pool.submit(os.getpid)
+    except OSError:
+        # Where there is no room for all, those that there are would wait for work for ever.
+        for worker in set(multiprocessing.active_children()).difference(others):
+            worker.kill()
+        raise
     return pool
 
 

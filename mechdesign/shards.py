@@ -19,7 +19,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from mechdesign.errors import StudyError
+from mechdesign.errors import OutputError, StudyError
 from mechdesign.files import replace
 from mechdesign.parallel import Divided
 
@@ -108,7 +108,7 @@ class Taken:
 
         Raises
         ------
-        OSError
+        OutputError
             If it cannot be written.
         """
         content = pickle.dumps(self.kept, protocol=5)
@@ -118,7 +118,10 @@ class Taken:
             "origin": origin,
             "sha256": hashlib.sha256(content).hexdigest(),
         }
-        replace(directory / FILE, [json.dumps(head, sort_keys=True).encode() + b"\n", content])
+        try:
+            replace(directory / FILE, [json.dumps(head, sort_keys=True).encode() + b"\n", content])
+        except OSError as error:
+            raise OutputError(f"{directory}: the shard could not be written: {error.strerror or error}") from error
 
 
 class Merged:

@@ -41,7 +41,7 @@ from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, judged_by
-from mechdesign.report.writer import FIGURES, check_writable
+from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
 
 
 def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: Sequence[str]) -> list[Task]:
-    """Read the studies, and keep no more of them than it takes to read them again."""
+    """Read the studies, and keep no more of them than their texts."""
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
@@ -248,7 +248,6 @@ def _study(several: bool, task: Task, hear: Tell) -> End:
 def _question(study: Study, command: str, directory: Path, options: Options, progress: Reported) -> Outcome:
     """Answer one question and say what came out; what goes wrong is its outcome."""
     try:
-        check_writable(directory)
         with owned(directory):
             given = replace(answer(study, command, directory, options, progress), table=None)
         tell(given, study, options)

@@ -34,12 +34,13 @@ from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
+from mechdesign.study.loading import load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES
+from mechdesign.study.text.inputs import Folder
 
 STANDARD_INPUT = Path("-")
 _ROWS_AT_ONCE = 20_000  # of a table that is read from its file
 RESULTS = Path("results")  # where no other folder is asked for
-Source = Path | bytes  # of a study: its file or its text
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -48,6 +49,15 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
+
+
+@dataclass(frozen=True)
+class Source:
+    """A study as it was read, once, and the folder of the files that it names, with what was read of them."""
+
+    text: bytes
+    path: Path | None
+    folder: Folder
 
 
 # Commands that an interrupted run need not begin anew.
@@ -74,13 +84,21 @@ class Outcome:
 
 
 def source(path: Path | None, options: Options) -> Source:
-    """Where a study comes from: ``-`` is standard input; without a path, say which is taken."""
+    """Read the text of a study: ``-`` is standard input; without a path, say which is taken.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read.
+    """
     if path is None:
         here = Path("study.yaml")
         path = here if here.exists() else template_path()
         what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
         terminal.say(f"study: {what}", quiet=options.quiet)
-    return sys.stdin.buffer.read(MAX_BYTES + 1) if path == STANDARD_INPUT else path
+    if path == STANDARD_INPUT:
+        return Source(sys.stdin.buffer.read(MAX_BYTES + 1), None, Folder(anywhere=options.allow_files))
+    return Source(read_file(path), path, Folder(path.parent, options.allow_files))
 
 
 def load_source(source: Source, options: Options) -> Study:
@@ -91,10 +109,7 @@ def load_source(source: Source, options: Options) -> Study:
     StudyError
         Every mistake of the study or the overrides.
     """
-    overrides = options.overrides or ()
-    if isinstance(source, bytes):
-        return load(text=source, overrides=overrides, seed=options.seed, allow_files=options.allow_files)
-    return load(source, overrides, options.seed, allow_files=options.allow_files)
+    return load_bytes(source.text, source.path, options.overrides or (), options.seed, source.folder)
 
 
 def load_study(path: Path | None, options: Options) -> Study:
@@ -361,7 +376,6 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
     """One command from end to end."""
     study = load_study(path, options)
     directory = place(folder(study, command, options), options)
-    writer.check_writable(directory)
     with owned(directory):
         try:
             given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))

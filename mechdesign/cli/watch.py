@@ -9,11 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from mechdesign.cli import batch, terminal
-from mechdesign.cli.execution import STANDARD_INPUT, load_source
+from mechdesign.cli.execution import STANDARD_INPUT, load_study
 from mechdesign.cli.options import Options
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggestion
-from mechdesign.study.text.inputs import FILES
+from mechdesign.study.text.inputs import FILES, MAX_FILE_BYTES
 
 _LOOK = 0.2  # seconds between two looks at the files
 _NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\b")
@@ -33,7 +33,7 @@ def watch(path: Path, commands: Sequence[str], options: Options) -> int:
         if command not in QUESTIONS:
             known = ", ".join(QUESTIONS)
             raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {known}")
-    if path == STANDARD_INPUT or path.is_dir():
+    if path == STANDARD_INPUT or (path.exists() and not path.is_file()):
         raise StudyError(f"{path}: is no file that could be watched")
     files = {path}
     with suppress(KeyboardInterrupt):
@@ -79,17 +79,19 @@ def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
 def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
     contents: dict[Path, bytes | None] = {}
     for file in files:
-        try:
-            contents[file] = file.read_bytes()
-        except OSError:
-            contents[file] = None
+        contents[file] = None
+        with suppress(OSError):
+            # A device might have no end, and a pipe no beginning.
+            if file.is_file():
+                with file.open("rb") as stream:
+                    contents[file] = stream.read(MAX_FILE_BYTES)
     return contents
 
 
 def _named(path: Path, options: Options) -> set[Path]:
     """Files that a study names; of one that is wrong, those that its text seems to name."""
     try:
-        return {file for _, file, _ in load_source(path, options).inputs()}
+        return {file for _, file, _ in load_study(path, options).inputs()}
     except MechdesignError:
         with suppress(OSError):
             return {path.parent / name for name in _NAMES.findall(path.read_text(encoding="utf-8", errors="replace"))}

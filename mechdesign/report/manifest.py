@@ -21,6 +21,7 @@ from mechdesign.study import Study
 
 NAME = "manifest.json"
 _INPUTS_IN = "inputs_in"
+_MOST_BYTES = 100_000_000  # of a manifest; of a larger one the memory might not hold what it says
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
 
 
@@ -120,8 +121,11 @@ def compose(
 
 def read(directory: Path) -> dict[str, Any] | None:
     """The manifest in a folder, or None where there is none that can be read."""
+    path = directory / NAME
     try:
-        content = json.loads((directory / NAME).read_text(encoding="utf-8"))
+        if not path.is_file() or path.stat().st_size > _MOST_BYTES:
+            return None
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) else None

@@ -45,7 +45,7 @@ def check_writable(directory: Path) -> None:
         If the directory, or the nearest one above it that exists, does not take files.
     """
     place = directory
-    while not place.exists() and place != place.parent:
+    while not os.path.exists(place) and place != place.parent:
         place = place.parent
     if not place.is_dir():
         raise OutputError(f"{directory}: results cannot be written there: {place} is a file; choose another --out")
@@ -137,7 +137,7 @@ def _check_room(directory: Path, result: Result) -> None:
 
 
 def write_file(path: Path, data: bytes) -> None:
-    """Write one file whole or not at all.
+    """Write one file whole or not at all; a device or a pipe gets the bytes, and a link stays one.
 
     Raises
     ------
@@ -146,7 +146,10 @@ def write_file(path: Path, data: bytes) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        replace(path, [data])
+        if path.exists() and not path.is_file():
+            path.write_bytes(data)
+        else:
+            replace(Path(os.path.realpath(path)), [data])
     except OSError as error:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 

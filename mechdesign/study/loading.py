@@ -163,13 +163,23 @@ def load(
         return load_data(source, overrides, seed, Folder(anywhere=allow_files))
     assert source is not None
     file = pathlib.Path(source)
+    return load_bytes(read_file(file), file, overrides, seed, Folder(file.parent, allow_files))
+
+
+def read_file(file: pathlib.Path) -> bytes:
+    """The text of a study, or as much of it as tells that it is too long.
+
+    Raises
+    ------
+    StudyError
+        If it cannot be read.
+    """
     try:
         with file.open("rb") as stream:
-            whole = stream.read(MAX_BYTES + 1)
+            return stream.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise StudyError([Problem(f"cannot be read: {why}", file=str(source))]) from None
-    return load_bytes(whole, file, overrides, seed, Folder(file.parent, allow_files))
+        raise StudyError([Problem(f"cannot be read: {why}", file=str(file))]) from None
 
 
 def load_data(

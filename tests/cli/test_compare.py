@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from junitparser import JUnitXml
 
+from mechdesign.report import manifest
 from mechdesign.report.comparison.differences import Tolerance
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.results import Column, Table
@@ -237,6 +238,25 @@ def test_nothing_to_compare(folder, results, compared):
     assert "motion.csv: is not the table that its manifest describes" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("study", {"resolved": "a text"}),
+        ("tool", ["mechdesign"]),
+        ("requirements", [{"requirement": "x at most 1"}]),
+        ("tables", {"motion.csv": {"columns": [{"name": ["theta"], "unit": "", "meaning": ""}]}}),
+    ],
+)
+def test_a_manifest_of_another_hand_is_none(folder, results, compared, key, value):
+    for side in ("old", "new"):
+        results(f"{side}/kinematics", motion())
+    path = folder / "new/kinematics/manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
+    done, _ = compared()
+    assert done.exit_code == 2
+    assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+
+
 def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatch, invoke):
     monkeypatch.chdir(tmp_path)
     for name, jobs in (("old", 1), ("new", 2)):
@@ -286,6 +306,26 @@ def test_verify_tells_files_whose_bytes_are_others(analysis, invoke, folder):
     done = invoke("run", "--verify", "old")
     assert done.exit_code == 1
     assert short(csv.DictReader(io.StringIO(done.stdout))) == {("motion", "", "bytes"), ("study.yaml", "", "bytes")}
+
+
+@pytest.mark.parametrize("damage", [None, "theta,B.x,valid\n0,1,1,1\n"])
+def test_verify_goes_on_after_a_table_that_cannot_be_read(analysis, invoke, folder, damage):
+    analysis(lambda study, **ignored: answer(tables=motion().tables))
+    for name in ("old/a", "old/b"):
+        invoke("kinematics", "slider.yaml", "--no-plots", "--out", name)
+    (folder / "old/a/motion.csv").unlink()
+    if damage is not None:
+        (folder / "old/a/motion.csv").write_text(damage)
+    done = invoke("run", "--verify", "old")
+    assert done.exit_code == 1
+    assert short(csv.DictReader(io.StringIO(done.stdout))) == {("motion", "", "bytes")}
+    assert "1 difference in 1 table" in done.stderr
+
+
+def test_a_huge_manifest_is_none(folder, monkeypatch):
+    monkeypatch.setattr(manifest, "_MOST_BYTES", 10)
+    (folder / "manifest.json").write_text('{"files": {}}')
+    assert manifest.read(folder) is None
 
 
 def test_verify_takes_no_other_study(results, invoke):

@@ -13,6 +13,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -20,8 +21,9 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.errors import explain
-from mechdesign.files import Transaction
+from mechdesign.errors import OutputError, explain
+from mechdesign.files import Transaction, owned
+from mechdesign.report.writer import write_file
 from mechdesign.results import Column, Result, Table
 
 from .conftest import SLIDER, answer
@@ -103,6 +105,13 @@ def test_an_interrupt_during_imports(here, module):
     assert process.returncode in (0, 130)
     assert "Traceback" not in told
     assert "rror" not in told
+
+
+def test_signals_wait_before_anything_is_imported():
+    """One that comes earlier ends Python itself, with a traceback."""
+    text = "import sys; known = {*sys.modules}; import mechdesign.__main__; print(*sorted({*sys.modules} - known))"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["__future__", "mechdesign", "mechdesign.__main__"]
 
 
 # What a command does when it is interrupted: in a call back, whose errors are dropped; in an import; in a finaliser;
@@ -316,6 +325,42 @@ def test_a_folder_is_of_one_process(here, analysis, invoke):
     assert set(contents(here / "out")) == {"t0.csv", "t1.csv", "t2.csv", "manifest.json"}
 
 
+def test_a_folder_is_free_though_the_workers_of_a_killed_run_live(tmp_path):
+    """As those of an executor of the user's may, which were forked while the folder was kept."""
+    reader, writer = os.pipe()
+
+    def own():
+        with owned(tmp_path):
+            os.write(writer, f"{forked(lambda: time.sleep(60))}\n".encode())
+            time.sleep(60)
+
+    pid = forked(own)
+    worker = int(os.read(reader, 100))
+    with pytest.raises(OutputError, match=f"process {pid} on"), owned(tmp_path):
+        pass
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    try:
+        with owned(tmp_path):
+            assert alive(worker)
+    finally:
+        os.kill(worker, signal.SIGKILL)
+
+
+def test_no_file_is_put_in_place_of_a_device_or_a_link(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    read = []
+    thread = threading.Thread(target=lambda: read.append((tmp_path / "pipe").read_bytes()), daemon=True)
+    thread.start()
+    write_file(tmp_path / "pipe", b"words")
+    thread.join(10)
+    assert read == [b"words"]
+    (tmp_path / "link").symlink_to("file")
+    write_file(tmp_path / "link", b"words")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "file").read_bytes() == b"words"
+
+
 @pytest.mark.parametrize(
     "damage", ["", "[]", "{}", "[" * 100_000, '{"files": {"..": "", "": "", "a\\u0000b": ""}}', "tables", "bytes"]
 )
@@ -482,9 +527,21 @@ def test_a_lack_of_memory_is_known_whoever_meets_it(error, known):
     assert explain(error)[1].startswith("not enough memory" if known else "internal error")
 
 
+def test_too_few_files_for_the_workers(here):
+    """Those that were forked before there was no room do not wait for work for ever."""
+    command = [*COMMAND, "optimize", "arm.yaml", "--no-plots", "--jobs", "8"]
+
+    def few():
+        resource.setrlimit(resource.RLIMIT_NOFILE, (20, 20))
+
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=few, check=False, timeout=60)
+    assert done.returncode == 4
+    assert done.stderr.startswith("too many files would be open at once")
+
+
 def test_places_that_are_no_folders(here, invoke):
     (here / "loop").symlink_to("loop")
-    for out in ("slider.yaml", "slider.yaml/deep", "loop", "loop/deep"):
+    for out in ("slider.yaml", "slider.yaml/deep", "loop", "loop/deep", 300 * "a"):
         done = invoke("run", "slider.yaml", "--no-plots", "--out", out)
         assert done.exit_code == 4, out
         assert "results cannot be written there" in done.stderr
@@ -508,6 +565,24 @@ def test_a_study_that_is_edited_while_it_runs(here, analysis, invoke):
     assert told["study"]["sha256"] == hashlib.sha256(SLIDER.encode()).hexdigest()
     assert "kept" not in invoke(*arguments).stdout
     assert "kept" in invoke(*arguments).stdout
+
+
+def test_a_study_is_read_once(here, analysis, invoke):
+    """The second of two, that is edited while the first is computed; and one from a pipe, which has it once."""
+
+    def edit(study, **options):
+        (here / "two.yaml").write_text(SLIDER + "stiffness: {at: B}\n")
+        return table(1)
+
+    (here / "two.yaml").write_text(SLIDER)
+    analysis(edit)
+    assert invoke("run", "slider.yaml", "two.yaml", "--no-plots", "--out", "out", "--jobs", 1).exit_code == 0
+    told = json.loads((here / "out/two/kinematics/manifest.json").read_text())
+    assert told["study"]["sha256"] == hashlib.sha256(SLIDER.encode()).hexdigest()
+    os.mkfifo(here / "pipe")
+    threading.Thread(target=(here / "pipe").write_text, args=[SLIDER], daemon=True).start()
+    done = invoke("run", "pipe", "--no-plots")
+    assert done.exit_code == 0, done.stderr
 
 
 def test_an_input_that_changes_while_it_is_computed(here, invoke, monkeypatch):

@@ -225,6 +225,20 @@ def test_a_damaged_journal_is_not_used(tmp_path):
     assert Journal(path, {"seed": 1}, resume=True).recall(key) is None
 
 
+def test_a_full_disk_ends_no_computation(tmp_path):
+    """What is kept of it is tried again; in the end it is told."""
+    journal = Journal(tmp_path / "file" / NAME, {})
+    journal._patience = 0.0
+    (tmp_path / "file").write_text("in the way")
+    journal.add(b"0" * 16, np.zeros((1, 1)), [])
+    with pytest.raises(mechdesign.MechdesignError, match="could not be written"):
+        journal.save()
+    (tmp_path / "file").unlink()
+    journal._patience = 0.0
+    journal.add(b"1" * 16, np.ones((1, 1)), [])
+    assert Journal(tmp_path / "file" / NAME, {}, resume=True).recall(b"0" * 16) == 0
+
+
 def test_a_journal_of_other_batches_is_void(tmp_path):
     path = tmp_path / NAME
     journal = Journal(path, {})

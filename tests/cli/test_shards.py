@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import mechdesign
 from mechdesign import shards
 from mechdesign.shards import FILE, Shard
 
@@ -109,6 +110,11 @@ def test_shards_that_cannot_be_merged(studies, invoke):
     assert "there are shards of " in told.stderr
 
 
+def test_a_shard_that_cannot_be_written_is_told(tmp_path):
+    with pytest.raises(mechdesign.MechdesignError, match="the shard could not be written: No such file"):
+        shards.Taken(shards.Shard(1, 2)).write(tmp_path / "nowhere", {}, "run")
+
+
 def test_a_shard_is_data_alone(tmp_path):
     class Evil:
         def __reduce__(self):
@@ -135,6 +141,8 @@ def test_a_shard_is_data_alone(tmp_path):
         (["--executor", "os:cpus"], "--executor os:cpus: module 'os' has no attribute 'cpus'"),
         (["--executor", "os:getcwd"], "--executor os:getcwd gives no concurrent.futures.Executor, but 'str'"),
         (["--executor", "os:mkdir"], "--executor os:mkdir: TypeError: "),
+        (["--executor", "sys:exit"], "--executor sys:exit: SystemExit"),
+        (["--executor", "..:two"], "--executor ..:two: TypeError: "),
         (["--executor", "dask:tcp://127.0.0.1:9"], "no scheduler answers there: "),
     ],
 )

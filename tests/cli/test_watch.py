@@ -66,11 +66,21 @@ def test_it_answers_again_after_a_save_and_goes_on_after_a_mistake(folder, watch
     assert process.wait(30) == 0
 
 
+def test_an_input_without_an_end_is_not_read(folder, watched):
+    (folder / "path.yaml").write_text(PATH)
+    (folder / "angles.csv").symlink_to("/dev/zero")
+    process, until = watched("path.yaml", "kinematics")
+    assert "is not in the folder of the study" in until("again when")
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 0
+
+
 def test_what_cannot_be_watched(folder, invoke):
     for arguments, words in {
         ("slider.yaml", "kinematic"): "did you mean 'kinematics'",
         ("-",): "no file that could be watched",
         (".",): "no file that could be watched",
+        ("/dev/zero",): "no file that could be watched",
     }.items():
         done = invoke("watch", *arguments)
         assert done.exit_code == 2

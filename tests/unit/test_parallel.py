@@ -7,14 +7,14 @@ import signal
 import sys
 import threading
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 import mechdesign
-from mechdesign import courier
+from mechdesign import courier, executors
 from mechdesign.courier import LostWorkerError, Pool
 from mechdesign.parallel import map_chunks, on
 from mechdesign.report.tables import to_csv
@@ -164,6 +164,77 @@ def test_workers_have_the_same_version(monkeypatch):
     monkeypatch.setattr(courier, "_perform", lambda version, *rest: before("0.0", *rest))
     with on(Pool(lambda: ThreadPoolExecutor(1), 1)), pytest.raises(mechdesign.MechdesignError, match=r"not 0\.0"):
         list(map_chunks(squared, [1], travels=True))
+
+
+class Stranger(ThreadPoolExecutor):
+    """An executor that does something else with its work."""
+
+    def __init__(self, does):
+        super().__init__(2)
+        self.does = does
+
+    def submit(self, *work):
+        if self.does == "refuses":
+            raise RuntimeError("the queue is closed")
+        future = Future()
+        if self.does == "drops":
+            future.cancel()
+        elif self.does == "loses":
+            future.set_exception(ConnectionResetError("by peer"))
+        else:
+            values, seconds = work[0](*work[1:])
+            future.set_result((values[1:], seconds) if self.does == "shortens" else 42)
+        return future
+
+
+@pytest.mark.parametrize(
+    ("does", "told"),
+    [
+        ("refuses", "the executor takes no work: RuntimeError: the queue is closed"),
+        ("drops", "the executor lost the work: CancelledError"),
+        ("loses", "the executor lost the work: ConnectionResetError by peer"),
+        ("shortens", "the executor gives something else than the values"),
+        ("answers", "the executor gives something else than the values"),
+    ],
+)
+def test_what_an_executor_does_wrong_is_told(does, told):
+    """Above all no value may be missing."""
+    with on(Pool(lambda: Stranger(does), 2)), pytest.raises(LostWorkerError, match=f"^{told}"):
+        list(map_chunks(squared, range(50), travels=True))
+
+
+def test_an_executor_whose_shutdown_knows_no_cancelling():
+    """As that of dask, of which a factory may give one."""
+
+    class Dasks(ThreadPoolExecutor):
+        def shutdown(self, wait=True):
+            super().shutdown(wait)
+
+    with on(Pool(lambda: Dasks(2), 2)):
+        assert [*map_chunks(squared, range(50), travels=True)] == [k * k for k in range(50)]
+
+
+@pytest.mark.parametrize("how", ["no workers", "no answer", "cancelled"])
+def test_a_scheduler_that_will_not_answer_is_not_waited_for(monkeypatch, how):
+    """Its last worker ended, or it did itself: dask would wait for others for ever."""
+
+    class Client:
+        def nthreads(self):
+            if how == "no answer":
+                raise OSError("connection closed")
+            return {}
+
+    monkeypatch.setattr(executors, "_RECOUNT", 0.01)
+    monkeypatch.setattr(executors, "_NO_WORKERS", 0.05)
+    pool = object.__new__(executors._Dask)
+    pool._name, pool._client = "dask:tcp://there", Client()
+    future = Future()
+    if how == "cancelled":
+        future.cancel()
+        future.set_running_or_notify_cancel()
+    told = "has had no workers for 0.05 seconds" if how == "no workers" else "does not answer any more"
+    with pytest.raises(LostWorkerError, match=f"^--executor dask:tcp://there: the scheduler {told}"):
+        pool.outcome(future)
 
 
 def texts(command, study, **options):

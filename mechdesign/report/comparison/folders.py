@@ -10,6 +10,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from pydantic import BaseModel, ValidationError
+
 from mechdesign.commands import SWEEP
 from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
@@ -30,6 +32,37 @@ from mechdesign.study.text.document import leaves, read
 
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
+
+
+class _Column(BaseModel):
+    name: str
+    unit: str
+    meaning: str
+
+
+class _Table(BaseModel):
+    columns: list[_Column]
+
+
+class _Study(BaseModel):
+    resolved: dict[str, Any] = {}
+
+
+class _Verdict(BaseModel):
+    requirement: str
+    met: bool
+    worst: float | None = None
+
+
+class _Manifest(BaseModel):
+    """What is read of a manifest here."""
+
+    study: _Study
+    tables: dict[str, _Table]
+    requirements: list[_Verdict]
+    tool: dict[str, str] = {}
+    libraries: dict[str, str] = {}
+    inputs: dict[str, str] = {}
 
 
 def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
@@ -86,9 +119,11 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
     found = {}
     for path in sorted(root.rglob(manifest.NAME)):
         content = manifest.read(path.parent)
-        kinds = {"tables": dict, "study": dict, "requirements": list}
-        if content is None or not all(isinstance(content.get(name), kind) for name, kind in kinds.items()):
-            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again")
+        try:
+            _Manifest.model_validate(content, strict=True)
+        except ValidationError:
+            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again") from None
+        assert content is not None
         found[path.parent.relative_to(root).as_posix()] = content
     return found
 
@@ -168,7 +203,7 @@ def compare_results(
             change = MISSING if name in before["tables"] else NEW
             found.differences.append(Difference(folder, table, "", change))
             continue
-        pair = _table(*old, name), _table(*new, name)
+        pair = read_table(*old, name), read_table(*new, name)
         given = [_given(each, command) for each in (before, after)]
         chosen = {}
         for column in pair[0].names:
@@ -199,7 +234,14 @@ def _verdict(told: Mapping[str, Any] | None) -> str:
     return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
 
 
-def _table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+def read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+    """A table of a folder, as its manifest describes it.
+
+    Raises
+    ------
+    StudyError
+        If it is another, or cannot be read.
+    """
     about = content["tables"][name]
     try:
         if Path(name).name != name:

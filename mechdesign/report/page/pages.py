@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from mechdesign.errors import printable_lines
+from mechdesign.errors import OutputError, printable_lines
 
 REPORT = "report.html"
 INDEX = "index.html"
@@ -24,11 +24,17 @@ def remove(path: Path) -> None:
 
     Raises
     ------
-    OSError
+    OutputError
         If it cannot be removed.
     """
-    if path.is_file():
+    try:
         with path.open("rb") as stream:
             ours = GENERATOR.encode() in stream.read(_HEAD)
-        if ours:
+    except OSError:
+        # There is none, as a rule.
+        return
+    if ours:
+        try:
             path.unlink()
+        except OSError as error:
+            raise OutputError(f"{path}: could not be removed: {error.strerror or error}") from error
