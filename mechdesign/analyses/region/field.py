@@ -203,7 +203,7 @@ class Field:
         """
         found = np.zeros(len(self.labels))
         if self.same_assembly:
-            sizes = np.abs(Field.margins(self, self.surroundings, {}))[-len(self._signs) :]
+            sizes = np.abs(Field.look(self, self.surroundings, {}, assembly=True)[0])[-len(self._signs) :]
             found[-len(self._signs) :] = ROUNDING * np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
         return found
 

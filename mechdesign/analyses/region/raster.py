@@ -97,7 +97,7 @@ class Raster:
                 good &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
                 # The parabola falls half as far.
                 good &= here + gx * dx + gy * dy < 0
-            place = np.where(good, place + x * dx + 1j * y * dy, place)
+            place = place + np.where(good, x * dx, 0.0) + 1j * np.where(good, y * dy, 0.0)
         return some[lane[good]], place[good]
 
     @property

@@ -14,7 +14,6 @@ from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
-from scipy.special import betaincinv, ndtr, ndtri
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
@@ -27,6 +26,14 @@ _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 # Largest correlation of the normal variables behind two laws.
 _MAX_CORRELATION = 0.999999
+
+
+def _normal_cdf(u: Floats | float) -> Floats:
+    """Probability that a standard normal variable is below `u`."""
+    # Moments need no SciPy, whose import takes longer than they do.
+    from scipy.special import ndtr
+
+    return np.asarray(ndtr(u))
 
 
 @dataclass(frozen=True)
@@ -120,9 +127,11 @@ class TruncatedNormal(Marginal):
         return np.asarray(self.mean + self.sigma * drawn)
 
     def at(self, u: Floats) -> Floats:
+        from scipy.special import ndtri
+
         # In the lower tail, where small probabilities keep their digits.
-        tail = ndtr(-SIGMAS)
-        below = ndtri(tail + ndtr(-np.abs(u)) * (1.0 - 2.0 * tail))
+        tail = _normal_cdf(-SIGMAS)
+        below = ndtri(tail + _normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
         return np.asarray(self.mean + self.sigma * np.copysign(below, u))
 
 
@@ -136,7 +145,7 @@ class Uniform(Marginal):
         return self.low + (self.high - self.low) * rng.random(count)
 
     def at(self, u: Floats) -> Floats:
-        return self._from_ends(u, (self.high - self.low) * ndtr(-np.abs(u)))
+        return self._from_ends(u, (self.high - self.low) * _normal_cdf(-np.abs(u)))
 
 
 class Triangular(Marginal):
@@ -163,7 +172,7 @@ class Triangular(Marginal):
 
     def at(self, u: Floats) -> Floats:
         width, rise = self.high - self.low, self.mode - self.low
-        below, above = ndtr(u), ndtr(-u)
+        below, above = _normal_cdf(u), _normal_cdf(-u)
         climb = self.low + np.sqrt(below * width * rise)
         fall = self.high - np.sqrt(above * width * (width - rise))
         return np.asarray(np.where(below * width < rise, climb, fall))
@@ -213,7 +222,7 @@ class UniformFit(_OfFit):
 
     def at(self, u: Floats) -> Floats:
         width, wider, narrower = self.high - self.low, max(self.hole, 1.0 - self.hole), min(self.hole, 1.0 - self.hole)
-        tail = ndtr(-np.abs(u))
+        tail = _normal_cdf(-np.abs(u))
         rising = np.sqrt(2.0 * wider * narrower * tail)
         inward = width * np.where(2.0 * wider * tail < narrower, rising, 0.5 * narrower + wider * tail)
         return self._from_ends(u, inward)
@@ -245,7 +254,9 @@ class Beta(Marginal):
         return self.low + (self.high - self.low) * rng.beta(*self.shape, count)
 
     def at(self, u: Floats) -> Floats:
-        (a, b), width, tail = self.shape, self.high - self.low, ndtr(-np.abs(u))
+        from scipy.special import betaincinv
+
+        (a, b), width, tail = self.shape, self.high - self.low, _normal_cdf(-np.abs(u))
         inward = width * np.where(u < 0, betaincinv(a, b, tail), betaincinv(b, a, tail))
         return self._from_ends(u, inward)
 
@@ -277,7 +288,7 @@ class Measured(Marginal):
         return self._quantile(rng.random(count))
 
     def at(self, u: Floats) -> Floats:
-        return self._quantile(ndtr(u))
+        return self._quantile(_normal_cdf(u))
 
     def _quantile(self, share: Floats) -> Floats:
         count = len(self.ordered)
