@@ -141,8 +141,9 @@ def owned(directory: Path) -> Iterator[None]:
             directory.mkdir(parents=True, exist_ok=True)
             stream = _locked(directory / _LOCK)
         except OSError as error:
-            message = f"{directory}: results cannot be written there: {error.strerror or error}; choose another --out"
-            raise OutputError(message) from error
+            there = next((place for place in (directory, *directory.parents) if os.path.exists(place)), directory)
+            why = f"{there} is a file" if there.is_file() else error.strerror or error
+            raise OutputError(f"{directory}: results cannot be written there: {why}; choose another --out") from error
         with _held(stream, directory / _LOCK):
             for left in _temporaries(directory):
                 left.unlink(missing_ok=True)

@@ -22,6 +22,7 @@ from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     OUTCOMES,
     Outcome,
+    Source,
     answer,
     claim,
     folder,
@@ -32,10 +33,10 @@ from mechdesign.cli.execution import (
     tell,
     write_report,
 )  # fmt: skip
-from mechdesign.cli.ledger import End, Ledger, Said, Task, failure
+from mechdesign.cli.ledger import End, Ledger, Said, Task, failure, name_of
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
-from mechdesign.errors import StudyError, printable
+from mechdesign.errors import StudyError
 from mechdesign.files import owned
 from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
@@ -64,10 +65,7 @@ def questions(study: Study) -> tuple[str, ...]:
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
     """Files of studies, each once: those that are named, all of a folder (``*.yaml``, ``*.yml``), and of a pattern.
 
-    Raises
-    ------
-    StudyError
-        If a folder or pattern has none.
+    A folder or pattern without any stands for itself.
     """
     if not paths:
         return [None]
@@ -78,11 +76,22 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
             here = sorted(file for file in path.glob("[!.]*") if file.suffix in _SUFFIXES and file.is_file())
         elif glob.has_magic(str(path)) and not path.exists():
             here = sorted(map(Path, glob.glob(str(path), recursive=True)))
-        if not here:
-            raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
-        for file in here:
+        for file in here or [path]:
             found.setdefault(os.path.abspath(file), file)
     return [*found.values()]
+
+
+def source_of(path: Path | None, options: Options) -> Source:
+    """Read one of the studies that `found_studies` gives; see `source`.
+
+    Raises
+    ------
+    StudyError
+        Also if it is a folder or pattern without studies.
+    """
+    if path is not None and (path.is_dir() or (glob.has_magic(str(path)) and not path.exists())):
+        raise StudyError(f"{path}: there are no studies, which are files *.yaml or *.yml")
+    return source(path, options)
 
 
 @one_thread()
@@ -95,7 +104,7 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
     """
     asked = found_studies(paths)
     with Board(quiet=options.quiet) as board:
-        ledger = Ledger(options, len(asked), board)
+        ledger = Ledger(options, asked, board)
         try:
             tasks = _read(asked, options, ledger, only)
             if not ledger.stopped:
@@ -110,9 +119,9 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
-        label, study = printable(path.stem) if path else "study", None
+        label, study = name_of(path), None
         try:
-            origin = source(path, options)
+            origin = source_of(path, options)
             study = load_source(origin, options)
             label = study.label
             claim(owners, study)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from mechdesign.cli import terminal
 from mechdesign.cli.annotations import annotate, of_error
-from mechdesign.cli.batch import found_studies
+from mechdesign.cli.batch import found_studies, source_of
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import claim, extras, folder, load_study
+from mechdesign.cli.execution import claim, extras, folder, load_source
 from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
@@ -31,7 +31,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
     asked = found_studies(paths)
     for path in asked:
         try:
-            study = load_study(path, options)
+            study = load_source(source_of(path, options), options)
             label = study.label
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph)
@@ -56,15 +56,15 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
 
 def _foresee(study: Study) -> None:
     """Find what requirements, matrix and sensitivities name and no result has: every such mistake in one go."""
-    looks: dict[Callable[[Study], object], bool] = {
-        partial(foresee, commands=COMMANDS, goals=True): True,
-        sweep.prepared: study.matrix is not None,
-        sensitivities.prepared: study.sensitivities is not None,
-    }
+    looks: list[Callable[[], object]] = [partial(foresee, study, COMMANDS, goals=True)]
+    if study.matrix is not None:
+        looks.append(partial(sweep.prepared, study))
+    if study.sensitivities is not None:
+        looks.append(partial(sensitivities.prepared, study))
     problems: dict[Problem, None] = {}
-    for look in [look for look, asked in looks.items() if asked]:
+    for look in looks:
         try:
-            look(study)
+            look()
         except StudyError as error:
             problems |= dict.fromkeys(error.problems)
     if problems:

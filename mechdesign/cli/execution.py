@@ -81,6 +81,7 @@ class Outcome:
     written: bool = False  # whether the directory holds what was found
     table: Table | None = None  # the main one
     shard: str = ""  # what became of a part of it, where no more was asked
+    left: bool = False  # whether the run ended before it
 
 
 def source(path: Path | None, options: Options) -> Source:

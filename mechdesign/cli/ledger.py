@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import RESULTS, Outcome, Source
 from mechdesign.cli.options import Options
 from mechdesign.courier import LostWorkerError
-from mechdesign.errors import Interrupted, OutputError, counted
+from mechdesign.errors import Interrupted, OutputError, counted, printable
 from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
@@ -25,6 +25,7 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
+_LOST = "run"  # in place of the commands that a killed process did not come to
 _KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
 
 
@@ -60,19 +61,20 @@ class End:
 class Ledger:
     """What becomes of studies: told in their order, in whatever order it is heard, and written in the end."""
 
-    def __init__(self, options: Options, count: int, board: Board) -> None:
+    def __init__(self, options: Options, asked: Sequence[Path | None], board: Board) -> None:
         self.options = options
         self.board = board
-        self.several = count > 1
+        self.several = len(asked) > 1
         self.interrupted = False
         self.stopped = False  # nothing more is begun
-        self._answers: list[list[Outcome]] = [[] for _ in range(count)]
+        self._asked = asked
+        self._answers: list[list[Outcome]] = [[] for _ in asked]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
         self._first = 0  # task that is not ended
-        self._left = count  # studies without an answer
+        self._left = len(asked)  # studies without an answer
         self._exit_code = 0
 
     def missing(self, number: int, given: Outcome) -> None:
@@ -116,7 +118,7 @@ class Ledger:
         if end is None:
             if not self.stopped:
                 with redirect_stderr(io.StringIO()) as words:
-                    given = failure(self._tasks[index].label, "run", Path(), LostWorkerError(_KILLED))
+                    given = failure(self._tasks[index].label, _LOST, Path(), LostWorkerError(_KILLED))
                 self._words[index].append(words.getvalue())
                 self.missing(number, given)
         else:
@@ -137,15 +139,15 @@ class Ledger:
     def close(self) -> int:
         """Tell what came out, write the summary, the JUnit file and the index, and give the exit code."""
         options = self.options
-        answers = [given for study in self._answers for given in study]
+        ended = [Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted")] if self.interrupted else []
+        answers = [*(given for study in self._answers for given in study), *ended]
         lost = f"; {self._left} of {len(self._answers)} studies were not answered" if self.several else ""
         if self.interrupted:
             terminal.say(f"interrupted; what was finished is whole{lost}")
-            answers.append(Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted"))
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
-            self._file(options.junit, summary.junit(answers).encode())
+            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode())
         table = summary.summary(answers)
         root = options.out or RESULTS
         if self.several and any(given.written for given in answers):
@@ -161,6 +163,19 @@ class Ledger:
             terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
         return max(self._exit_code, *(given.exit_code for given in answers))
 
+    def _with_left(self) -> Iterator[Outcome]:
+        """The answers in the order of the studies, and what the run ended before."""
+        tasks = {task.number: task for task in self._tasks}
+        for number, (path, answers) in enumerate(zip(self._asked, self._answers, strict=True)):
+            yield from answers
+            told = {given.command for given in answers}
+            if (task := tasks.get(number)) is not None:
+                left = [command for command, _ in task.questions if not {command, _LOST} & told]
+            else:
+                left = [] if answers else ["check"]
+            label = name_of(path) if task is None else task.label
+            yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
+
     def _file(self, path: Path, data: bytes) -> bool:
         """Write a file about all studies; whether it is there, for the run goes on without it."""
         try:
@@ -170,6 +185,11 @@ class Ledger:
             self._exit_code = max(self._exit_code, explained(error)[0])
             return False
         return True
+
+
+def name_of(path: Path | None) -> str:
+    """A study in words that could not be read."""
+    return printable(path.stem) if path else "study"
 
 
 def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:

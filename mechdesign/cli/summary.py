@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from mechdesign.results import Column, Table
 if TYPE_CHECKING:
     from junitparser import JUnitXml
 
+_SKIPPED = re.compile(r'(?<=") skipped="\d+"')
 NAME = "summary.csv"  # of several studies, beside their folders
 
 
@@ -51,9 +53,10 @@ def summary(answers: Sequence[Outcome]) -> Table:
 def junit(answers: Sequence[Outcome]) -> str:
     """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
 
-    A requirement that is not met is a failure; whatever kept a command from its result is an error.
+    A requirement that is not met is a failure; whatever kept a command from its result is an error; what the run ended
+    before is skipped.
     """
-    from junitparser import Error, Failure, JUnitXml, TestCase, TestSuite
+    from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
     for study, group in groupby(answers, key=lambda given: given.study):
@@ -66,6 +69,8 @@ def junit(answers: Sequence[Outcome]) -> str:
                 error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {given.exit_code}")
                 error.text = failed
                 case.result = [error]
+            if given.left:
+                case.result = [Skipped("the run ended before it")]
             if given.warnings:
                 case.system_out = "\n".join(f"warning: {printable(warning)}" for warning in given.warnings)
             suite.add_testcase(case)
@@ -83,5 +88,5 @@ def junit_text(report: JUnitXml) -> str:
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
     # Jenkins' schema (junit-10.xsd of its xunit plugin) allows that count in suites alone.
-    body = text.decode().replace(' skipped="0"', "", 1)
+    body = _SKIPPED.sub("", text.decode(), count=1)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

@@ -34,6 +34,11 @@ def summary(done):
     return [tuple(row.values())[:4] for row in csv.DictReader(io.StringIO(done.stdout))]
 
 
+def skipped(report):
+    """Cases of a JUnit report that were not answered."""
+    return [f"{case.classname}: {case.name}" for suite in report for case in suite if case.is_skipped]
+
+
 def test_every_question_a_study_asks_gets_a_folder(studies, invoke):
     done = invoke("run", "both.yaml", "--no-plots")
     assert done.exit_code == 0
@@ -98,6 +103,26 @@ def test_interrupt_ends_the_run_and_what_was_finished_is_whole(studies, analysis
     assert (studies / "results/both/kinematics/manifest.json").exists()
     assert not (studies / "results/both/stiffness").exists()
     assert not (studies / "results/slider").exists()
+    report = JUnitXml.fromfile("report.xml")
+    assert report.errors == 1
+    assert skipped(report) == ["mechdesign.both: stiffness", "mechdesign.slider: kinematics"]
+
+
+def test_what_the_first_failure_leaves_is_in_junit(studies, analysis, invoke):
+    analysis(lambda study, **options: answer(failed="cannot be assembled"))
+    asked = ["run", "both.yaml", "slider.yaml", "--no-plots", "--junit", "report.xml", "--jobs", 1, "--fail-fast"]
+    assert invoke(*asked).exit_code == 3
+    assert skipped(JUnitXml.fromfile("report.xml")) == ["mechdesign.both: stiffness", "mechdesign.slider: kinematics"]
+    # Studies are read before the first question.
+    assert invoke("run", "wrong.yaml", *asked[1:]).exit_code == 2
+    assert skipped(JUnitXml.fromfile("report.xml")) == ["mechdesign.both: check", "mechdesign.slider: check"]
+
+
+def test_a_folder_without_studies_is_an_error_of_its_own(studies, invoke):
+    (studies / "empty").mkdir()
+    done = invoke("run", "empty", "slider.yaml", "--no-plots", "--junit", "report.xml")
+    assert done.exit_code == 2
+    assert summary(done) == [("empty", "check", "wrong study", "2"), ("slider", "kinematics", "done", "0")]
     assert JUnitXml.fromfile("report.xml").errors == 1
 
 
