@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 import mechdesign
 from mechdesign.cli.app import app
+from mechdesign.commands import QUESTIONS
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Mechanism
@@ -290,6 +291,11 @@ def test_a_table_is_a_data_frame_by_one_call(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas"):
         table.to_pandas()
+
+
+def test_every_question_is_a_function_of_the_package() -> None:
+    """Its names stand there once more, as it may import nothing."""
+    assert set(QUESTIONS) < set(mechdesign.__all__)
 
 
 @pytest.mark.parametrize("name", ["", *mechdesign.__all__])

@@ -72,8 +72,8 @@ class Raster:
     def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
         """Designs and places where a margin is negative, though at the centres of all cells around it is not.
 
-        Where a margin is lowest a parabola through the places around leads to the lowest: for squares of distances it
-        is exact.
+        From the lowest of neighbouring centres a parabola through the places around leads on: it is exact for squares
+        of distances.
         """
         size = self.inside.shape[1]
         values = margins.reshape(len(margins), size, size, -1)
@@ -95,7 +95,7 @@ class Raster:
                 det = xx * yy - xy * xy
                 dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
                 good &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
-                # The parabola falls half as far.
+                # To twice the depth of the parabola, as the margin is none exactly.
                 good &= here + gx * dx + gy * dy < 0
             place = place + np.where(good, x * dx, 0.0) + 1j * np.where(good, y * dy, 0.0)
         return some[lane[good]], place[good]
