@@ -17,6 +17,8 @@ _BY_SIGNAL = 128  # exit code of a process that a signal ended, less the signal'
 # Files of Python's that hold locks for an instant, and functions of `threading` that wait without.
 _LOCKING = tuple(part.replace("/", os.sep) for part in ("/threading.py", "/queue.py", "/concurrent/futures/"))
 _WAITS = ("wait", "_wait_for_tstate_lock")
+# A text that Python evaluates. An interrupt inside would end the process by SIGINT at its exit, even if it is handled.
+_EVALUATED = ("<string>", "<module>")
 _RETRY = 0.02  # seconds until an interrupt that came amiss is tried again
 
 
@@ -52,10 +54,11 @@ def run(command: Callable[[], Any]) -> None:
 class Signals:
     """Interrupts, terminations and hang-ups are all a KeyboardInterrupt, at the first place that is fit for one.
 
-    Inside an import or a finaliser it would be lost or become another error, and what blocks signals is not to be
-    disturbed though another thread lets them in; one that is lost in a library is tried again. A signal that was
-    ignored from the start (``nohup``) stays so. The second Ctrl-C interrupts again; the second of the others is that of
-    ``timeout``, which sends it to the process and to its group.
+    Inside an import or a finaliser it would be lost or become another error, inside `eval` kept for the process's
+    end, and what blocks signals is not to be disturbed though another thread lets them in; one that is lost in a
+    library is tried again. A signal that was ignored from the start (``nohup``) stays so. The second Ctrl-C
+    interrupts again; the second of the others is that of ``timeout``, which sends it to the process and to its
+    group.
     """
 
     def __init__(self) -> None:
@@ -102,12 +105,17 @@ def _blocked() -> bool:
 
 
 def _unfit(frame: FrameType | None) -> bool:
-    """Whether an interrupt in a frame would be lost, or leave a lock of threads or workers held for ever."""
+    """Whether an interrupt in a frame would be lost, kept for the end, or leave a lock of threads held for ever."""
     while frame is not None:
         file, name = frame.f_code.co_filename, frame.f_code.co_name
         if name in _WAITS and file.endswith("threading.py"):
             return False
-        if file.startswith("<frozen importlib") or name == "__del__" or any(part in file for part in _LOCKING):
+        if file.startswith("<frozen importlib") or name == "__del__":
+            return True
+        # The outermost is the program of `python -c`.
+        if (file, name) == _EVALUATED and frame.f_back is not None:
+            return True
+        if any(part in file for part in _LOCKING):
             return True
         frame = frame.f_back
     return False

@@ -114,8 +114,9 @@ def test_signals_wait_before_anything_is_imported():
     assert done.stdout.split() == ["__future__", "mechdesign", "mechdesign.__main__"]
 
 
-# What a command does when it is interrupted: in a call back, whose errors are dropped; in an import; in a finaliser;
-# while it blocks signals and another thread lets them in; in the queue that work goes to.
+# What a command does when it is interrupted: in a call back, whose errors are dropped; in an import; in a text that is
+# evaluated, which Python keeps for its end; in a finaliser; while it blocks signals and another thread lets them in; in
+# the queue that work goes to.
 INTERRUPTED = {
     "call back": """
         thing = type("Thing", (), {})()
@@ -126,6 +127,9 @@ INTERRUPTED = {
         pathlib.Path("slow.py").write_text("import signal; signal.raise_signal(signal.SIGINT); print('whole')")
         sys.path.insert(0, "")
         import slow
+    """,
+    "evaluated": """
+        eval("signal.raise_signal(signal.SIGINT) or print('whole')")
     """,
     "finaliser": """
         class Thing:
