@@ -63,6 +63,7 @@ class Signals:
 
     def __init__(self) -> None:
         self.number: int | None = None  # of the signal that came first
+        self._catcher = sys._getframe(1)  # who made this, and catches what is raised
         self._heard = [each for each in SIGNALS if signal.getsignal(each) is not signal.SIG_IGN]
         for each in self._heard:
             signal.signal(each, self._hear)
@@ -94,7 +95,7 @@ class Signals:
             sys.__unraisablehook__(error)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        if hasattr(signal, "SIGALRM") and (_blocked() or _unfit(frame)):
+        if hasattr(signal, "SIGALRM") and (_blocked() or _unfit(frame, self._catcher)):
             signal.setitimer(signal.ITIMER_REAL, _RETRY)
         else:
             raise KeyboardInterrupt
@@ -104,16 +105,13 @@ def _blocked() -> bool:
     return not signal.pthread_sigmask(signal.SIG_BLOCK, ()).isdisjoint(SIGNALS)
 
 
-def _unfit(frame: FrameType | None) -> bool:
+def _unfit(frame: FrameType | None, catcher: FrameType) -> bool:
     """Whether an interrupt in a frame would be lost, kept for the end, or leave a lock of threads held for ever."""
-    while frame is not None:
+    while frame is not None and frame is not catcher:
         file, name = frame.f_code.co_filename, frame.f_code.co_name
         if name in _WAITS and file.endswith("threading.py"):
             return False
-        if file.startswith("<frozen importlib") or name == "__del__":
-            return True
-        # The outermost is the program of `python -c`.
-        if (file, name) == _EVALUATED and frame.f_back is not None:
+        if file.startswith("<frozen importlib") or name == "__del__" or (file, name) == _EVALUATED:
             return True
         if any(part in file for part in _LOCKING):
             return True
