@@ -122,6 +122,25 @@ def proper(name: object) -> bool:
     return isinstance(name, str) and name not in {"", ".", ".."} and not {"/", os.sep, "\0"}.intersection(name)
 
 
+def check_writable(directory: Path) -> None:
+    """Find out before a long computation that its results could not be written; creates nothing.
+
+    Raises
+    ------
+    OutputError
+        If the directory, or the nearest one above it that exists, does not take files.
+    """
+    place = directory
+    while not os.path.exists(place) and place != place.parent:
+        place = place.parent
+    if not place.is_dir():
+        raise OutputError(f"{directory}: results cannot be written there: {place} is a file; choose another --out")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise OutputError(
+            f"{directory}: results cannot be written there: no permission for {place}; choose another --out"
+        )
+
+
 @contextmanager
 def owned(directory: Path) -> Iterator[None]:
     """Keep a folder, made where there is none, to this process; clears up what a killed one left in it.
@@ -141,8 +160,8 @@ def owned(directory: Path) -> Iterator[None]:
             directory.mkdir(parents=True, exist_ok=True)
             stream = _locked(directory / _LOCK)
         except OSError as error:
-            there = next((place for place in (directory, *directory.parents) if os.path.exists(place)), directory)
-            why = f"{there} is a file" if there.is_file() else error.strerror or error
+            check_writable(directory)
+            why = error.strerror or error
             raise OutputError(f"{directory}: results cannot be written there: {why}; choose another --out") from error
         with _held(stream, directory / _LOCK):
             for left in _temporaries(directory):

@@ -15,6 +15,7 @@ from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text
 from mechdesign.errors import StudyError, counted
+from mechdesign.files import check_writable
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
@@ -61,7 +62,7 @@ def compare(
     default = Tolerance(rtol, atol)
     chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if out is not None:
-        writer.check_writable(out)
+        check_writable(out)
     found = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, found)
@@ -130,13 +131,7 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
     # The study that is repeated has its overrides in it.
     before, after = content | {"overrides": []}, folders.results(there)["."]
     found = Comparison(notes=[f"{folder}: {note}" for note in folders.notes(before, after)])
-    # Of tables that cannot be read their bytes tell.
-    lost = {name for name in before["tables"] if not _legible(kept, before, name)}
-    known, computed = (
-        each | {"tables": {name: about for name, about in each["tables"].items() if name not in lost}}
-        for each in (before, after)
-    )
-    folders.compare_results(found, folder, (kept, known), (there, computed), _EXACTLY)
+    folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
     again = manifest.recorded_files(after)
     told = {each.table for each in found.differences}
     for name, digest in manifest.recorded_files(content).items():
@@ -148,14 +143,6 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
         if wrong and table not in told:
             found.differences.append(Difference(folder, table, "", _BYTES, old=", ".join(wrong), new=wanted[:_SHOWN]))
     return found
-
-
-def _legible(directory: Path, content: dict[str, Any], name: str) -> bool:
-    try:
-        folders.read_table(directory, content, name)
-    except StudyError:
-        return False
-    return True
 
 
 def _write(out: Path, found: Comparison) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.cli.execution import Outcome, ask
-from mechdesign.cli.ledger import failure
+from mechdesign.cli.ledger import failure, name_of
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit
 from mechdesign.errors import Interrupted, Problem, StudyError
@@ -84,7 +84,7 @@ def _as_typed(error: StudyError) -> StudyError:
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
-    given, label = None, path.stem if path is not None else "study"
+    given, label = None, name_of(path)
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))

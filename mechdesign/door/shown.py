@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
-from mechdesign.files import formats_of, owned
+from mechdesign.files import check_writable, formats_of, owned
 from mechdesign.report import writer
 from mechdesign.report.manifest import Extras
 from mechdesign.report.requirements import Verdict, requirements
@@ -147,7 +147,7 @@ class Answer(Result):
             raise StudyError("plots=False and animate=True or formats contradict each other")
         asked = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
         folder = Path(directory)
-        writer.check_writable(folder)
+        check_writable(folder)
         with owned(folder):
             undrawn = writer.write(folder, self.study, self, self.verdicts, asked)
         for warning in undrawn:

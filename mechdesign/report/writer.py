@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
-from mechdesign.files import Transaction, replace, unsettled
+from mechdesign.files import Transaction, check_writable, replace, unsettled
 from mechdesign.progress import NULL, Progress
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
@@ -34,25 +34,6 @@ FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
 # Ends the names under which pictures stand as HTML.
 INLINE = ".html"
-
-
-def check_writable(directory: Path) -> None:
-    """Find out before a long computation that its results could not be written; creates nothing.
-
-    Raises
-    ------
-    OutputError
-        If the directory, or the nearest one above it that exists, does not take files.
-    """
-    place = directory
-    while not os.path.exists(place) and place != place.parent:
-        place = place.parent
-    if not place.is_dir():
-        raise OutputError(f"{directory}: results cannot be written there: {place} is a file; choose another --out")
-    if not os.access(place, os.W_OK | os.X_OK):
-        raise OutputError(
-            f"{directory}: results cannot be written there: no permission for {place}; choose another --out"
-        )
 
 
 def write(

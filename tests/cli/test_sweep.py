@@ -8,17 +8,15 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from helpers.studies import IN_LINE
 
-STUDY = """
-mechanism:
-  parameters: {r: 30, l: 100}
-  links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
-  joints: {guide: {prismatic: [ground, slider], through: O}}
-  drives: [crank]
-  sketch: {A: [0, 30], B: [95, 0]}
+STUDY = (
+    IN_LINE
+    + """\
 kinematics: {sweep: {crank: {from: 0, to: 360, step: 30}}, outputs: [B.x]}
 requirements: [{result: kinematics.extremes.B.x.range, at_least: 50}]
 """
+)
 R = "mechanism.parameters.r"
 
 

@@ -186,13 +186,15 @@ def compare_results(
     old: tuple[Path, Mapping[str, Any]],
     new: tuple[Path, Mapping[str, Any]],
     tolerances: Tolerances,
+    *,
+    illegible: bool = False,
 ) -> set[str]:
     """Add to what was found how two results of a command, folders and manifests, differ; the patterns that fitted.
 
     Raises
     ------
     StudyError
-        If a table cannot be read.
+        If a table cannot be read, unless `illegible` ones are left to who compares their bytes.
     """
     (_, before), (_, after) = old, new
     fitted: set[str] = set()
@@ -203,7 +205,12 @@ def compare_results(
             change = MISSING if name in before["tables"] else NEW
             found.differences.append(Difference(folder, table, "", change))
             continue
-        pair = read_table(*old, name), read_table(*new, name)
+        try:
+            pair = _read_table(*old, name), _read_table(*new, name)
+        except StudyError:
+            if illegible:
+                continue
+            raise
         given = [_given(each, command) for each in (before, after)]
         chosen = {}
         for column in pair[0].names:
@@ -234,7 +241,7 @@ def _verdict(told: Mapping[str, Any] | None) -> str:
     return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
 
 
-def read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
+def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:
     """A table of a folder, as its manifest describes it.
 
     Raises
