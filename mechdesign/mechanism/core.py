@@ -38,12 +38,14 @@ class Bound:
             return size**2
         return 2 * np.pi if self.coordinate.quantity == "angle" else size
 
-    def margins(self, configuration: Configuration, places: Mapping[str, Value]) -> list[tuple[str, Value]]:
+    def margins(
+        self, configuration: Configuration, places: Mapping[str, Value], *, smooth: bool = False
+    ) -> list[tuple[str, Value]]:  # fmt: skip
         """Margins of this limit, each named; distances and legs as differences of squares, quadratic in positions.
 
         An angle between bounds is judged modulo a turn: it holds if (value - min) mod turn <= max - min. Where the
         turns of a drive count (it is given, or followed along a motion) its value itself is judged, and so is any angle
-        that is followed between bounds a turn apart or more.
+        that is followed between bounds a turn apart or more. `smooth` gives functions of the same sign without corners.
         """
         low, high = self.ends(places)
         if self.coordinate.kind == "distance":
@@ -55,13 +57,17 @@ class Bound:
             low, high = _squared(low), _squared(high)
         else:
             value = configuration.value(self.coordinate)
-            if self.coordinate.quantity == "angle" and low is not None and high is not None:
-                half = (high - low) / 2
+            if self.of_angle and low is not None and high is not None:
+                half, counted = (high - low) / 2, self.coordinate.name in configuration.counted
                 away = value - (low + half)
                 whole = half >= np.pi
                 # A drive's angle is given, or already in the turn of its limits.
-                margin = half - np.abs(away if self.drive else np.where(whole, away, wrap(away)))
-                if self.coordinate.name not in configuration.counted:
+                away = away if self.drive else np.where(whole, away, wrap(away))
+                margin = half - np.abs(away)
+                if smooth:
+                    turns = counted & np.asarray(self.drive | whole)
+                    margin = np.where(turns, half * half - away * away, np.cos(away) - np.cos(half))
+                if not counted:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
                 return [(self.label, margin)]
@@ -74,8 +80,9 @@ class Bound:
 
     @property
     def of_angle(self) -> bool:
-        """Whether it bounds an angle on both sides."""
-        return self.coordinate.quantity == "angle" and self.minimum is not None and self.maximum is not None
+        """Whether it bounds an angle on both sides, modulo a turn; an expression is judged as it is."""
+        given = self.minimum is not None and self.maximum is not None
+        return self.coordinate.kind == "angle" and given
 
     def counts(self, places: Mapping[str, Value]) -> bool:
         """Whether it depends on the turns of an angle: in an expression, or between ends a turn apart or more."""
@@ -127,10 +134,10 @@ class Core:
         """
         return names.resolve(name, self.description, self.graph)
 
-    def margins(self, configuration: Configuration) -> list[tuple[str, Value]]:
-        """Named margins of all limits: positive inside."""
+    def margins(self, configuration: Configuration, *, smooth: bool = False) -> list[tuple[str, Value]]:
+        """Named margins of all limits: positive inside; see `Bound.margins`."""
         places = {**self.nominal, **configuration.places}
-        return [margin for bound in self.bounds for margin in bound.margins(configuration, places)]
+        return [margin for bound in self.bounds for margin in bound.margins(configuration, places, smooth=smooth)]
 
     def turns(self, places: Mapping[str, Value]) -> dict[str, Value]:
         """Values that drives' angles lie within half a turn of, so that they lie within their limits."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,9 +13,10 @@ from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import MEASURED, Place, Term
 
 
-def offset_names(link: str, point: str) -> tuple[str, str]:
-    """Places of a pin's offset from its nominal place, in the link's frame (zero unless given)."""
-    return f"{link}.{point}.dx", f"{link}.{point}.dy"
+def offset_names(body: str, point: str) -> tuple[str, str]:
+    """Places of a pin's offset from its nominal place, in the frame of the body's link (zero unless given)."""
+    name = f"{body.removesuffix(':rod')}.{point}"
+    return f"{name}.dx", f"{name}.dy"
 
 
 def slide_offset(joint: str) -> str:
@@ -50,16 +51,18 @@ class Geometry:
             return self.places[term].nominal if value is None else value
         return term
 
+    def place(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
+        """Coordinates of a point in its body's frame, those of its hole where a pin moves in it."""
+        return vector(*(self.term(term, values) for term in self.graph.points[body, point]))
+
+    def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
+        """The offset of the pin at a point, in its body's frame; the plain zero where it has none."""
+        dx, dy = (values.get(name, 0.0) for name in offset_names(body, point))
+        return vector(dx, dy) if np.ndim(dx) or np.ndim(dy) or dx or dy else 0.0
+
     def local(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
-        """Coordinates of a point in its body's frame, pin offset included."""
-        x_term, y_term = self.graph.points[body, point]
-        x, y = self.term(x_term, values), self.term(y_term, values)
-        dx, dy = (values.get(name) for name in offset_names(body.removesuffix(":rod"), point))
-        if dx is not None:
-            x = x + dx
-        if dy is not None:
-            y = y + dy
-        return vector(x, y)
+        """Coordinates of the pin at a point in the body's frame."""
+        return plus(self.place(body, point, values), 1, self.pin(body, point, values))
 
     def angle(self, turns: Sequence[Turn], values: Mapping[str, Value]) -> Value:
         """Sum of turns in radians."""
@@ -69,28 +72,29 @@ class Geometry:
                 total = total + turn.sign * self.term(turn.term, values)
             else:
                 link, a, b = turn.towards
-                total = total + turn.sign * np.angle(self.local(link, b, values) - self.local(link, a, values))
+                total = total + turn.sign * np.angle(self.place(link, b, values) - self.place(link, a, values))
         return total
 
     def _places_of(self, edge: Edge) -> frozenset[str]:
         graph = self.graph
         names: set[str] = set()
 
-        def add_local(body: str, point: str) -> None:
+        def add_place(body: str, point: str) -> None:
             names.update(term for term in graph.points[body, point] if isinstance(term, str))
-            names.update(offset_names(body.removesuffix(":rod"), point))
 
         def add_turns(turns: Sequence[Turn]) -> None:
             for turn in turns:
                 if turn.towards is not None:
                     link, a, b = turn.towards
-                    add_local(link, a)
-                    add_local(link, b)
+                    add_place(link, a)
+                    add_place(link, b)
                 elif isinstance(turn.term, str):
                     names.add(turn.term)
 
         for _, body, point in edge.locals:
-            add_local(body, point)
+            add_place(body, point)
+        for _, body, point in (*edge.locals, *edge.pins):
+            names.update(offset_names(body, point))
             add_turns(graph.bodies[body][1])
         add_turns(edge.turns)
         names.update(self._offset_of(edge))
@@ -105,7 +109,7 @@ class Geometry:
     @cached_property
     def offsets(self) -> frozenset[str]:
         """Names of the places of all offsets, of pins and of slides."""
-        pins = (name for body, point in self.graph.points for name in offset_names(body.removesuffix(":rod"), point))
+        pins = (name for body, point in self.graph.points for name in offset_names(body, point))
         return frozenset([*pins, *(name for edge in self.graph.edges for name in self._offset_of(edge))])
 
     @cached_property
@@ -141,11 +145,10 @@ class Geometry:
                 d.append(base.d[k])
                 continue
             total: Value = 0.0
-            for sign, body, point in edge.locals:
-                local = self.local(body, point, values)
-                if not isinstance(offsets[body], float):
-                    local = local * offsets[body]
-                total = plus(total, sign, local)
+            for sign, body, arm, _ in self._arms(edge, values):
+                if not isinstance(offsets[body], float) and not isinstance(arm, float):
+                    arm = arm * offsets[body]
+                total = plus(total, sign, arm)
             if edge.slide is None:
                 d.append(0.0)
             else:
@@ -163,16 +166,10 @@ class Geometry:
                 total = total + turn.sign * (turn.term == place)
             else:
                 link, a, b = turn.towards
-                span = self.local(link, b, values) - self.local(link, a, values)
-                change = self.local_derivative(link, b, place) - self.local_derivative(link, a, place)
+                span = self.place(link, b, values) - self.place(link, a, values)
+                change = _equal(self.graph.points[link, b], place) - _equal(self.graph.points[link, a], place)
                 total = total + turn.sign * cross(span, change) / norm2(span)
         return total
-
-    def local_derivative(self, body: str, point: str, place: str) -> complex:
-        """Derivative of a point's local coordinates with respect to a place."""
-        x, y = self.graph.points[body, point]
-        dx, dy = offset_names(body.removesuffix(":rod"), point)
-        return complex((x == place) + (dx == place), (y == place) + (dy == place))
 
     def derivatives(self, place: str, values: Mapping[str, Value], vectors: Vectors) -> tuple[list[Value], list[Value]]:
         """Derivatives of all edges' w and d with respect to one place, at dimensions `values` with edges `vectors`."""
@@ -187,9 +184,23 @@ class Geometry:
             total: Value = 0j
             for name in self._offset_of(edge):
                 total = 1j * ((place == name) * vectors.d[k] + values.get(name, 0.0) * d_z[k])
-            for sign, body, point in edge.locals:
+            for sign, body, arm, change in self._arms(edge, values, place):
                 turn = self.angle_derivative(self.graph.bodies[body][1], place, values)
-                turned = 1j * turn * self.local(body, point, values)
-                total = total + sign * (self.local_derivative(body, point, place) + turned) * vectors.offsets[body]
+                total = total + sign * (change + 1j * turn * arm) * vectors.offsets[body]
             w_z.append(total)
         return w_z, d_z
+
+    def _arms(
+        self, edge: Edge, values: Mapping[str, Value], place: str = ""
+    ) -> Iterator[tuple[int, str, Value, complex]]:
+        """What `w` of an edge is the sum of: sign, body, vector in its frame, and derivative of that by a place."""
+        for sign, body, point in edge.locals:
+            change = _equal(self.graph.points[body, point], place) + _equal(offset_names(body, point), place)
+            yield sign, body, self.local(body, point, values), change
+        for sign, body, point in edge.pins:
+            yield sign, body, self.pin(body, point, values), _equal(offset_names(body, point), place)
+
+
+def _equal(terms: tuple[Term, Term], place: str) -> complex:
+    """The derivative of two terms, x and y, by a place."""
+    return complex(terms[0] == place, terms[1] == place)

@@ -16,6 +16,8 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
 
 GROUND = "ground"
+# What may follow a link's name, and so is none of its points there.
+OF_LINKS = frozenset(("angle", "length"))
 
 
 def rod_of(leg: str) -> str:
@@ -39,7 +41,11 @@ class Turn:
 
 @dataclass(frozen=True)
 class Edge:
-    """``X_head = X_tail + (w + s d) U``; `w` is a sum of signed local points, `d` a unit vector at a sum of turns."""
+    """``X_head = X_tail + (w + s d) U``; `w` is a sum of signed local points, `d` a unit vector at a sum of turns.
+
+    A line and what slides along it are of links, not of the pins there: `pins` are those whose offsets in their links
+    are part of `w`.
+    """
 
     tail: int
     head: int
@@ -47,6 +53,7 @@ class Edge:
     locals: tuple[tuple[int, str, str], ...] = ()
     slide: int | None = None
     turns: tuple[Turn, ...] = ()
+    pins: tuple[tuple[int, str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -64,8 +71,18 @@ class Graph:
     ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
 
     def node(self, name: str) -> int:
-        """Index of a point."""
-        return self.nodes.index(name)
+        """Index of a point; that of a link, ``rod.B``, is where the others at its pin are."""
+        return self.nodes.index(name.rpartition(".")[2])
+
+    def is_point(self, name: str) -> bool:
+        """Whether it names a point, ``B``, or one of a link, ``rod.B``."""
+        link, _, point = name.rpartition(".")
+        on_link = point not in OF_LINKS and any((body, point) in self.points for body in (link, rod_of(link)))
+        return name in self.nodes or on_link
+
+    def links_at(self, point: str) -> list[str]:
+        """Links that have a point."""
+        return list(dict.fromkeys(body.removesuffix(":rod") for body, name in self.points if name == point))
 
     def joined(self, edges: Iterable[int]) -> list[str]:
         """Names of the points at the ends of some edges, in their order; edges that stand for distances have none."""
@@ -142,7 +159,7 @@ def build_graph(description: Description) -> Graph:
             ties.append((name, rod, ()))
             legs.append((name, *link.ends))
 
-    lines: list[tuple[str, Line, str]] = []
+    lines: list[tuple[str, Line, str, tuple[tuple[int, str, str], ...]]] = []
     for joint in description.joints.values():
         if isinstance(joint, Fixed):
             a, b = joint.links
@@ -151,7 +168,9 @@ def build_graph(description: Description) -> Graph:
         line = joint.line
         if line.through is None:
             put(line.link, origin_of(line.link), (0.0, 0.0))
-        lines.append((joint.name, line, joint.point))
+        seats = [(-1, line.link, line.through)] if line.through is not None else []
+        seats += [(1, joint.slider, joint.point)] if isinstance(joint, Prismatic) else []
+        lines.append((joint.name, line, joint.point, tuple(seats)))
         if isinstance(joint, Prismatic):
             ties.append((line.link, joint.slider, (*_turns_of(line), Turn(1, joint.angle))))
 
@@ -175,10 +194,10 @@ def build_graph(description: Description) -> Graph:
                  len(slides), classes[leg][1])
         )  # fmt: skip
         slides.append(leg)
-    for name, line, point in lines:
+    for name, line, point, pins in lines:
         through = line.through if line.through is not None else origin_of(line.link)
         frame, offset = classes[line.link]
-        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line))))
+        edges.append(Edge(index[through], index[point], frame, (), len(slides), (*offset, *_turns_of(line)), pins))
         slides.append(name)
     return Graph(
         tuple(nodes), tuple(edges), count, classes, points, tuple(slides), frozenset(range(len(legs))), tuple(ties)

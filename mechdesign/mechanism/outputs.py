@@ -21,7 +21,8 @@ GRADIENT_STEP = 1e-6
 class Rates:
     """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies, parameters.
 
-    Of the parameters that measures take those that are not named do not change.
+    Of the parameters that measures take those that are not named do not change. `ends` are points of links, by link and
+    node, where these do not move with the pin at the node.
     Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
     """
 
@@ -30,16 +31,19 @@ class Rates:
     slides: Sequence[Value]
     offsets: Mapping[str, Value]
     parameters: Mapping[str, Value] = field(default_factory=dict)
+    ends: Mapping[tuple[str, int], Value] = field(default_factory=dict)
 
 
 @quiet
 def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) -> Value:
     """First derivative of a coordinate along `rates` (in time, by a drive or by a dimension); angles in radians."""
     kind = coordinate.kind
-    if kind == "x":
-        return np.real(rates.nodes[coordinate.node])
-    if kind == "y":
-        return np.imag(rates.nodes[coordinate.node])
+    if kind in ("x", "y", "distance"):
+        moved = [rates.ends.get(end, rates.nodes[end[1]]) for end in coordinate.ends]
+        if kind != "distance":
+            return np.real(moved[0]) if kind == "x" else np.imag(moved[0])
+        span = _span(configuration.nodes, coordinate)
+        return dot(span, moved[1] - moved[0]) / np.sqrt(norm2(span))
     if kind == "slide":
         return rates.slides[coordinate.slide]
     if kind == "angle":
@@ -48,14 +52,11 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
             frame = configuration.graph.bodies[body][0]
             total = total + sign * (rates.angles[frame] + rates.offsets.get(body, 0.0))
         return total
-    if kind == "distance":
-        span, change = _span(configuration.nodes, coordinate), _span(rates.nodes, coordinate)
-        return dot(span, change) / np.sqrt(norm2(span))
     if kind == "parameter":
         return rates.parameters.get(coordinate.name, 0.0)
     gradient = _gradient(coordinate, configuration.user_values(coordinate))
-    return sum(g * _user(part, first(configuration, part, rates), coordinate)
-               for g, part in zip(gradient, coordinate.parts, strict=True))  # fmt: skip
+    return _radians(coordinate, sum(g * _user(part, first(configuration, part, rates), coordinate)
+                                    for g, part in zip(gradient, coordinate.parts, strict=True)))  # fmt: skip
 
 
 @quiet
@@ -77,7 +78,8 @@ def second(configuration: Configuration, coordinate: Coordinate, one: Rates, oth
         mixed = [_user(part, second(configuration, part, one, other, both), coordinate) for part in coordinate.parts]
         values = configuration.user_values(coordinate)
         gradient, curved = _gradient(coordinate, values), _directional(coordinate, values, along_one)
-        return sum(g * m + c * b for g, m, c, b in zip(gradient, mixed, curved, along_other, strict=True))
+        terms = zip(gradient, mixed, curved, along_other, strict=True)
+        return _radians(coordinate, sum(g * m + c * b for g, m, c, b in terms))
     return first(configuration, coordinate, both)
 
 
@@ -120,6 +122,12 @@ def _span(nodes: Sequence[Value], coordinate: Coordinate) -> Value:
 def _user(part: Coordinate, value: Value, whole: Coordinate) -> Value:
     assert whole.expression is not None
     return value / whole.expression.angle_unit if part.quantity == "angle" else value
+
+
+def _radians(coordinate: Coordinate, value: Value) -> Value:
+    """The value of an expression, or a derivative of it, as the core has it."""
+    assert coordinate.expression is not None
+    return value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
 
 
 def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:

@@ -49,6 +49,7 @@ class Structure:
         self.section, self.description = study.stiffness, study.mechanism.description
         self.nodes: dict[tuple[str, str], int] = {}  # of each link: at its points, and where each line's slider is
         self.there: dict[str, list[int]] = {}  # nodes at each point, before joints join them
+        self.pins: dict[str, int] = {}  # each in the middle of what it joins
         self.clamps: list[tuple[int, int]] = []
         for link in self.description.links.values():
             self._link(link)
@@ -186,7 +187,9 @@ class Structure:
 
     def _pins(self) -> int:
         """Clamps, then pins, each with a node of its own; the node that the study asks."""
-        asked = None if self.section.link is None else self.nodes[self.section.link, self.section.at]
+        link, _, at = self.section.at.rpartition(".")
+        link = self.section.link or link
+        asked = self.nodes[link, at] if link else None
         for a, b in self.clamps:
             self.frame.clamp(a, b)
         for point, nodes in self.there.items():
@@ -195,8 +198,8 @@ class Structure:
                 if a in nodes:
                     joined = set().union(*(c for c in clusters if c & {a, b}))
                     clusters = [c for c in clusters if not c & {a, b}] + [joined]
-            pin = self.frame.node(self.place(point))
-            if self.section.link is None and point == self.section.at:
+            pin = self.pins[point] = self.frame.node(self.place(point))
+            if not link and point == at:
                 asked = pin
             ground = self.nodes.get((GROUND, point))
             bearing = self.section.bearings.get(point)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import copy
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from random import Random
 
@@ -149,37 +149,71 @@ class Layout:
             row[3 * columns.index(body) + 2] = 1
         return row
 
-    def _sliding(self) -> list[tuple[str, complex, complex, str, complex, bool]]:
-        """Every line: its body, a place on it, its direction; the body that slides, its point; whether it may turn."""
+    def _sliding(self) -> list[tuple[str, complex, complex, str, complex, bool, tuple[str, str]]]:
+        """Every line: its body, a place on it, its direction; the body that slides, its point; whether it may turn.
+
+        Last the link and the point whose pin it is that slides; none where it is the body itself.
+        """
         lines = [
             (
                 self.holder(g.guide, g.through), g.base, g.along,
                 self.holder(g.slider, g.point), self.places[g.point], g.kind == "slot",
+                (g.slider, g.point) if g.kind == "slot" else ("", ""),
             )
             for g in self.guides.values()
         ]  # fmt: skip
         for body in self.bodies.values():
             if body.to:
-                lines.append((body.name, body.origin, body.turn, f"{body.name}:rod", self.places[body.to], False))
+                at = self.places[body.to]
+                lines.append((body.name, body.origin, body.turn, f"{body.name}:rod", at, False, ("", "")))
         return lines
+
+    def _gaps(self, columns: list[str], off: Mapping[tuple[str, str], complex]) -> Iterator[tuple[Floats, float]]:
+        """Constraints on the rates of the bodies `columns`: a row each, and what it comes to where pins are moved.
+
+        `off` are pins, by link and point, and how far each goes off its place in that link.
+        """
+        for point, at in self.places.items():
+            first, *others = self.owners(point)
+            for other in others:
+                row = self._move(self.holder(other, point), at, columns)
+                row -= self._move(self.holder(first, point), at, columns)
+                gap = off.get((first, point), 0j) - off.get((other, point), 0j)
+                yield row.real, gap.real
+                yield row.imag, gap.imag
+        for guide, base, along, slider, at, turns, pin in self._sliding():
+            relative = self._move(slider, at, columns) - self._move(guide, base, columns)
+            relative -= self._spin(guide, columns) * 1j * (at - base)
+            yield (along.conjugate() * relative).imag, -(along.conjugate() * off.get(pin, 0j)).imag
+            if not turns:
+                yield self._spin(slider, columns) - self._spin(guide, columns), 0.0
+        for clamp in self.clamps.values():
+            yield self._spin(clamp.second, columns) - self._spin(clamp.first, columns), 0.0
 
     def equations(self, columns: list[str]) -> Floats:
         """Constraints, a row each, on the rates of the bodies `columns`; only rows that they take part in."""
-        rows: list[Floats] = []
-        for point, at in self.places.items():
-            first, *others = [self.holder(body, point) for body in self.owners(point)]
-            for other in others:
-                gap = self._move(other, at, columns) - self._move(first, at, columns)
-                rows += [gap.real, gap.imag]
-        for guide, base, along, slider, at, turns in self._sliding():
-            relative = self._move(slider, at, columns) - self._move(guide, base, columns)
-            relative -= self._spin(guide, columns) * 1j * (at - base)
-            rows.append((along.conjugate() * relative).imag)
-            if not turns:
-                rows.append(self._spin(slider, columns) - self._spin(guide, columns))
-        for clamp in self.clamps.values():
-            rows.append(self._spin(clamp.second, columns) - self._spin(clamp.first, columns))
-        return np.array([row for row in rows if row.any()]).reshape(-1, 3 * len(columns))
+        rows = [row for row, _ in self._gaps(columns, {}) if row.any()]
+        return np.array(rows).reshape(-1, 3 * len(columns))
+
+    def displaced(self, given: list[Coordinate], link: str, point: str, offset: complex) -> dict[str, complex]:
+        """How far each point of each link goes, as ``link.point``, where the pin at one lies off its place in a link.
+
+        The pin stays in the other links, and so on the line of a slot; what is given is held.
+        """
+        columns, pin = self.rigid(), (link, point)
+        gaps = list(self._gaps(columns, {pin: offset}))
+        for coordinate in given:
+            guide = self.guides.get(coordinate[1]) if coordinate[0] == "slide" else None
+            slot = guide is not None and guide.kind == "slot" and (guide.slider, guide.point) == pin
+            gap = -(guide.along.conjugate() * offset).real if slot else 0.0
+            gaps.append((self.rate(coordinate, columns), gap))
+        rows, right = (np.array(part) for part in zip(*gaps, strict=True))
+        moving = np.linalg.lstsq(rows, right, rcond=None)[0]
+        return {
+            f"{owner}.{place}": complex(self._move(self.holder(owner, place), at, columns) @ moving)
+            for place, at in self.places.items()
+            for owner in self.owners(place)
+        }
 
     def rate(self, coordinate: Coordinate, columns: list[str]) -> Floats:
         """Derivative of a coordinate by the rates of the bodies."""

@@ -15,6 +15,7 @@ from hypothesis import assume, given, settings
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.geometry import offset_names
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats
 
@@ -154,3 +155,22 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
             for order, (values, exact) in enumerate(zip(shown, told, strict=False)):
                 derivative = np.broadcast_to(np.asarray(exact(c)), (len(places), len(time)))[row]
                 agree(derivative, slopes(values, h), 1e-7, f"order {order} of {name} by {place}")
+
+
+@settings(max_examples=40)
+@given(mechanisms())
+def test_a_pin_off_its_place_in_one_link_moves_the_others_with_it_and_leaves_guides_alone(made: Made) -> None:
+    """By body coordinates, in which every link has points, lines and sliders of its own."""
+    mechanism, layout = made.mechanism, made.layout
+    configuration = mechanism.forward.solve(made.drives(np.array(0.0)))
+    linear, held = mechanism.linearize(configuration), [layout.drives[drive] for drive in mechanism.drives]
+    pins = [(link, point) for point in layout.places for link in layout.owners(point) if len(layout.owners(point)) > 1]
+    for link, point in made.rng.sample(pins, min(6, len(pins))):
+        for way, place in zip((1.0, 1j), offset_names(link, point), strict=True):
+            expected = layout.displaced(held, link, point, way * layout.bodies[link].turn)
+            nodes = linear.sensitivity([place]).nodes
+            largest = max(1.0, *map(abs, expected.values()))
+            for end, moved in expected.items():
+                if end != f"{link}.{point}":
+                    found = complex(np.ravel(nodes[mechanism.graph.node(end.partition(".")[2])])[0])
+                    assert found == pytest.approx(moved, abs=1e-6 * largest**2), (place, end)

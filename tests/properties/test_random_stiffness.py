@@ -6,8 +6,9 @@ from random import Random
 
 import numpy as np
 import pytest
+import yaml
 from helpers.frames import Structure
-from helpers.layouts import GROUND
+from helpers.layouts import DUMPER, GROUND
 from helpers.platforms import platform
 from helpers.random_stiffness import Sprung, sprung
 from helpers.stiffness import ask_stiffness, matrix
@@ -15,6 +16,7 @@ from helpers.studies import study_of
 from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
+import mechdesign
 from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.stiffness.analysis import ask, hold
 from mechdesign.analyses.stiffness.force_method import load, twists_of
@@ -65,6 +67,55 @@ def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) 
     for link, point, dx, dy in zip(*(table[name] for name in ("link", "point", "dx", "dy")), strict=True):
         node = structure.nodes[link, point]
         assert complex(dx, dy) == pytest.approx(complex(*moved[3 * node : 3 * node + 2, 0]), abs=1e-6 * largest + 1e-12)
+
+
+@settings(max_examples=25)
+@given(sprung(), st.integers(0, 2**32 - 1))
+def test_ends_of_pins_and_turns_of_links_in_a_reliability_are_those_of_finite_elements(case: Sprung, seed: int) -> None:
+    """Every end of every pin, the pin itself, and the angle of every link that has a line; most pins give."""
+    layout, rng = case.layout, Random(seed)
+    clamps = [{clamp.first, clamp.second} for clamp in layout.clamps.values()]
+    pins = [
+        point for point in layout.places if len(layout.owners(point)) > 1 and set(layout.owners(point)) not in clamps
+    ]
+    case.bearings |= {pin: {"radial": 10 ** rng.uniform(3, 5)} for pin in pins if rng.random() < 0.6}
+    ends = {f"{link}.{point}": (link, point) for point in layout.places for link in layout.owners(point)}
+    if rng.random() < 0.4:
+        case.link, case.at = "", rng.choice([end for end, (link, _) in ends.items() if link != GROUND])
+    text = case.text()
+    angles = [f"{link}.angle" for link in layout.bodies if link != GROUND]
+    section = {
+        "poses": [layout.pose(layout.drives)], "dimensions": {"load.fx": 1.0, "load.fy": 1.0}, "load": [0, 0, 0],
+        "outputs": [*ends, *layout.places, *angles], "methods": "analytic",
+    }  # fmt: skip
+    result = mechdesign.reliability(study_of(text + yaml.dump({"reliability": section}, Dumper=DUMPER)))
+    table, structure = result.tables["contributions"], Structure(*posed(text))
+    unknown = "".join(warning for warning in result.warnings if "not known" in warning)
+    moved = structure.frame.respond(structure.asked, np.eye(3)[:, :2])[0]
+    places = moved[0::3] + 1j * moved[1::3]
+
+    def expected(output: str) -> np.ndarray:
+        name, _, part = output.rpartition(".")
+        if part == "angle":
+            link = structure.description.links[name]
+            corners = list(link.ends or link.points)
+            nodes = [structure.nodes[name, corner] for corner in corners]
+            if len(corners) != 2:
+                return moved[3 * nodes[0] + 2]
+            span = structure.place(corners[1]) - structure.place(corners[0])
+            return np.imag((places[nodes[1]] - places[nodes[0]]) / span)
+        node = structure.nodes[ends[name]] if name in ends else structure.pins[name]
+        if (GROUND, name) in structure.nodes:
+            node = structure.nodes[GROUND, name]
+        elif name == case.at and case.link:
+            node = structure.nodes[case.link, name]
+        return np.real(places[node]) if part == "x" else np.imag(places[node])
+
+    tolerance = 1e-6 * np.abs(moved).max() + 1e-12
+    for output, source, slope in zip(table["output"], table["source"], table["sensitivity"], strict=True):
+        if f" {output}" not in unknown:
+            at = expected(str(output))[["load.fx", "load.fy"].index(source)]
+            assert slope == pytest.approx(at, abs=tolerance), (output, source)
 
 
 @settings(max_examples=25)

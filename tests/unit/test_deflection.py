@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.stiffness import ARM, FIVE_BAR, METRES, matrix
+from helpers.stiffness import ARM, FIVE_BAR, METRES, ask_stiffness, matrix
 from helpers.studies import study_of
 from scipy.special import ndtr
 
@@ -46,6 +46,14 @@ def pick(result: Result, table: str, column: str, **chosen: object) -> np.ndarra
     return found[column][rows]
 
 
+def lower_line(text: str, load: np.ndarray) -> float:
+    """How far a load turns the line of the arm's lower link, by the displacements of its ends."""
+    table = mechdesign.stiffness(study_of(text, f"stiffness.loads={[load.tolist()]}")).tables["displacements"]
+    own = table["link"] == "lower"
+    x, y, dx, dy = (np.diff(table[name][own])[0] for name in ("x", "y", "dx", "dy"))
+    return float((complex(dx, dy) / complex(x, y)).imag)
+
+
 def test_an_output_errs_by_compliance_times_load() -> None:
     """Mean C F of the fixed load, and sigma C sigma_F of one that varies alone."""
     study = mechdesign.load(
@@ -70,6 +78,8 @@ def test_a_random_load_is_a_source_beside_the_dimensions() -> None:
     text = ARM + LOADED
     result = ask(text, "reliability.methods=[analytic, second_order, monte_carlo, quasi_monte_carlo]")
     soft = matrix(mechdesign.stiffness(study_of(text)), "C")
+    # The angle of a link that bends is that of the line between its ends.
+    soft[2] = [lower_line(text, load) for load in np.eye(3)]
     turn = np.radians(30)
     length = np.array([np.cos(turn), np.sin(turn), 0.0]) * 1e-5 / 3
     parts = np.stack([length, soft[:, 0] * 20, soft[:, 2] * 1.0])
@@ -128,22 +138,100 @@ def test_points_of_a_rigid_platform_move_about_the_loaded_one() -> None:
 
 
 def test_outputs_without_a_known_deflection_are_named() -> None:
-    """What turns at an elastic link's foot is not the link's angle; a velocity is that of the unloaded mechanism."""
-    result = ask(ARM + LOADED, "reliability.outputs=[P, upper.angle]", "reliability.rates={shoulder: 10}")
+    """A link of three points has no line of its own where it bends; a velocity is that of the unloaded mechanism."""
+    text = ARM.replace("[O, E, 0.5]", "{O: [0, 0], F: [0.2, 0.1], E: [0.5, 0]}").replace(
+        "E: [0", "F: [0.2, 0.2], E: [0"
+    )
+    text = text.replace("{O: [0, 0], F: [0.2, 0.1], F: [0.2, 0.2], E", "{O: [0, 0], F: [0.2, 0.1], E") + LOADED
+    changes = ["reliability.outputs=[P, upper.angle]", "reliability.dimensions={shoulder: 0.1, load.fx: 1}"]
+    result = ask(text, *changes, "reliability.rates={shoulder: 10}", "reliability.methods=analytic")
     (told,) = [warning for warning in result.warnings if "deflection" in warning]
     for name in ("upper.angle", "upper.angle_velocity", "P.x_velocity", "P.y_acceleration"):
         assert f" {name}," in told or f" {name}:" in told
     assert " P.x," not in told
     unloaded = ask(
-        ARM + LOADED, "reliability.outputs=[upper.angle]", "reliability.load=[0, 0, 0]",
-        "reliability.dimensions={upper.length: 1e-5, shoulder: 0.1}", "reliability.methods=analytic",
+        text, "reliability.outputs=[upper.angle]", "reliability.load=[0, 0, 0]",
+        "reliability.dimensions={upper.E.x: 1e-5, shoulder: 0.1}", "reliability.methods=analytic",
     )  # fmt: skip
     loaded = ask(
-        ARM + LOADED, "reliability.outputs=[upper.angle]", "reliability.dimensions={upper.length: 1e-5, shoulder: 0.1}",
+        text, "reliability.outputs=[upper.angle]", "reliability.dimensions={upper.E.x: 1e-5, shoulder: 0.1}",
         "reliability.methods=analytic",
     )  # fmt: skip
     for column in ("mean", "sigma"):
         assert pick(loaded, "moments", column) == pytest.approx(pick(unloaded, "moments", column), rel=1e-12)
+
+
+CANTILEVER = (
+    METRES
+    + """
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: ARM}
+  drives: {q: {angle: arm}}
+  sketch: {P: [0.7, 0.3]}
+  measures: {tilt: {angle: [ground, arm]}}
+stiffness: {link: arm, at: P, sections: {rod: {E: 200 GPa, diameter: 0.02}}, elastic: {arm: rod}, poses: [{q: 25}]}
+reliability: {poses: [{q: 25}], dimensions: {load.fy: 1}, outputs: [arm.angle, tilt], methods: analytic}
+"""
+)
+
+
+@pytest.mark.parametrize(("arm", "at", "a"), [
+    ("{from: O, to: P, length: 0.8, points: {M: [0.3, 0]}}", "P", 0.8),
+    ("{from: O, to: P, length: 0.8, points: {M: [0.3, 0]}}", "M", 0.3),
+    ("{O: [0, 0], P: [0.8, 0]}", "P", 0.8),
+])  # fmt: skip
+def test_the_angle_of_a_link_that_bends_is_that_of_the_line_between_its_ends(arm: str, at: str, a: float) -> None:
+    """A force across at a moves the tip of a cantilever by F a^2 (3 L - a) / 6 E I, a moment by M a (2 L - a) / 2 E I.
+
+    Wherever it is asked; the section there turns by another angle, of which the stiffness speaks.
+    """
+    length, bending, across, moment = 0.8, 200e9 * np.pi / 64 * 0.02**4, -40.0, 6.0
+    load = [across * -float(np.sin(np.radians(25))), across * float(np.cos(np.radians(25))), moment]
+    text = CANTILEVER.replace("ARM", arm)
+    result = ask(text, f"stiffness.at={at}", f"reliability.load={load}")
+    tip = across * a**2 * (3 * length - a) / (6 * bending) + moment * a * (2 * length - a) / (2 * bending)
+    shift = np.radians(pick(result, "moments", "mean") - pick(result, "moments", "nominal"))
+    assert shift == pytest.approx([tip / length] * 2, rel=1e-8)
+    section = ask_stiffness(text, f"stiffness.at={at}", f"stiffness.loads={[load]}").tables["deflections"]
+    assert section["dphi"][0] == pytest.approx(across * a**2 / (2 * bending) + moment * a / bending, rel=1e-8)
+    assert [text for text in result.warnings if "bends" in text] == [
+        "arm.angle, tilt: arm bends, and its angle is that of the line from O to P"
+    ]
+
+
+def test_the_angle_of_a_leg_whose_rod_bends_is_that_of_the_line_between_its_ends() -> None:
+    """A boom on a telescopic leg: by the displacements of the leg's own ends, and by the leg's rod in line with it."""
+    text = (
+        METRES
+        + """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [-0.1, -0.3]}
+    boom: {O: [0, 0], M: [0.25, 0.02], T: [0.6, 0]}
+    leg: {from: D, to: M, telescopic: true}
+  drives: [leg]
+  sketch: {T: [0.6, 0], M: [0.25, 0]}
+stiffness:
+  link: boom
+  at: T
+  sections: {rod: {E: 200 GPa, diameter: 0.02}}
+  elastic: {leg: rod}
+  actuators: {leg: 2e6}
+  bearings: {M: 1e6, leg: {radial: 1e6, moment: 1e3}}
+  poses: [{boom.angle: 10}]
+reliability:
+  {poses: [{boom.angle: 10}], dimensions: {load.fy: 1}, load: [5, -40, 2], outputs: [leg.angle, boom.angle, leg.M],
+   methods: analytic}
+"""
+    )
+    result = ask(text)
+    turn, boom, x, y = pick(result, "moments", "mean") - pick(result, "moments", "nominal")
+    solved = study_of(text).mechanism.solve({"boom.angle": 10})
+    span = complex(solved["M.x"] + 0.1, solved["M.y"] + 0.3)
+    assert np.radians(turn) == pytest.approx((complex(x, y) / span).imag, rel=1e-8)
+    deflections = ask_stiffness(text, "stiffness.loads=[[5, -40, 2]]").tables["deflections"]
+    assert np.radians(boom) == pytest.approx(deflections["dphi"][0], rel=1e-8)
+    assert abs(turn) > 1e-4
 
 
 def test_one_load_of_the_stiffness_section_counts_and_of_several_one_has_to_be_named() -> None:

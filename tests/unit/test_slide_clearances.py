@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import StudyError
@@ -143,3 +144,48 @@ def test_a_slot_and_a_pin_have_no_length_and_form_no_walls():
     for text in (GUIDED.replace("PIN", "contact"), slot):
         with pytest.raises(StudyError, match="ask for monte_carlo or quasi_monte_carlo"):
             mechdesign.load(text=text.replace("second_order", "form"))
+
+
+def test_a_guide_is_where_its_links_have_it_however_their_pins_lie() -> None:
+    """Pins with clearances at all points of a guide: its line through two points, at an angle, and what slides on it.
+
+    The block's lug T keeps its distance from the line of the bar, and turns with it.
+    """
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0], Q: [200, -30]}
+    bar: {O: [0, 0], R: [150, 40]}
+    crank: [O, A, 60]
+    coupler: [A, B, 110]
+    block: {B: [5, 3], T: [20, 30]}
+    prop: [R, S, 90]
+    foot: [Q, S, 100]
+  joints: {guide: {prismatic: [bar, block], through: [O, R], point: B}}
+  drives: {tilt: {angle: bar}, theta: {angle: crank}}
+  sketch: {R: [150, 40], A: [20, 56], B: [128, 34], S: [220, 60]}
+  measures:
+    line: bar.angle + atan2(40, 150)
+    lug: (T.y - O.y)*cos(line) - (T.x - O.x)*sin(line)
+    turn: {angle: [bar, block]}
+reliability:
+  poses: [{tilt: 0, theta: 70}]
+  clearances:
+    O: {radial: 0.3, link: crank}
+    B: {radial: 0.3, link: block}
+    R: {radial: 0.3, link: bar}
+  outputs: [lug, turn, T, coupler.B]
+  methods: [analytic, monte_carlo]
+  samples: 2000
+"""
+    table = mechdesign.reliability(study_of(text)).tables["moments"]
+    still = np.isin(table["output"], ["lug", "turn"])
+    assert table["sigma"][still] == pytest.approx(np.zeros(4), abs=1e-9)
+    assert (table["sigma"][~still] > 0.03).all()
+    moving = study_of(
+        text, "reliability.rates={theta: 60, tilt: 30}", "reliability.outputs=[T, coupler.B]",
+        "reliability.samples=40000",
+    )  # fmt: skip
+    rates = mechdesign.reliability(moving).tables["moments"]
+    analytic, sampled = (rates["sigma"][rates["method"] == method] for method in ("analytic", "monte_carlo"))
+    assert sampled == pytest.approx(analytic, rel=0.03)

@@ -15,7 +15,7 @@ from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, 
 from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
-from mechdesign.analyses.reliability.deflection import Elastic, elasticity, unknown
+from mechdesign.analyses.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, reached
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
 from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
@@ -170,7 +170,7 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             linear.components[:, :, rows[block]] = found.components
         groups.append((solved, rates))
     if bent is not None and elastic is not None:
-        doubts += unknown(bent, channels)
+        doubts += cautions(study, bent, channels)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~elastic.held, np.int8(Reason.NOT_HELD), reason)
         linear = replace(linear, offset=elastic.offset)
     task = Task(study, poses, question, sources, reason, nominal, linear, elastic)

@@ -1,8 +1,9 @@
 """Elastic deflections among the errors: the stiffness section's mechanism under a load at its point.
 
 A deflection is the compliance of the nominal pose times the load, fixed or random: error += C(pose) F. It is known of
-the points and rigid links that the stiffness model knows, and joins the errors of positions and angles; what moves
-slowly under its load has the velocities and accelerations of the unloaded mechanism.
+the points that the stiffness model knows, of the angles of rigid links and of links with two ends, and joins the errors
+of positions and angles; what moves slowly under its load has the velocities and accelerations of the unloaded
+mechanism.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ import numpy as np
 
 from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.stiffness.analysis import Body
+from mechdesign.analyses.stiffness.elements import corners_of
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
+from mechdesign.study.schema.reliability import links_meant
 from mechdesign.study.schema.variation import LOADS
 
 
@@ -64,15 +67,26 @@ class Elastic:
 class Elasticity:
     """The loaded mechanism, ready for any number of poses.
 
-    `nodes` are the points whose displacement is known, and `bodies` the links whose rotation is, with the vertices of
-    the stiffness network that bear them; of the ground the empty word.
+    Parameters
+    ----------
+    ends : mapping of (str, int) to str
+        Points of links, by link and node, whose displacement is known, and the vertices of the stiffness network that
+        bear them; of the ground the empty word.
+    pins : mapping of int to tuple of str
+        Points by their plain names: the vertices in whose middle each lies.
+    bodies : mapping of str to str
+        Links that stay straight, and their vertices likewise.
+    lines : mapping of str to (int, int)
+        Links that do not: the ends between which their x axis runs.
     """
 
     mechanism: Mechanism
     asked: Body
     load: Floats
-    nodes: Mapping[int, str]
+    ends: Mapping[tuple[str, int], str]
+    pins: Mapping[int, tuple[str, ...]]
     bodies: Mapping[str, str]
+    lines: Mapping[str, tuple[int, int]]
 
     def knows(self, channel: Channel) -> bool:
         """Whether a channel's deflection is known."""
@@ -85,9 +99,9 @@ class Elasticity:
         if kind == "expression":
             return all(self._knows(part) for part in coordinate.parts)
         if kind == "angle":
-            return coordinate.body in self.bodies and coordinate.reference in self.bodies
-        nodes = (coordinate.node, coordinate.other) if kind == "distance" else (coordinate.node,)
-        return kind != "slide" and all(node in self.nodes for node in nodes)
+            return {coordinate.body, coordinate.reference} <= self.bodies.keys() | self.lines.keys()
+        points = ((link, node) in self.ends if link else node in self.pins for link, node in coordinate.ends)
+        return kind != "slide" and all(points)
 
     def at(self, configuration: Configuration, channels: Sequence[Channel]) -> Elastic:
         """How channels yield in a flat batch of configurations; nan where one is not assembled."""
@@ -112,14 +126,22 @@ class Elasticity:
         loaded = load(twists, asked.size)
         moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
         origin = configuration.point(asked.section.at)
-        graph = self.mechanism.graph
+        graph, places = self.mechanism.graph, configuration.nodes
+
+        def shift(node: int, vertex: str) -> Value:
+            if not vertex:
+                return 0.0
+            dx, dy, turn = np.moveaxis(moved[vertex], 0, -1)
+            return np.asarray(dx + 1j * dy + 1j * turn * (places[node] - origin))
+
+        ends = {(link, node): shift(node, vertex) for (link, node), vertex in self.ends.items()}
         nodes: list[Value] = [0.0] * len(graph.nodes)
-        for node, vertex in self.nodes.items():
-            if vertex:
-                dx, dy, turn = np.moveaxis(moved[vertex], 0, -1)
-                nodes[node] = dx + 1j * dy + 1j * turn * (configuration.nodes[node] - origin)
-        turned = {body: moved[vertex][:, 2].T for body, vertex in self.bodies.items() if vertex}
-        return Rates(nodes, [0.0] * graph.classes, [0.0] * len(graph.slides), turned), held
+        for node, vertices in self.pins.items():
+            nodes[node] = sum(shift(node, vertex) for vertex in vertices) / len(vertices)
+        turned: dict[str, Value] = {body: moved[vertex][:, 2].T for body, vertex in self.bodies.items() if vertex}
+        for link, (tail, head) in self.lines.items():
+            turned[link] = np.imag((ends[link, head] - ends[link, tail]) / (places[head] - places[tail]))
+        return Rates(nodes, [0.0] * graph.classes, [0.0] * len(graph.slides), turned, ends=ends), held
 
 
 def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
@@ -141,28 +163,51 @@ def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
     from mechdesign.analyses.stiffness.analysis import ask
 
     asked, mechanism = ask(study), study.mechanism
-    network, graph = asked.network, mechanism.graph
-    nodes = {graph.node(point): "" for point in mechanism.description.links[GROUND].points}
-    bodies = {GROUND: ""}
+    network, graph, links = asked.network, mechanism.graph, mechanism.description.links
+    ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
+    bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
     for link, points in network.points.items():
-        for point, vertex in points:
-            if vertex in network.paths:
-                nodes.setdefault(graph.node(point), vertex)
-        vertices = {vertex for _, vertex in points}
-        if len(vertices) == 1 and vertices <= network.paths.keys():
-            bodies[link] = vertices.pop()
-    nodes[graph.node(stiffness.at)] = network.asked
-    if stiffness.link is not None:
-        bodies[stiffness.link] = network.asked
-    return Elasticity(mechanism, asked, load, nodes, bodies), notes
+        borne = {(link, graph.node(point)): vertex for point, vertex in points if vertex in network.paths}
+        corners = [(link, graph.node(point)) for point in corners_of(links[link])]
+        if len(borne) == len(points) and len({*borne.values()}) == 1:
+            bodies[link] = next(iter(borne.values()))
+        elif len(corners) == 2 and borne.keys() >= {*corners}:
+            lines[link] = corners[0][1], corners[1][1]
+        ends |= borne
+    # Of the ground where that has the point, else of any link.
+    pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
+    if stiffness.at == stiffness.point:
+        pins[graph.node(stiffness.at)] = (network.asked,)
+    for point, meant in links_meant(section, stiffness, graph).items():
+        node = graph.node(point)
+        if point in stiffness.bearings and (len(meant) == 1 or point != stiffness.at):
+            pins[node] = (ends[meant[0], node],) if len(meant) == 1 else network.pin(point) or pins[node]
+    return Elasticity(mechanism, asked, load, ends, pins, bodies, lines), notes
 
 
-def unknown(loaded: Elasticity, channels: Sequence[Channel]) -> list[str]:
-    """A warning that names the channels whose deflection is not known."""
+def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[str]:
+    """Warnings that name channels whose deflection is not known, and those that could be understood in two ways."""
+    positions = [channel for channel in channels if channel.order == 0]
+    sentences = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]
-    if not lost:
-        return []
-    return [
-        f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
-        "mechanism"
-    ]
+    if lost:
+        sentences.append(
+            f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
+            "mechanism"
+        )
+    graph, section = loaded.mechanism.graph, loaded.asked.section
+    for point, links in links_meant(study.reliability, section, graph).items():
+        about = [channel.name for channel in positions if ("", graph.node(point)) in channel.coordinate.ends]
+        if about and len(links) > 1 and point in section.bearings and point != section.at:
+            ends = " and ".join(f"{link}.{point}" for link in links)
+            sentences.append(
+                f"{', '.join(about)}: the pin {point} gives, and {point} is midway between its ends {ends}; name one "
+                "of them where that is meant"
+            )
+    for link in filter(section.elastic.__contains__, loaded.lines):
+        angles = [(channel.name, angles_of([channel.coordinate]).values()) for channel in positions]
+        about = [name for name, turns in angles if any(link in (turn.body, turn.reference) for turn in turns)]
+        if about:
+            ends = " to ".join(graph.nodes[node] for node in loaded.lines[link])
+            sentences.append(f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}")
+    return sentences

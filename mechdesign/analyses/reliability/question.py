@@ -17,7 +17,7 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, others, split_order
+from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, links_meant, others, split_order
 from mechdesign.study.text import fields
 
 
@@ -187,7 +187,7 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
 
     def known(name: str) -> bool:
         try:
-            return name in mechanism.points or bool(mechanism.coordinate(name))
+            return mechanism.graph.is_point(name) or bool(mechanism.coordinate(name))
         except MechanismError:
             return False
 
@@ -200,8 +200,8 @@ def unsaid(study: Study, question: ReliabilityQuestion) -> list[str]:
     names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
     sentences = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
-        node = study.mechanism.graph.node(point)
-        about = [c.name for c in question.channels if not c.order and node in _nodes(c.coordinate)]
+        plain = ("", study.mechanism.graph.node(point))
+        about = [c.name for c in question.channels if not c.order and plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
             sentences.append(
@@ -216,18 +216,13 @@ def _named(name: str, point: str) -> bool:
     return rest == point or rest.startswith((f"{point}.", f"{point}_"))
 
 
-def links_meant(study: Study, coordinate: Coordinate) -> str:
-    """The links whose points a coordinate is about, as far as their pins have clearances."""
-    nodes = _nodes(coordinate)
-    found = [
-        " ".join(rest)
-        for point, (_, rest) in others(study.reliability, study.mechanism.graph).items()
-        if study.mechanism.graph.node(point) in nodes
+def holders(study: Study, coordinate: Coordinate) -> str:
+    """The links whose points a coordinate is about, as far as their pins have clearances or give."""
+    graph = study.mechanism.graph
+    names = [
+        link or " ".join(links)
+        for point, links in links_meant(study.reliability, study.stiffness, graph).items()
+        for link, node in coordinate.ends
+        if node == graph.node(point)
     ]
-    return " ".join(dict.fromkeys(found))
-
-
-def _nodes(coordinate: Coordinate) -> set[int]:
-    """Points that a coordinate depends on itself."""
-    own = {coordinate.node, coordinate.other} - {-1}
-    return own.union(*(_nodes(part) for part in coordinate.parts))
+    return " ".join(dict.fromkeys(names))

@@ -12,7 +12,7 @@ from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
 from mechdesign.analyses.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.analyses.reliability.first_order import correlation
-from mechdesign.analyses.reliability.question import ReliabilityQuestion, links_meant
+from mechdesign.analyses.reliability.question import ReliabilityQuestion, holders
 from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Strings, Task
@@ -212,13 +212,13 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
     below += [study.units.label("length")] * pins
     units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
-    links = np.array([links_meant(task.study, c.coordinate) for c in task.question.channels])
+    links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
     columns = [
         *at_poses(task, pose),
         Column("source", names[source], meaning="parameter, dimension, drive, or joint's clearance"),
         *of_channels(task, channel),
         Column("on", links[channel],
-               meaning="links whose point the output is, where its pin has a clearance: the pin moves in another link"),
+               meaning="links whose point the output is, where its pin has a clearance or gives; of several, midway"),
         Column("sensitivity", sensitivity.ravel(),
                meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
         Column("derivative", (sensitivity * task.scale[:, None] * factors).ravel(),

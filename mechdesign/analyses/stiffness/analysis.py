@@ -64,7 +64,7 @@ class Body:
     size : int
         3 for a body's twist, 2 for the displacement of a pin.
     condensed : bool
-        The pin is a point of one link only: the link turns freely under forces at it.
+        The pin is a point of one link only, or its end on one: the link turns freely under forces at it.
     length : float
         What turns rotations into lengths where sizes are compared; no result depends on it.
     """
@@ -195,17 +195,14 @@ def ask(study: Study) -> Body:
     if section is None:
         message = "is missing: say which point's stiffness is asked, for example {link: platform, at: P}"
         raise StudyError((study.problem(message, "stiffness"),))
-    mechanism = study.mechanism
-    link = section.link
-    bearers = [name for name, other in mechanism.description.links.items()
-               if section.at in other.points or section.at in (other.ends or ())]  # fmt: skip
-    condensed = link is None and len(bearers) == 1
-    if condensed:
-        link = bearers[0]
-    standing = build_bodies(mechanism, link, section.at, section)
-    pinned = build_bodies(mechanism, None, section.at, section) if condensed else standing
+    mechanism, point = study.mechanism, section.point
+    link, links = section.bearer, mechanism.graph.links_at(point)
+    lone = link is None and len(links) == 1
+    standing = build_bodies(mechanism, links[0] if lone else link, point, section)
+    pinned = build_bodies(mechanism, None, point, section) if lone else standing
     legs = find_legs(standing, list(mechanism.description.links))
     network = build_network(pinned)
+    condensed = section.link is None and (lone or link is not None)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, _spread(mechanism, network))
 
 

@@ -282,6 +282,13 @@ class Network:
                 found[edge.name] = (*found.get(edge.name, ()), k)
         return tuple(found.values())
 
+    def pin(self, point: str) -> tuple[str, ...]:
+        """Vertices of which the pin at a point is the middle, where it gives: itself, or both ends; none elsewhere."""
+        for edge in self.edges:
+            if edge.name == point and any(isinstance(element, Bearing) for element in edge.elements):
+                return (edge.a,) if is_pin(edge.a) else (edge.a, edge.b)
+        return ()
+
     def signs(self, way: Sequence[tuple[int, int]]) -> Floats:
         """Sign of each edge on a way, 0 where it is not on it, shape (edges,)."""
         found = np.zeros(len(self.edges))

@@ -2,22 +2,24 @@
 
 Where a pin has a clearance its links have that point in places of their own. The clearance moves the pin in one link;
 the point's coordinates are those of the other links. An output or a limit may name its link, ``coupler.P.x``, and then
-the pin moves in another one.
+the pin moves in another one. Where the pin gives, by a bearing of the stiffness section, every link has an end of it.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from mechdesign.commands import COMMANDS
-from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.graph import GROUND, OF_LINKS, Graph
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.variation import (
     LOADS,
     Clearance,
@@ -260,11 +262,15 @@ class ReliabilitySection(MotionSection):
         if self.allocate is not None:
             _allocate(checker, self, dimensions, clearances)
         load = _load(checker, self, dimensions)
-        plain = {name: split_link(checker.mechanism, name)[1] for name in (*(self.outputs or ()), *self.limits)}
-        limits = {plain[name]: limit for name, limit in self.limits.items()}
-        if len(limits) < len(self.limits):
+        parts = {name: split_link(checker.mechanism, name) for name in (*(self.outputs or ()), *self.limits)}
+        stiffness = checker.parts.get("stiffness")
+        springs = set(stiffness.bearings if stiffness is not None else ()) - self.clearances.keys()
+        if len({name if parts[name][2] in springs else parts[name][1] for name in self.limits}) < len(self.limits):
             checker.report(("reliability", "limits"), "the same error is limited twice; leave one out")
-        outputs = None if self.outputs is None else tuple(plain[name] for name in self.outputs)
+        # Of a pin with a clearance all names mean the one link of which it is asked.
+        names = {name: plain if point in self.clearances else name for name, (_, plain, point) in parts.items()}
+        limits = {names[name]: limit for name, limit in self.limits.items()}
+        outputs = None if self.outputs is None else tuple(names[name] for name in self.outputs)
         checker.outputs(outputs, ("reliability", "outputs"))
         filled = {"dimensions": dimensions, "clearances": clearances, "load": load}
         return super().checked(checker).model_copy(update=filled | {"outputs": outputs, "limits": limits})
@@ -275,30 +281,31 @@ def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
     link, _, rest = name.partition(".")
     points = {part: point for point in mechanism.owners for part in (point, *mechanism.coordinates_of(point))}
     base, _ = split_order(rest, points.__contains__)
-    if name in mechanism.coordinates or link not in mechanism.links or base not in points:
+    if base in OF_LINKS or link not in mechanism.links or base not in points:
         return "", name, ""
     return link, rest, points[base]
 
 
 def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
-    """The link that outputs and limits mean by each point, where they say; what contradicts itself is noted."""
+    """The link of which each point with a clearance is asked, where that is said; what contradicts itself is noted."""
     found: dict[str, str] = {}
     given: list[tuple[KeyPath, str, bool]] = [
         *((("reliability", "outputs", k), name, False) for k, name in enumerate(section.outputs or ())),
         *((("reliability", "limits", name), name, True) for name in section.limits),
     ]
-    for path, name, at_key in given:
-        link, _, point = split_link(checker.mechanism, name)
+    if (workspace := checker.parts.get("workspace")) is not None:
+        given.append((("workspace", "point"), workspace.point, False))
+    for path, part, at_key in [(path, part, key) for path, name, key in given for part in _parts(checker, name)]:
+        link, _, point = split_link(checker.mechanism, part)
         if not link:
             continue
-        links = checker.mechanism.owners[point]
+        links, own = checker.mechanism.owners[point], section.clearances.get(point)
         if link not in links:
             message = f"link {link!r} has no point {point!r}; it belongs to {' and '.join(links)}"
             checker.report(path, message, at_key=at_key)
-        elif found.setdefault(point, link) != link:
+        elif own is not None and found.setdefault(point, link) != link:
             message = f"{point!r} is that of link {found[point]!r} elsewhere; all outputs and limits mean one of them"
             checker.report(path, message, at_key=at_key)
-        own = section.clearances.get(point)
         if own is not None and link in links and (own.link == link or len(links) < 2):
             message = (
                 f"the clearance of {point!r} moves its pin in link {link!r}, and the coordinates of {point!r} are "
@@ -306,6 +313,17 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
             )
             checker.report(path, message, at_key=at_key)
     return found
+
+
+def _parts(checker: Checker, name: str) -> list[str]:
+    """A coordinate, and the names in it where it is a measure, its velocity or its acceleration."""
+    measures, names = checker.mechanism.measures, [name]
+    for part in names:
+        measure = measures.get(split_order(part, measures.__contains__)[0])
+        if measure is not None:
+            words = measure.distance or re.findall(r"[\w.]+", measure.expression or "")
+            names += [word for word in words if word not in names]
+    return names
 
 
 def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension]) -> tuple[float, ...] | None:
@@ -376,9 +394,24 @@ def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tup
     for point, clearance in (section.clearances if section is not None else {}).items():
         if point in graph.slides:
             continue
-        links = [body.removesuffix(":rod") for body, name in graph.points if name == point]
-        found[point] = clearance.link or "", [link for link in dict.fromkeys(links) if link != clearance.link]
+        found[point] = clearance.link or "", [link for link in graph.links_at(point) if link != clearance.link]
     return found
+
+
+def links_meant(
+    section: ReliabilitySection | None, stiffness: StiffnessSection | None, graph: Graph
+) -> dict[str, list[str]]:
+    """Of each pin that has a clearance or gives, the links whose ends of it its plain name means.
+
+    Of a pin that gives these are all, and it lies midway; but where the ground has it, or the stiffness section asks it
+    of a link, that one.
+    """
+    meant: dict[str, list[str]] = {}
+    if stiffness is not None:
+        bodies = {stiffness.at: [stiffness.link]} if stiffness.link is not None else {}
+        pins = {point: links for point in stiffness.bearings if (links := graph.links_at(point))}
+        meant = {point: [GROUND] if GROUND in links else bodies.get(point, links) for point, links in pins.items()}
+    return meant | {point: rest for point, (_, rest) in others(section, graph).items()}
 
 
 def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:

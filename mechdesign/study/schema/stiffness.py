@@ -113,8 +113,10 @@ class StiffnessSection(PoseSection):
     """Link whose stiffness is asked, as a body. Left out: the pin ``at`` alone, which has dx and dy only. Example:
     platform
     """
-    at: fields.PointName
-    """The point whose stiffness is asked. Example: P"""
+    at: fields.EndName
+    """The point whose stiffness is asked. Without ``link`` a pin that gives is midway between its links; rod.B is its
+    end on link rod. Example: P
+    """
     sections: dict[str, Profile] = Field(default_factory=dict)
     """Cross-sections by name, for ``elastic``. Example: {beam: {E: 200 GPa, width: 20 mm, height: 40 mm}}"""
     elastic: dict[fields.LinkName, str] = Field(default_factory=dict)
@@ -127,8 +129,8 @@ class StiffnessSection(PoseSection):
     is moment per radian. Example: {l1: 5e7, theta1: 1e5 N*m/rad} Example: {theta: [3e4 N*m/rad, 1.5e4 N*m/rad]}
     """
     bearings: dict[fields.BearingName, Bearing] = Field(default_factory=dict)
-    """Stiffness of pins (by their point) and slides (by their joint or telescopic link); others are rigid. Example: {B:
-    1e5 N/mm, guide: {radial: 2e5 N/mm, moment: 1e6 N*m/rad}}
+    """Stiffness of pins (by their point) and slides (by their joint or telescopic link); others are rigid. Every link
+    at a pin that gives has an end of it, rod.B. Example: {B: 1e5 N/mm, guide: {radial: 2e5 N/mm, moment: 1e6 N*m/rad}}
     """
     direction: fields.Angle | None = None
     """Angle from the world's x axis of the direction whose stiffness is k_direction. Left out: that column is not
@@ -141,15 +143,26 @@ class StiffnessSection(PoseSection):
     characteristic_length: fields.PositiveLength | None = None
     """Length as which a radian counts; then the eigen-stiffnesses of ``link`` are reported. Example: 0.1"""
 
+    @property
+    def point(self) -> str:
+        """The asked point without its link."""
+        return self.at.rpartition(".")[2]
+
+    @property
+    def bearer(self) -> str | None:
+        """The link whose point is asked; None of a pin."""
+        return self.link or self.at.rpartition(".")[0] or None
+
     def checked(self, checker: Checker) -> Self:
         """Check what is named as well, and the units of stiffnesses; loads get three numbers."""
         root: KeyPath = ("stiffness",)
-        right = checker.known(self.at, checker.mechanism.owners, "point", (*root, "at"))
-        if right and self.link is None and GROUND in checker.mechanism.owners[self.at]:
+        owners, ends = checker.mechanism.owners, checker.mechanism.ends
+        right = checker.known(self.at, [*owners, *ends], "point", (*root, "at"))
+        if right and GROUND in (owners[self.at] if self.bearer is None else [self.bearer]):
             checker.report((*root, "at"), f"point {self.at!r} belongs to the ground and does not move")
         if self.link is not None and checker.known(self.link, checker.mechanism.moving, "moving link", (*root, "link")):
             points = checker.mechanism.points_of(self.link)
-            if right and self.at not in points:
+            if right and self.at not in points and self.at != f"{self.link}.{self.point}":
                 message = f"link {self.link!r} has no point {self.at!r}; it has {', '.join(points)}"
                 checker.report((*root, "at"), message)
         for link, profile in self.elastic.items():

@@ -55,7 +55,7 @@ def deflections_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | Non
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
-    shapes, at = _shapes(drawn, scene), scene.points[asked.section.at]
+    shapes, at = _shapes(drawn, scene), scene.points[asked.section.point]
     loads = np.array(asked.section.loads[:MAX_LOADS])[:, : asked.size]
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
@@ -115,7 +115,7 @@ def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
 
     The first begins at the asked point.
     """
-    network, at, moved = drawn.body.network, scene.points[drawn.body.section.at], drawn.twists
+    network, at, moved = drawn.body.network, scene.points[drawn.body.section.point], drawn.twists
 
     def shift(vertex: str, place: complex) -> Complexes:
         dx, dy, turn = moved[vertex]
@@ -201,7 +201,7 @@ def directions_figure(study: Study, result: Result) -> Figure | None:
     for row, scale in zip(rows, scales, strict=True):
         xx, xy, yy = (float(soft[name][row]) for name in ("C11", "C12", "C22"))
         ellipses.append(scale * (xx * turns.real + xy * turns.imag + 1j * (xy * turns.real + yy * turns.imag)))
-    places = [[*scene.points.values(), *(scene.points[section.at] + ellipse)]
+    places = [[*scene.points.values(), *(scene.points[section.point] + ellipse)]
               for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
     words = f"{force:g} {style.printed(study.units.label('force'))}"
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
@@ -214,7 +214,7 @@ def directions_figure(study: Study, result: Result) -> Figure | None:
     units = study.units.label("stiffness"), study.units.label("angle")
     shapes = zip(panels, scenes.items(), rows, scales, ellipses, where, strict=True)
     for axes, (k, scene), row, scale, ellipse, words in shapes:
-        at = scene.points[section.at]
+        at = scene.points[section.point]
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_symbol_size(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
         axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)

@@ -57,7 +57,7 @@ def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
             anchor = base
         else:
             # Its line passes the leg's base: away from the body.
-            body = scene.points[drawn.body.section.at]
+            body = scene.points[drawn.body.section.point]
             anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
         text = quantity(stiffness, study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
@@ -128,7 +128,7 @@ def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | N
     scene = pose(study.mechanism, drawn.configuration)
     if scene is None:
         return None
-    at = scene.points[section.at]
+    at = scene.points[section.point]
     body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
     turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
     rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
