@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -102,6 +103,8 @@ _FUNCTIONS: dict[str, _Function] = {
     "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
+# Functions whose value repeats, and after how many turns.
+_TURNS = {"atan2": 1.0, "atan": 0.5}
 _OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
 _UNARY_BINDING = 30
 
@@ -169,6 +172,62 @@ class Expression:
 
         found: int = self._run(lambda value: 0, lambda name: 1, degree)
         return found <= 1
+
+    def is_angle(self, quantities: Mapping[str, str]) -> bool:
+        """Whether the value is an angle, by the quantities of variables: one itself, or a sum of whole multiples of some.
+
+        Other variables are numbers. A bare number beside an angle is one in the same unit. Any other multiple may be
+        an arc as well.
+        """
+
+        def kind(function: str, inner: list[str]) -> str:
+            """``angle``, ``whole`` or other ``number``, or ``other``: nothing that may stand beside an angle."""
+            if _FUNCTIONS[function].angles == "gives":
+                return "angle"
+            if "angle" not in inner:
+                return (
+                    "other" if "other" in inner else "whole" if {*inner} == {"whole"} and function != "/" else "number"
+                )
+            if function in ("+", "-", "negate", "abs", "min", "max"):
+                return "other" if "other" in inner else "angle"
+            return (
+                "angle"
+                if (function == "*" and "whole" in inner) or (function == "/" and inner[1] == "whole")
+                else "other"
+            )
+
+        def variable(name: str) -> str:
+            quantity = quantities.get(name, "number")
+            return quantity if quantity in ("angle", "number") else "other"
+
+        def constant(value: float) -> str:
+            return "whole" if value.is_integer() else "number"
+
+        return bool(self._run(constant, variable, kind) == "angle")
+
+    def turning(self, name: str) -> tuple[Expression, dict[str, tuple[Expression, float]]]:
+        """The expression with variables in place of its arctangents, and these, each with the turn after it repeats.
+
+        An arctangent jumps where a direction passes half a turn, or a line a quarter; as a variable it can be followed.
+        `name` begins the names of the variables.
+        """
+        found: dict[str, tuple[Expression, float]] = {}
+        stack: list[tuple[_Step, ...]] = []
+        for step in self.program:
+            kind, item = step
+            if kind != "call":
+                stack.append((step,))
+                continue
+            count = arity(str(item))
+            program = (*chain.from_iterable(stack[-count:]), step)
+            if item in _TURNS:
+                variable = f"{name}:{len(found)}"
+                names = frozenset(str(part) for what, part in program if what == "name")
+                found[variable] = Expression(self.text, program, self.angle_unit, names), _TURNS[str(item)]
+                program = (("name", variable),)
+            stack[-count:] = [program]
+        names = frozenset(str(part) for what, part in stack[0] if what == "name")
+        return Expression(self.text, stack[0], self.angle_unit, names), found
 
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]

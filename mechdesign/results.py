@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import pandas
 
+# What a number says that nothing is known of between the poses.
+POSES_ONLY = "of the asked poses only"
 # Meaning of a column of what varies over the cases of a sweep.
 VARIED = "varied"
 # Number of columns that a table's repr names.
@@ -44,6 +46,26 @@ class Column:
         return self.values.dtype.kind in "fiub"
 
 
+@dataclass(frozen=True, eq=False)
+class Scope:
+    """What the rows of a table, one a pose or of all poses together, say of a motion.
+
+    Parameters
+    ----------
+    poses_only : bool
+        Whether nothing is known between the poses asked for.
+    missing : str
+        In words, which poses or parts of the motion are not valid; empty where all are.
+    worst : callable, optional
+        Largest value of a column over the whole motion, or of it times -1, or of its absolute values (by its name, a
+        sign, and whether absolute values count): the value and its place in words; None where none is known.
+    """
+
+    poses_only: bool = False
+    missing: str = ""
+    worst: Callable[[str, int, bool], tuple[float, str] | None] | None = None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Table:
     """Columns of equal length; ``table["sigma"]`` is the NumPy array.
@@ -68,6 +90,7 @@ class Table:
     name: str
     columns: tuple[Column, ...]
     meaning: str = ""
+    scope: Scope | None = None  #: of poses and motions
 
     def __post_init__(self) -> None:
         lengths = {len(column.values) for column in self.columns}
@@ -164,7 +187,9 @@ class LongTable(Table):
 
     def __init__(self, like: Table, count: int, source: Callable[[], Iterator[Table]]) -> None:
         columns = tuple(_LongColumn(column, self._values) for column in like.columns)
-        self.__dict__.update(name=like.name, columns=columns, meaning=like.meaning, _count=count, _source=source)
+        self.__dict__.update(
+            name=like.name, columns=columns, meaning=like.meaning, scope=like.scope, _count=count, _source=source
+        )
 
     def blocks(self) -> Iterator[Table]:
         """The rows, made anew, as tables one after the other."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
-from mechdesign.mechanism.algebra import TURN, Value, wrap
+from mechdesign.mechanism.algebra import TURN, Value
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
@@ -29,20 +30,8 @@ from mechdesign.study.schema.poses import PoseSection
 POSES_AT_ONCE = 65536
 # Threads that solve poses of a long motion: what is made of them is one thread's work, and more would fill the memory.
 _MOST_SOLVERS = 4
-# An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
-ON_THE_CUT = 1e-9
-# What an angle may turn between neighbouring poses so that the way round is certain.
-SURE_TURN = np.pi / 2
-# What is given moves at most this far between poses before any angle is looked at: an angle, and a length as a part of
-# the mechanism's size. A link could turn nearly round within one longer step and seem to stand still.
-MAX_TURN_STEP = np.pi / 4
-MAX_LENGTH_STEP = 0.25
-# Poses between two of the motion, at most: more than these only a jump needs, and it has no way round.
-MAX_PARTS = 4096
 # Poses of a motion that a picture can show.
 MAX_SHOWN_POSES = 2001
-# Solves poses with given values near rows of a study's, both of one shape.
-Solve = Callable[[Sequence[Floats], Ints], Configuration]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +78,15 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
 
 
 def solve_poses(
-    study: Study, poses: Poses, wanted: Sequence[Coordinate] = (), jobs: int | None = 1
+    study: Study, poses: Poses, wanted: Sequence[Coordinate] = (), jobs: int | None = 1, curve: Curve | None = None
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     """Solve each group of poses with the plan of its coordinates, at most `POSES_AT_ONCE` poses at a time.
 
     What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
     motion or a grid, the other angles of the wanted coordinates and of the study's limits, in expressions too, are
     followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
-    (-180, 180] deg. The result is the same for any number of threads, `jobs`.
+    (-180, 180] deg. The result is the same for any number of threads, `jobs`. `curve` is the motion of the poses, with
+    these angles, where it is there already.
 
     Raises
     ------
@@ -104,93 +94,39 @@ def solve_poses(
         Where the coordinates of a pose do not determine the mechanism.
     """
     for group in poses.groups:
-        yield from _solve_group(study, poses, group, wanted, jobs)
+        yield from _solve_group(study, poses, group, wanted, jobs, curve)
 
 
 def _solve_group(
-    study: Study, poses: Poses, group: PoseGroup, wanted: Sequence[Coordinate], jobs: int | None
+    study: Study, poses: Poses, group: PoseGroup, wanted: Sequence[Coordinate], jobs: int | None, curve: Curve | None
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     mechanism: Mechanism = study.mechanism
     plan = mechanism.plan(group.names)
     jobs = min(worker_count(jobs), _MOST_SOLVERS)
     pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
-
-    def given(piece: slice = slice(None)) -> list[Floats]:
-        columns = zip(plan.structure.given, group.columns(), strict=True)
-        return [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
-
-    def solve(values: Sequence[Floats], rows: Ints) -> Configuration:
-        """Poses at or near some rows, not yet judged by the limits."""
-        start = starts(mechanism, poses, rows) if plan.iterative else None
-        return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
+    angles = [] if poses.listed else followed_angles(mechanism, plan, wanted)
+    if angles and curve is None:
+        curve = Curve(study, poses, angles)
+    turns = _Turns(study, poses, angles, curve)
 
     def at(piece: slice) -> Configuration:
-        return solve(given(piece), group.rows[piece])
+        """Poses of some rows, not yet judged by the limits."""
+        rows = group.rows[piece]
+        columns = zip(plan.structure.given, group.columns(), strict=True)
+        given = [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
+        start = starts(mechanism, poses, rows) if plan.iterative else None
+        return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
 
-    def judged(piece: slice, configuration: Configuration, near: Mapping[str, Floats]) -> SolvedPoses:
-        known = {**configuration.near, **near}
-        configuration = replace(configuration, near=known, counted=configuration.counted | near.keys())
+    for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
+        near = turns.near(group.rows[piece], configuration)
+        configuration = replace(
+            configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys()
+        )
         plan.judge(configuration)
-        return SolvedPoses(group.rows[piece], group.names, configuration)
-
-    angles = [] if poses.listed else _followed(mechanism, plan, wanted)
-    names = [angle.name for angle in angles]
-    bounded = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
-    if poses.designs == 1 and len(poses.grid) == 1 and not bounded.intersection(names):
-        way, begun = _Way(plan, angles, solve), dict[str, float]()
-        for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
-            near = dict(zip(names, way.follow(piece.start, given(piece), configuration) if angles else (), strict=True))
-            for name in mechanism.drives:
-                if name in near and (known := np.isfinite(near[name])).any():
-                    begin = begun.setdefault(name, float(near[name][known.argmax()]))
-                    near[name] = _begun(study, poses, name, near[name], begin)
-            yield judged(piece, configuration, near)
-        return
-    only = [at(piece) for piece in pieces] if len(pieces) == 1 else None
-    near = {}
-    if angles:
-        values = np.empty((len(angles), len(group.rows)))
-        for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
-            values[:, piece] = _values_of(angles, configuration)
-        lines = continuous(poses.grid[-1], plan, given(), angles, values, solve)
-        near = dict(zip(names, (_across(row, poses.grid) for row in lines), strict=True))
-        near |= {name: _begun(study, poses, name, near[name]) for name in mechanism.drives if name in near}
-    for piece, configuration in zip(pieces, only or map_chunks(at, pieces, jobs), strict=True):
-        yield judged(piece, configuration, {name: values[piece] for name, values in near.items()})
+        yield SolvedPoses(group.rows[piece], group.names, configuration)
 
 
-def _values_of(angles: Sequence[Coordinate], configuration: Configuration) -> Floats:
-    """Values of some angles, shape (angles, ...)."""
-    return np.stack([np.broadcast_to(configuration.value(angle), configuration.shape) for angle in angles])
-
-
-@dataclass
-class _Way:
-    """Angles along a motion that comes piece by piece; `last` is the pose from which the next piece goes on."""
-
-    plan: Plan
-    angles: Sequence[Coordinate]
-    solve: Solve
-    last: tuple[int, Floats, Floats, Floats] | None = None  # row, what is given, angles, and their whole turns
-
-    def follow(self, begin: int, given: Sequence[Floats], configuration: Configuration) -> Floats:
-        """The angles without jumps at the poses of the next piece, whose first row is `begin`."""
-        values = _values_of(self.angles, configuration)
-        rows, turns = begin + np.arange(values.shape[1]), None
-        if self.last is not None:
-            row, places, before, turns = self.last
-            rows, values = np.append(row, rows), np.concatenate([before[:, None], values], axis=1)
-            given = [np.append(place, column) for place, column in zip(places, given, strict=True)]
-        found = continuous(values.shape[1], self.plan, given, self.angles, values, self.solve, rows, turns)
-        known = np.flatnonzero(np.isfinite(values).all(axis=0))
-        if len(known):
-            k = known[-1]
-            turned = np.round((found[:, k] - values[:, k]) / TURN)
-            self.last = int(rows[k]), np.array([column[k] for column in given]), values[:, k], turned
-        return found[:, len(rows) - configuration.shape[0] :]
-
-
-def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
+def followed_angles(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
     """Angles whose turns only the motion gives: not those given, nor drives whose limits leave them one turn."""
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
@@ -198,29 +134,59 @@ def _followed(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) ->
     return [angle for name, angle in found.items() if name not in plan.counted | settled]
 
 
-def _begun(study: Study, poses: Poses, drive: str, values: Floats, first: float | None = None) -> Floats:
-    """A drive's values in each design in the turn that leaves it within its limits, else near the sketch's value.
+class _Turns:
+    """Values near which angles lie at the poses of a motion or a grid; chunk by chunk in the order of the rows."""
 
-    `first` is where the motion began of which the values are a later piece.
-    """
-    mechanism = study.mechanism
-    drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
-    lines = values.reshape(poses.designs, -1)
-    known = np.isfinite(lines)
-    begin = np.take_along_axis(lines, known.argmax(axis=1)[:, None], axis=1)[:, 0]
-    if first is not None:
-        begin = np.array([first])
-    smallest, largest = (f(np.where(known, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
-    turns = np.round((drawn - begin) / TURN)
-    sizes = mechanism.nominal | {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
-    for bound in mechanism.bounds:
-        if bound.drive and bound.of_angle and bound.coordinate.name == drive:
-            low, high = bound.ends(sizes)
-            # All of the motion where it fits, or else its begin.
-            for least, most in ((begin, begin), (smallest, largest)):
-                fewest, greatest = np.ceil((low - least) / TURN), np.floor((high - most) / TURN)
-                turns = np.where(fewest <= greatest, np.clip(turns, fewest, greatest), turns)
-    return np.asarray(lines + TURN * turns[:, None]).ravel()
+    def __init__(self, study: Study, poses: Poses, angles: Sequence[Coordinate], curve: Curve | None) -> None:
+        self.study, self.poses, self.angles, self.curve = study, poses, angles, curve
+        self._last = np.zeros(len(angles))
+        self._grid: Floats | None = None
+        if angles and curve is not None and len(poses.grid) > 1:
+            self._grid = self._across(curve)
+
+    def near(self, rows: Ints, configuration: Configuration) -> dict[str, Floats]:
+        if self.curve is None or not self.angles:
+            return {}
+        if self._grid is not None:
+            return dict(zip((angle.name for angle in self.angles), self._grid[:, rows], strict=True))
+        line, s = np.divmod(rows, self.poses.line)
+        table = np.nan_to_num(self.curve.turned(line, s.astype(float)))
+        if self.curve.spent.any():
+            # Of what is not followed between the poses an angle goes the nearest way.
+            table = np.where(self.curve.spent[line], self._nearest(configuration), table)
+        return dict(zip((angle.name for angle in self.angles), table, strict=True))
+
+    def _nearest(self, configuration: Configuration) -> Floats:
+        found = np.empty((len(self.angles), *configuration.shape))
+        for k, angle in enumerate(self.angles):
+            values = np.array(np.broadcast_to(configuration.value(angle), configuration.shape))
+            known = np.isfinite(values)
+            values[known] = np.unwrap(np.append(self._last[k], values[known]), period=angle.turn)[1:]
+            found[k], self._last[k] = values, values[known][-1] if known.any() else self._last[k]
+        return found
+
+    def _across(self, curve: Curve) -> Floats:
+        """Angles of a grid of rows, without whole turns between its lines; drives within their limits."""
+        mechanism, poses = self.study.mechanism, self.poses
+        line, s = np.divmod(np.arange(poses.count), poses.line)
+        table = curve.turned(line, s.astype(float))
+        table[:, ~curve.holds(line, s.astype(float))] = np.nan
+        for angle, values in zip(self.angles, table, strict=True):
+            for axis in range(len(poses.grid) - 2, -1, -1):
+                # Each design of several has a grid of its own.
+                for stack in values.reshape(-1, poses.grid[axis], math.prod(poses.grid[axis + 1 :])):
+                    for before, block in pairwise(stack):
+                        jump = (block - before)[np.isfinite(block - before)][:1]
+                        block -= angle.turn * np.round(jump / angle.turn).sum()
+            if angle.name in mechanism.drives:
+                lines = values.reshape(poses.designs, -1)
+                known = np.isfinite(lines)
+                begin = np.take_along_axis(lines, known.argmax(axis=1)[:, None], axis=1)[:, 0]
+                least, most = (f(np.where(known, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
+                sizes = {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
+                turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, sizes))
+                values += TURN * np.repeat(turns, lines.shape[1])
+        return np.nan_to_num(table)
 
 
 def dimensions(poses: Poses, rows: Ints) -> dict[str, Value]:
@@ -292,117 +258,9 @@ def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
     mechanism = study.mechanism
     found = []
     for name in names:
-        parts = [f"{name}.x", f"{name}.y"] if name in mechanism.points else [name]
+        parts = [f"{name}.x", f"{name}.y"] if mechanism.graph.is_point(name) else [name]
         found += [mechanism.coordinate(part) for part in parts]
     return found
-
-
-def continuous(
-    line: int, plan: Plan, given: Sequence[Floats], angles: Sequence[Coordinate], values: Floats, solve: Solve,
-    rows: Ints | None = None, begun: Floats | None = None,
-) -> Floats:  # fmt: skip
-    """Angles without jumps along a sweep, a path or each line of a grid, which has as many poses as `line`.
-
-    Between poses that are far apart the mechanism is solved on the way, twice as finely until no angle turns by a
-    right angle or more in one step. Poses without a value are stepped over.
-
-    Parameters
-    ----------
-    given : sequence of ndarray, shape (poses,)
-        Values of the plan's coordinates (radians, lengths).
-    values : ndarray, shape (angles, poses)
-        The angles at the poses (radians), nan where a pose has none.
-    rows : ndarray of int, shape (poses,), optional
-        Places of the poses along the motion; one after the other where left out.
-    begun : ndarray, shape (angles,), optional
-        Whole turns with which the first pose begins; by default its angles begin in (-pi, pi].
-    """
-    known = np.flatnonzero(np.isfinite(values).all(axis=0))
-    if not len(known):
-        return values
-    seen = values if len(known) == values.shape[1] else values[:, known]
-    starts = known // line != np.append(-1, known[:-1] // line)
-    rises = np.diff(seen, axis=1)
-    far = ~starts[1:] & (np.abs(rises) >= SURE_TURN).any(axis=0)
-    parts = _parts(plan, given, known)
-    at = np.flatnonzero(far | (parts > 1) & ~starts[1:])
-    moved = wrap(rises[:, at])
-    place = known if rows is None else rows[known]
-    coarse = np.flatnonzero(
-        (place[at + 1] == place[at] + 1) & ((parts[at] > 1) | (np.abs(moved) >= SURE_TURN).any(axis=0))
-    )
-    if len(coarse):
-        begins = known[at[coarse]]
-        moved[:, coarse] = _on_the_way(angles, given, begins, parts[at[coarse]], solve)
-    # Whole turns from each of some poses on, counted anew on every line of a grid.
-    heads = np.flatnonzero(starts)
-    begins = np.concatenate([heads, at + 1])
-    order = np.argsort(begins, kind="stable")
-    more = np.concatenate([np.zeros((len(values), len(heads))), np.round((moved - rises[:, at]) / TURN)], axis=1)
-    total = np.cumsum(more[:, order], axis=1)
-    line_of = np.cumsum(order < len(heads)) - 1
-    first = (seen[:, heads] < ON_THE_CUT - np.pi) if begun is None else begun[:, None]
-    total += (first - total[:, order < len(heads)])[:, line_of]
-    if not total.any():
-        return values
-    found = values.copy()
-    found[:, known] += TURN * np.repeat(total, np.diff(np.append(begins[order], len(known))), axis=1)
-    return found
-
-
-def _parts(plan: Plan, given: Sequence[Floats], known: Ints) -> Ints:
-    """In how many parts (a power of two) each step is made, so that what is given moves little in each."""
-    longest = np.ones(len(known) - 1)
-    for coordinate, values in zip(plan.structure.given, given, strict=True):
-        step = {"angle": MAX_TURN_STEP, "length": MAX_LENGTH_STEP * plan.core.size}.get(coordinate.quantity)
-        if step:
-            longest = np.maximum(longest, np.abs(np.diff(values[known])) / step)
-    parts = np.ones(len(longest), dtype=np.intp)
-    # A step that is just one part must not become two by rounding.
-    long = np.flatnonzero(longest > 1 + 1e-9)
-    powers = np.ceil(np.log2(longest[long]) - 1e-9)
-    parts[long] = 2 ** np.clip(powers, 0, math.log2(MAX_PARTS)).astype(np.intp)
-    return parts
-
-
-def _on_the_way(
-    angles: Sequence[Coordinate], given: Sequence[Floats], begins: Ints, parts: Ints, solve: Solve
-) -> Floats:
-    """How far each angle turns to the next pose, shape (angles, begins); the nearest way where it does not close."""
-    found = np.empty((len(angles), len(begins)))
-    number = np.maximum(parts, 2)
-    pending = np.arange(len(begins))
-    while len(pending):
-        count = int(number[pending].min())
-        at = pending[number[pending] == count]
-        left = [pending[number[pending] > count]]
-        most = max(1, POSES_AT_ONCE // (count + 1))
-        for first in range(0, len(at), most):
-            pairs = at[first : first + most]
-            way = np.linspace(0.0, 1.0, count + 1)
-            between = [v[begins[pairs], None] * (1 - way) + v[begins[pairs] + 1, None] * way for v in given]
-            turned = _values_of(angles, solve(between, begins[pairs, None]))
-            steps = wrap(np.diff(turned, axis=-1))
-            closed = np.isfinite(steps).all(axis=(0, 2))
-            sure = (np.abs(steps) < SURE_TURN).all(axis=(0, 2))
-            straight = wrap(turned[..., -1] - turned[..., 0])
-            found[:, pairs] = np.where(closed, steps.sum(axis=-1), straight)
-            finer = pairs[closed & ~sure & (count < MAX_PARTS)]
-            number[finer] = 2 * count
-            left.append(finer)
-        pending = np.concatenate(left)
-    return found
-
-
-def _across(values: Floats, grid: Sequence[int]) -> Floats:
-    """Whole turns between the lines of a grid taken out, its last axis being continuous already."""
-    for axis in range(len(grid) - 2, -1, -1):
-        # Each design of several has a grid of its own.
-        for stack in values.reshape(-1, grid[axis], math.prod(grid[axis + 1 :])):
-            for before, block in pairwise(stack):
-                jump = (block - before)[np.isfinite(block - before)][:1]
-                block -= TURN * np.round(jump / TURN).sum()
-    return values
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,6 +83,6 @@ def wrap(angle: Value) -> Value:
     return np.pi - np.mod(np.pi - angle, TURN)
 
 
-def nearest(angle: Value, near: Value) -> Value:
-    """An angle in the turn in which it lies within half a turn of `near`."""
-    return angle + TURN * np.round((near - angle) / TURN)
+def nearest(angle: Value, near: Value, turn: float = TURN) -> Value:
+    """An angle in the turn in which it lies within half a turn of `near`; `turn` is after what it repeats."""
+    return angle + turn * np.round((near - angle) / turn)

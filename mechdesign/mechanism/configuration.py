@@ -94,7 +94,10 @@ class Configuration:
         if coordinate.kind == "parameter":
             return self.vectors.parameters[coordinate.name]
         assert coordinate.expression is not None
-        return coordinate.expression.evaluate(self.user_values(coordinate))
+        value = coordinate.expression.evaluate(self.user_values(coordinate))
+        value = value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
+        near = self.near.get(coordinate.name) if coordinate.turn else None
+        return value if near is None else nearest(value, near, coordinate.turn)
 
     def user_values(self, coordinate: Coordinate) -> dict[str, Value]:
         """Values of the parts of an expression, angles in the study's unit as its text expects."""

@@ -21,20 +21,27 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 MAX_CHANGE = 0.35
 # Change that steps are planned for, a little less so that few are refused.
 PLANNED = 0.8 * MAX_CHANGE
+# Largest turn of an angle in an expression in one step (radians): one more, and its way round would not be certain.
+MAX_TURNED = 1.5
 SMALLEST_STEP = 2e-4
-MAX_ROUNDS = 400
+# Rounds of steps: enough for ten turns.
+MAX_ROUNDS = 250
 # Step that gives the first direction, as a part of the path.
 FIRST_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Start:
-    """A solved pose to continue from: its given values, dimensions, unknowns, and signs of the determinants."""
+    """A solved pose to continue from: its given values, dimensions, unknowns, and signs of the determinants.
+
+    `turns` are angles in expressions that are given, whose turns count.
+    """
 
     given: Sequence[Value]
     places: Mapping[str, Value]
     unknowns: Sequence[Value]
     signs: Sequence[Value]
+    turns: Sequence[Value] = ()
 
     def map(self, function: Callable[[Value], Value]) -> Start:
         """The start with a function applied to each of its arrays."""
@@ -43,11 +50,13 @@ class Start:
             {name: function(v) for name, v in self.places.items()},
             [function(v) for v in self.unknowns],
             [function(v) for v in self.signs],
+            [function(v) for v in self.turns],
         )
 
 
-# Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps.
-Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int], State]
+# Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps and angles near those that
+# are followed; also gives these.
+Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int, Floats], tuple[State, Floats]]
 
 
 def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:
@@ -71,8 +80,8 @@ def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
 def follow(
     structure: Structure, solver: Solver, start: Start, given: Sequence[Value], places: Mapping[str, Value],
     nominal: Mapping[str, float], size: float, count: int,
-) -> tuple[Floats, Flags]:  # fmt: skip
-    """Continue `count` poses from `start`; returns the table of their unknowns and which poses were reached.
+) -> tuple[Floats, Flags, Floats]:  # fmt: skip
+    """Continue `count` poses from `start`: the table of their unknowns, which poses were reached, and their `turns`.
 
     `given` and `places` are the values at the end of the path, scalars or arrays of shape (count,); changes of slides
     are judged as parts of `size`, a length of the mechanism.
@@ -85,18 +94,18 @@ def follow(
     }
     signs = [np.broadcast_to(sign, (count,)) for sign in start.signs]
 
-    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = NEWTON_STEPS) -> tuple[Floats, State]:
-        """Unknowns and state of some poses at parts `at` of their paths."""
+    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = NEWTON_STEPS) -> tuple[Floats, State, Floats]:
+        """Unknowns, state and angles of some poses at parts `at` of their paths."""
 
         def between(begin: Value, end: Value) -> Value:
             a, b = (value if np.ndim(value) == 0 else value[lanes] for value in (begin, end))
             return a + at * (b - a)
 
-        state = solver(
+        state, angles_there = solver(
             [between(*pair) for pair in ends], {name: between(*pair) for name, pair in sizes.items()},
-            guess, steps,
+            guess, steps, turns[:, lanes],
         )  # fmt: skip
-        return table_of(state.unknowns, lanes.shape), state
+        return table_of(state.unknowns, lanes.shape), state, angles_there
 
     def change(new: Floats, old: Floats) -> Floats:
         """How far the unknowns moved, angles the short way round; nan where a step has no end."""
@@ -110,9 +119,10 @@ def follow(
             return np.asarray(np.minimum(1.0, PLANNED / speed))
 
     table = table_of(start.unknowns, (count,)).copy()
+    turns = np.array([np.broadcast_to(angle, (count,)) for angle in start.turns]).reshape(len(start.turns), count)
     moving = np.arange(count)
     # One step of Newton's method at the very beginning gives the direction in which the unknowns set out.
-    first, _ = solve(moving, FIRST_STEP, table, 1)
+    first, *_ = solve(moving, FIRST_STEP, table, 1)
     slope = change(first, table) / FIRST_STEP
     slope = np.where(np.isfinite(slope).all(axis=0), slope, 0.0)
     done = np.zeros(count)
@@ -124,12 +134,14 @@ def follow(
         target = np.minimum(1.0, done[moving] + step[moving])
         taken = target - done[moving]
         old = table[:, moving]
-        new, state = solve(moving, target, old + slope[:, moving] * taken)
+        new, state, turned = solve(moving, target, old + slope[:, moving] * taken)
         moved = change(new, old)
         with np.errstate(invalid="ignore"):
             good = (np.abs(moved) <= MAX_CHANGE * scale_of(structure, size, old)).all(axis=0)
+            good &= (np.abs(turned - turns[:, moving]) <= MAX_TURNED).all(axis=0)
         good &= state.solved(moving.shape, [sign[moving] for sign in signs])
         reached = moving[good]
+        turns[:, reached] = turned[:, good]
         table[:, reached] = old[:, good] + moved[:, good]
         slope[:, reached] = moved[:, good] / taken[good]
         done[reached] = target[good]
@@ -139,4 +151,4 @@ def follow(
         step[moving[~good]] = taken[~good] / 2
         steady[moving] = good
         moving = moving[(done[moving] < 1) & (step[moving] >= SMALLEST_STEP)]
-    return table, done >= 1
+    return table, done >= 1, turns

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import MEASURED, Description, Drive, Measure, Quantity
 
@@ -20,7 +21,9 @@ class Coordinate:
 
     ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide`` displacement (a
     telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`, of
-    which a ``parameter`` is the same in every pose.
+    which a ``parameter`` is the same in every pose. `turn` is after what the value repeats, such as that of an angle
+    (radians); 0 where it does not. `links` are those whose ends of the pins at `node` and `other` are
+    meant; empty for the pin itself.
     """
 
     name: str
@@ -28,11 +31,19 @@ class Coordinate:
     quantity: Quantity
     node: int = -1
     other: int = -1
+    links: tuple[str, str] = ("", "")
     body: str = ""
     reference: str = GROUND
     slide: int = -1
     expression: Expression | None = None
     parts: tuple[Coordinate, ...] = ()
+    turn: float = 0.0
+
+    @property
+    def ends(self) -> tuple[tuple[str, int], ...]:
+        """Points that it depends on itself, link and node of each."""
+        nodes = {"x": (self.node,), "y": (self.node,), "distance": (self.node, self.other)}.get(self.kind, ())
+        return (*zip(self.links, nodes, strict=False), *(end for part in self.parts for end in part.ends))
 
 
 def all_names(description: Description, graph: Graph) -> tuple[str, ...]:
@@ -60,10 +71,11 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
     if name in description.measures:
         return _measure(name, description.measures[name], description, graph)
     owner, _, part = name.rpartition(".")
-    if part in ("x", "y") and owner in graph.nodes:
-        return Coordinate(name, "x" if part == "x" else "y", "length", node=graph.node(owner))
+    if part in ("x", "y") and graph.is_point(owner):
+        links = (owner.rpartition(".")[0], "")
+        return Coordinate(name, "x" if part == "x" else "y", "length", node=graph.node(owner), links=links)
     if part == "angle" and owner in description.links:
-        return Coordinate(name, "angle", "angle", body=owner)
+        return _angle(name, owner)
     if part in ("length", "slide") and owner in graph.slides:
         slide = graph.slides.index(owner)
         if (part == "length") == (slide in graph.telescopic):
@@ -73,10 +85,10 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
 
 
 def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
-    """The angles among coordinates and in their expressions, by name."""
+    """The angles among coordinates and in their expressions, arctangents too, by name."""
     found: dict[str, Coordinate] = {}
     for coordinate in coordinates:
-        if coordinate.kind == "angle":
+        if coordinate.turn:
             found[coordinate.name] = coordinate
         found |= angles_of(coordinate.parts)
     return found
@@ -84,7 +96,7 @@ def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
 
 def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:
     if drive.kind == "angle":
-        return Coordinate(name, "angle", "angle", body=drive.target, reference=drive.reference)
+        return _angle(name, drive.target, drive.reference)
     return Coordinate(name, "slide", "length", slide=graph.slides.index(drive.target))
 
 
@@ -96,13 +108,31 @@ def _measure(name: str, measure: Measure, description: Description, graph: Graph
             else resolve(part, description, graph)
             for part in sorted(measure.expression.names)
         )
-        return Coordinate(name, "expression", "none", expression=measure.expression, parts=parts)
+        return _expression(name, measure.expression, {part.name: part for part in parts})
     return between(name, measure.kind, measure.items or ("", ""), graph)
+
+
+def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:
+    return Coordinate(name, "angle", "angle", body=body, reference=reference, turn=TURN)
+
+
+def _expression(name: str, expression: Expression, parts: Mapping[str, Coordinate], turn: float = 0.0) -> Coordinate:
+    """An expression of coordinates, its arctangents as coordinates of their own."""
+    known, outer = dict(parts), expression
+    if not turn:
+        outer, arctangents = expression.turning(name)
+        for variable, (inner, turns) in arctangents.items():
+            known[variable] = _expression(variable, inner, known, turns * TURN)
+    own = tuple(known[part] for part in sorted(outer.names))
+    quantities = {part.name: part.quantity for part in own if part.kind != "parameter"}
+    quantity: Quantity = "angle" if turn or outer.is_angle(quantities) else "none"
+    return Coordinate(name, "expression", quantity, expression=outer, parts=own, turn=turn)
 
 
 def between(name: str, kind: str, items: Sequence[str], graph: Graph) -> Coordinate:
     """The ``angle`` from one link to another, or the distance of two points."""
     first, second = items
     if kind == "angle":
-        return Coordinate(name, "angle", "angle", body=second, reference=first)
-    return Coordinate(name, "distance", "length", node=graph.node(first), other=graph.node(second))
+        return _angle(name, second, first)
+    links = (first.rpartition(".")[0], second.rpartition(".")[0])
+    return Coordinate(name, "distance", "length", node=graph.node(first), other=graph.node(second), links=links)

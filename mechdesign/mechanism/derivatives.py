@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -255,19 +255,24 @@ def determinants(linearization: Linearization) -> list[Value]:
 
 
 @quiet
-def regularity(linearization: Linearization) -> Value:
-    """How far the drives are from a singularity, for each pose: 0 at one, at most 1.
+def conditionings(linearization: Linearization) -> dict[int, Value]:
+    """Per group of the drives' structure, by its index, how far from a singularity it is: from -1 to 1, zero at one.
 
-    The smallest over the groups of |det| over the product of the lengths of its columns; for two links that meet it
-    is the sine of the angle between them.
+    The determinant of its loop equations over the product of the lengths of its columns; for two links that meet it is
+    the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
     """
-    found: Value = 1.0
     groups = [(k, group) for k, group in enumerate(linearization.structure.groups) if group.form != "place"]
+    signed = {}
     for (index, group), determinant in zip(groups, determinants(linearization), strict=True):
         lines = linearization.loop_columns(index, group)
         sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
-        found = np.minimum(found, np.abs(determinant) / np.sqrt(math.prod(sizes)))
-    return found
+        signed[index] = determinant / np.sqrt(math.prod(sizes))
+    return signed
+
+
+def regularity(linearization: Linearization) -> Value:
+    """How far the drives are from a singularity, for each pose: 0 at one, at most 1; the smallest over the groups."""
+    return reduce(np.minimum, map(np.abs, conditionings(linearization).values()), 1.0)
 
 
 def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,14 +14,12 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.solve import equations, run, set_unknowns
 from mechdesign.mechanism.state import State, Unknowns, start_state
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
 # Largest errors at a fold: of its equations (parts of the mechanism's size) and of the determinant (parts of that at
 # the last pose).
 FOLD_SOLVED = 1e-9
-# How far from the last pose a fold may lie along the coordinate (radians, or parts of the size).
-FOLD_REACH = 0.1
 
 
 @dataclass(frozen=True)
@@ -73,111 +71,54 @@ def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]
     return found + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
 
 
-class SweepMargins:
-    """Margins along a sweep, in the order of `causes`; nan where something before in that order ends the motion.
+class Margins:
+    """What may end the motion of a plan, in the order of `causes`: as functions of solved poses, shape (causes, n).
 
-    Parameters
-    ----------
-    given : mapping of str to ndarray, shape (poses,)
-        The coordinates that the poses give (radians, lengths); all but `swept` are held at their first value.
-    near : mapping of str to ndarray, shape (poses,)
-        Angles at the poses (radians), without jumps: between the poses angles continue them.
-    counted : bool
-        Whether limits count the turns of angles that are swept or followed.
+    The stated limits come last; `limited` is their number.
     """
 
-    def __init__(
-        self, mechanism: Mechanism, given: Mapping[str, Floats], swept: str, near: Mapping[str, Floats],
-        *, counted: bool = True,
-    ) -> None:  # fmt: skip
-        self.mechanism, self.counted = mechanism, counted
-        names = tuple(given)
-        self.plan = mechanism.plan(names)
-        self.which = names.index(swept)
-        self.coordinate = self.plan.structure.given[self.which]
-        self.at: Floats = given[swept]
-        self.held = [float(column[0]) for column in given.values()]
-        self.near = {name: self._known(values) for name, values in near.items() if name not in names}
-        graph = mechanism.graph
-        known = {slide for slide, _ in self.plan.structure.known_slides}
-        self.legs = sorted(graph.telescopic - (known - {self.coordinate.slide}))
-        lengths = [graph.slides[slide] for slide in self.legs]
-        if self.coordinate.kind == "distance":
-            lengths.append(self.coordinate.name)
-        self.causes = tuple(causes(self.plan, mechanism, lengths))
+    def __init__(self, mechanism: Mechanism, plan: Plan) -> None:
+        self.mechanism, self.plan = mechanism, plan
+        graph, spans = mechanism.graph, [plan.structure.given[k] for _, k in plan.structure.spans]
+        self.legs = sorted(graph.telescopic)
+        lengths = [*(graph.slides[slide] for slide in self.legs), *(distance.name for distance in spans)]
+        self.causes = tuple(causes(plan, mechanism, lengths))
+        self.limited = sum(cause.role == "limit" for cause in self.causes)
 
-    def solve(self, place: Floats, start: Configuration | None = None, *, limits: bool = True) -> Configuration:
-        """The mechanism at values of the swept coordinate (radians or length)."""
-        found = self.plan.solve(self._given(place), start=start, limits=False)
-        near = {name: np.asarray(np.interp(place, *known)) for name, known in self.near.items()}
-        if self.counted:
-            found = replace(found, near={**found.near, **near}, counted=found.counted | near.keys())
-        else:
-            found = replace(found, near={**found.near, **near, **self.mechanism.turns({})}, counted=frozenset())
-        if limits:
-            self.plan.judge(found)
-        return found
+    def of(self, configuration: Configuration, given: Sequence[Value]) -> Floats:
+        """Margins but for the stated limits, of poses solved without these; nan where an earlier one is negative.
 
-    def _given(self, place: Floats) -> list[Value]:
-        return [*self.held[: self.which], place, *self.held[self.which + 1 :]]
-
-    def _known(self, values: Floats) -> tuple[Floats, Floats]:
-        """Swept coordinate, rising, and the values of poses that have one; nan where none has."""
-        known = np.flatnonzero(np.isfinite(values))
-        known = known[np.argsort(self.at[known], kind="stable")]
-        return (self.at[known], values[known]) if len(known) else (np.zeros(1), np.full(1, np.nan))
-
-    def start(self, place: Floats) -> Configuration | None:
-        """Poses that groups without a closed form may be continued from; None where every group has one."""
-        return self.solve(place, limits=False) if self.plan.iterative else None
-
-    def look(self, place: Floats, start: Configuration | None = None) -> tuple[Floats, Flags]:
-        """Margins at values of the swept coordinate, shape (margins, n), and whether the mechanism is valid there.
-
-        nan, and not valid, where the pose to start from is not valid.
+        `given` are the values of the plan's coordinates (radians, lengths), shape (n,).
         """
-        if start is None or start.valid.all():
-            pose = self.solve(place, start, limits=False)
-            values = self._of(pose, place)
-            self.plan.judge(pose)
-            return values, pose.valid
-        values, valid = np.full((len(self.causes), len(place)), np.nan), np.zeros(len(place), dtype=bool)
-        live = np.flatnonzero(start.valid)
-        if len(live):
-            values[:, live], valid[live] = self.look(place[live], start.take(live))
-        return values, valid
-
-    def _of(self, configuration: Configuration, place: Floats) -> Floats:
-        """Margins of poses solved without the limits."""
         good = configuration.reason == Reason.OK
-        lost = np.zeros(place.shape, dtype=bool)  # poses that a group without a closed form does not reach
-        open_ = np.zeros(place.shape, dtype=bool)  # poses in which an earlier group does not close
-        each = {
-            "closure": iter(configuration.closures), "leg": iter(self._lengths(configuration, place)),
-            "limit": (margin for _, margin in self.mechanism.margins(configuration)),
-        }  # fmt: skip
-        found = np.empty((len(self.causes), len(place)))
-        for row, cause in zip(found, self.causes, strict=True):
+        lost = np.zeros(configuration.shape, dtype=bool)  # poses that a group without a closed form does not reach
+        ended = np.zeros(configuration.shape, dtype=bool)  # poses in which an earlier group does not close
+        closures, lengths = iter(configuration.closures), iter(self._lengths(configuration, given))
+        margins = np.empty((len(self.causes) - self.limited, *configuration.shape))
+        for row, cause in zip(margins, self.causes, strict=False):
             if cause.role == "reached":
-                row[:] = np.where(good, 1.0, np.where(open_, np.nan, -1.0))
-                lost, open_ = ~good, open_ | ~good
+                row[:] = np.where(good, 1.0, np.where(ended, np.nan, -1.0))
+                lost, ended = ~good, ended | ~good
             elif cause.role == "across":
                 row[:] = np.where(lost, np.nan, self._across(configuration, cause.group))
             else:
-                row[:] = next(each[cause.role])
+                row[:] = next(closures if cause.role == "closure" else lengths)
             if cause.role == "closure":
                 row[lost] = np.nan
-                open_ = open_ | ~(row >= 0)
-        return found
+                ended = ended | ~(row >= 0)
+        return margins
 
-    def _lengths(self, configuration: Configuration, place: Floats) -> list[Value]:
+    def of_limits(self, configuration: Configuration) -> Floats:
+        """Margins of the stated limits, smooth along a motion."""
+        margins = self.mechanism.margins(configuration, smooth=True)
+        return np.stack([np.broadcast_to(margin, configuration.shape) for _, margin in margins])
+
+    def _lengths(self, configuration: Configuration, given: Sequence[Value]) -> list[Value]:
         slides: Sequence[Value] = configuration.slides
         if self.legs and not self.plan.iterative:
             # As they come out of the closed forms: those of a pose that is not valid are hidden.
-            given = self._given(place)
             slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given)).slides
-        lengths = [slides[slide] for slide in self.legs]
-        return [*lengths, place] if self.coordinate.kind == "distance" else lengths
+        return [*(slides[slide] for slide in self.legs), *(given[k] for _, k in self.plan.structure.spans)]
 
     def _across(self, configuration: Configuration, index: int) -> Value:
         structure = self.plan.structure
@@ -191,52 +132,51 @@ class SweepMargins:
 
 
 def turning_point(
-    plan: Plan, given: Sequence[float], k: int, near: Configuration
+    plan: Plan, given: Callable[[float], Sequence[float]], place: float, reach: float, near: Configuration
 ) -> tuple[float, Configuration, int] | None:
-    """Value of given coordinate `k` at which the motion ends at a fold of a group without a closed form.
+    """Place along a motion at which it ends at a fold of a group without a closed form.
 
     There the determinant of the group's equations F(y, s) = 0 vanishes. F = 0 and det(dF/dy) = 0 together are regular
     there, so that the fold can be solved for to the last digit, where a search for the last pose that converges cannot.
 
     Parameters
     ----------
-    given : sequence of float
-        Values of the plan's coordinates at `near` (radians and lengths).
+    given : callable
+        Values of the plan's coordinates (radians and lengths) at a place.
+    place, reach : float
+        Where `near` is, and how far from there a fold may lie.
     near : Configuration
         A single valid pose shortly before the end.
 
     Returns
     -------
     (float, Configuration, int) or None
-        The value, the pose there, and the index of the group in the plan; None where no fold is near.
+        The place, the pose there, and the index of the group in the plan; None where no fold is near.
     """
-    guess = plan.unknowns(near, given)
-    reach = FOLD_REACH * (1.0 if plan.structure.given[k].quantity == "angle" else plan.core.size)
-    folds = [(index, _fold(plan, given, k, near, guess, index)) for index in plan.structure.unknowns]
-    found = [(abs(fold[0] - given[k]), index, fold) for index, fold in folds if fold is not None]
-    distance, index, (value, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
+    guess = plan.unknowns(near, given(place))
+    folds = [(index, _fold(plan, given, place, reach, near, guess, index)) for index in plan.structure.unknowns]
+    found = [(abs(fold[0] - place), index, fold) for index, fold in folds if fold is not None]
+    distance, index, (end, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
     if state is None or distance > reach:
         return None
-    return value, plan.configuration(state, (), near.places, None), index
+    return end, plan.configuration(state, (), near.places, None), index
 
 
 @quiet
 def _fold(
-    plan: Plan, given: Sequence[float], k: int, near: Configuration, guess: Unknowns, index: int
-) -> tuple[float, State] | None:
-    """The coordinate's value at a fold of group `index`, and the state there."""
+    plan: Plan, given: Callable[[float], Sequence[float]], place: float, reach: float, near: Configuration,
+    guess: Unknowns, index: int,
+) -> tuple[float, State] | None:  # fmt: skip
+    """The place of a fold of group `index`, and the state there."""
     from scipy.optimize import root
 
     group, size = plan.structure.groups[index], plan.core.size
     own = np.array(guess[plan.structure.unknowns[index]], dtype=float)
     weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
 
-    def at(value: float) -> list[Value]:
-        return [np.asarray(value if j == k else v) for j, v in enumerate(given)]
-
     def state_at(unknowns: Floats) -> State:
-        """Everything up to the group, with its unknowns and the coordinate in their own scales."""
-        values = at(unknowns[-1])
+        """Everything up to the group, with its unknowns and the place in their own scales."""
+        values = [np.asarray(value) for value in given(place + reach * unknowns[-1])]
         state = start_state(plan.core.graph, plan.structure, near.vectors, values)
         state.size = size
         run(state, plan.modes_at(values)[:index], guess)
@@ -253,11 +193,12 @@ def _fold(
         errors, determinant = system(unknowns)
         return np.append(errors, determinant / unit)
 
-    begin = np.append(own / weights, given[k])
+    begin = np.append(own / weights, 0.0)
     unit = abs(system(begin)[1]) or 1.0
     answer: Any = root(residual, begin, method="hybr", options={"xtol": 1e-14, "factor": 0.1})
     if not np.abs(residual(answer.x)).max() < FOLD_SOLVED:
         return None
-    value, state = float(answer.x[-1]), state_at(answer.x)
+    end, state = place + reach * float(answer.x[-1]), state_at(answer.x)
     state.place(group)
-    return value, run(state, plan.modes_at(at(value)), guess, begin=index + 1)
+    values = [np.asarray(value) for value in given(end)]
+    return end, run(state, plan.modes_at(values), guess, begin=index + 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,9 +13,10 @@ from mechdesign.mechanism.algebra import Value, angle_of, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
+from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.solve import run
+from mechdesign.mechanism.solve import as_configuration, run
 from mechdesign.mechanism.state import CONVERGED, NEWTON_STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -44,6 +45,9 @@ class Plan:
         self.modes = tuple(modes)
         self.follows = follows and core.description.branch == "follow"
         self.iterative = any(group.form == "newton" for group in structure.groups)
+        # Angles in given expressions, whose turns the way from the sketch tells.
+        inner = angles_of(c for c in structure.given if c.kind == "expression")
+        self.angles = tuple(angle for name, angle in inner.items() if name not in self.counted)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -73,11 +77,14 @@ class Plan:
         enough: float = CONVERGED,
         *,
         beyond: bool = False,
+        turns: Sequence[Value] | Floats = (),
     ) -> State:
-        """Solve all groups, in the assembly as drawn unless `modes` says another."""
+        """Solve all groups, in the assembly as drawn unless `modes` says another; `turns` are near to `angles`."""
         state = start_state(self.core.graph, self.structure, vectors, given)
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
+        state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
+        state.near |= {c.name: v for c, v in zip(self.structure.given, given, strict=True) if c.kind == "angle"}
         return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
@@ -85,8 +92,9 @@ class Plan:
         at = self.core.sketch_configuration if at is None else at
         given = [at.value(coordinate) for coordinate in self.structure.given]
         guess = self.unknowns(at, given)
-        state = self.run(given, at.vectors, guess)
-        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants])
+        turns = [at.value(angle) for angle in self.angles]
+        state = self.run(given, at.vectors, guess, turns=turns)
+        return Start(given, at.places, guess, [np.sign(d) for d in state.determinants], turns)
 
     def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
         """Unknowns of the groups without a closed form in a solved pose with such given coordinates."""
@@ -159,9 +167,16 @@ class Plan:
             dimensions = {name: some(v) for name, v in places.items()}
             return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), begun, limits)
 
-        parts = map_chunks(part, range(0, count, length), jobs)
+        parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
+        parts = [*parts] if self.angles else parts
         whole = joined(parts, shape, self.core.geometry.vectors(dims), dims)
-        return replace(whole, near=self.turns(values, dims), counted=self.counted)
+        near = {
+            angle.name: np.concatenate([np.broadcast_to(some.near[angle.name], some.shape) for some in parts]).reshape(
+                shape
+            )
+            for angle in self.angles
+        }
+        return replace(whole, near={**self.turns(values, dims), **near}, counted=self.counted)
 
     def _at_once(
         self,
@@ -174,14 +189,18 @@ class Plan:
         """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
         reached: Flags | None = None
         guess: Unknowns | None = None
+        turns: Floats = np.empty((0, *shape))
         if self.iterative:
             begin = self.start(start)
-            guess, reached = self._follow(values, dims, shape, begin)
-        state = self.run(values, self.core.geometry.vectors(dims), guess, self.modes_at(values))
+            guess, reached, turns = self._follow(values, dims, shape, begin)
+        state = self.run(values, self.core.geometry.vectors(dims), guess, self.modes_at(values), turns=turns)
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
         found = self.configuration(state, shape, dims, reached, values)
+        if self.angles:
+            near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
+            found = replace(found, near={**found.near, **near})
         if limits:
             self.judge(found)
         return found
@@ -210,20 +229,26 @@ class Plan:
         dims: Mapping[str, Value],
         shape: tuple[int, ...],
         begin: Start,
-    ) -> tuple[Floats, Flags]:
+    ) -> tuple[Floats, Flags, Floats]:
         geometry, count = self.core.geometry, int(np.prod(shape))
         begin = begin.map(lambda value: _flat(value, shape))
         places = {name: _flat(v, shape) for name, v in dims.items()}
 
-        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags]:
+        def stepped(
+            at: Sequence[Value], sizes: Mapping[str, Value], guess: Floats, steps: int, near: Floats
+        ) -> tuple[State, Floats]:
+            state = self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION, turns=near)
+            there = as_configuration(state)
+            turned = [np.broadcast_to(there.value(angle), near.shape[1:]) for angle in self.angles]
+            return state, np.array(turned).reshape(near.shape)
+
+        def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags, Floats]:
             def some(value: Value) -> Value:
                 return value if rows is None or np.ndim(value) == 0 else value[rows]
 
             return follow(
                 self.structure,
-                lambda at, sizes, guess, steps: self.run(
-                    at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION
-                ),
+                stepped,
                 begin.map(some),
                 [some(v) for v in given],
                 {name: some(v) for name, v in places.items()},
@@ -233,7 +258,7 @@ class Plan:
             )
 
         given = [_flat(v, shape) for v in values]
-        found, reached = solve(given, None)
+        found, reached, near = solve(given, None)
         # First the given turns; but where they are not reached, the pose is the same with its angles in other turns.
         turned = [
             nearest(v, at) if c.quantity == "angle" else v
@@ -242,9 +267,10 @@ class Plan:
         other = np.any([np.broadcast_to(one != two, (count,)) for one, two in zip(given, turned, strict=True)], axis=0)
         rows = np.flatnonzero(other & ~reached)
         if len(rows):
-            better, there = solve(turned, rows)
+            better, there, turns = solve(turned, rows)
             found[:, rows[there]], reached[rows] = better[:, there], there
-        return found.reshape(len(found), *shape), reached.reshape(shape)
+            near[:, rows[there]] = turns[:, there]
+        return found.reshape(len(found), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
 
     def configuration(
         self,

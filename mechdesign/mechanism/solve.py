@@ -95,15 +95,21 @@ def equations(state: State, group: Group) -> tuple[list[list[Value]], list[Value
         errors += [gap.real, gap.imag]
     if group.conditions:
         state.place(group)
-        configuration = Configuration(
-            state.graph, state.vectors, (), state.nodes, state.rotations, state.slides, [], np.zeros((), np.int8), {}
-        )
+        configuration = as_configuration(state)
         moves = _moves(state, group)
         for which in group.conditions:
             coordinate: Coordinate = state.structure.given[which]
             rows.append([first(configuration, coordinate, move) for move in moves])
             errors.append(configuration.value(coordinate) - state.given[which])
     return rows, errors
+
+
+def as_configuration(state: State) -> Configuration:
+    """What is known of a state, as poses whose coordinates have values."""
+    return Configuration(
+        state.graph, state.vectors, (), state.nodes, state.rotations, state.slides, [], np.zeros((), np.int8), {},
+        state.near,
+    )  # fmt: skip
 
 
 def _moves(state: State, group: Group) -> list[Rates]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,7 +28,7 @@ class State:
     Groups with a closed form leave their `closures`, with `beyond` also stretched or folded (see
     `mechdesign.mechanism.solve`). The others are solved by at most `steps` of Newton's corrections, until one is below
     `enough` (radians, or parts of the length `size`), and leave their unknowns, which poses converged, and the
-    determinant of their equations.
+    determinant of their equations. `near` are values within half a turn of which angles in given expressions lie.
     """
 
     graph: Graph
@@ -44,6 +44,7 @@ class State:
     steps: int = NEWTON_STEPS
     enough: float = CONVERGED
     beyond: bool = False
+    near: Mapping[str, Value] = field(default_factory=dict)
     closures: list[Value] = field(default_factory=list)
     unknowns: list[Value] = field(default_factory=list)
     converged: list[Flags] = field(default_factory=list)

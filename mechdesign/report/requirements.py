@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
-from mechdesign.results import Result, Table
+from mechdesign.results import POSES_ONLY, Result, Table
 from mechdesign.rows import IN_UNIT, Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
@@ -26,10 +26,11 @@ class Verdict:
     place: str = ""  #: the pose or row where it is worst
     margin: float = float("nan")  #: of the worst row to the limit, negative beyond it
     unit: str = ""  #: of `worst` and `margin`
+    note: str = ""  #: which poses or parts of a motion it does not speak of
 
     def __str__(self) -> str:
-        place = f" at {self.place}" if self.place else ""
-        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}"
+        place, note = f" at {self.place}" if self.place else "", f" ({self.note})" if self.note else ""
+        return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}{note}"
 
 
 def command_of(requirement: Requirement) -> str:
@@ -86,8 +87,9 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
 def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
     """Verdicts on those requirements of a study that concern a result, in the order of the study.
 
-    The worst row counts: the smallest value for `at_least`, the largest for `at_most`; nan is not met, nor is a
-    requirement that no row answers because none came out valid.
+    The worst row counts: the smallest value for `at_least`, the largest for `at_most`; along a motion the worst place
+    between the rows, too. nan is not met, nor is a requirement on a motion that is not valid at every pose and between
+    them (unless it says ``unassembled: allowed``), nor one that no row answers.
 
     Parameters
     ----------
@@ -114,7 +116,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ... ''')
     >>> for verdict in mechdesign.requirements(study, mechdesign.kinematics(study)):
     ...     print(verdict)
-    kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30
+    kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30 (of the asked poses only)
     """
     if "cases" in result.drawn:
         return tuple(over_cases(result.drawn["cases"].verdicts))
@@ -152,23 +154,48 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         row = _worst_row(chosen, requirement)
         if row is not None:
             value = float(chosen.values[row])
-            verdict = Verdict(
-                in_words(requirement), margin_of(requirement, value) >= 0, value,
-                "" if len(table) == 1 else place_of(part, row, column, freedom, begin), margin_of(requirement, value),
-                unit_of(part, column, row),
-            )  # fmt: skip
+            place = "" if len(table) == 1 else place_of(part, row, column, freedom, begin)
+            verdict = _verdict(requirement, value, place, unit_of(part, column, row))
             if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
                 found = verdict
         begin += len(part)
     if found is None and whole and (missing := choose(result, path, requirement.where).missing):
         raise UnknownColumnError(missing)
-    none = "no row of " + table.name
-    return found or Verdict(in_words(requirement), met=False, worst=float("nan"), place=none)
+    if found is None:
+        return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
+    return _over_motion(found, requirement, table, column)
+
+
+def _verdict(requirement: Requirement, value: float, place: str, unit: str) -> Verdict:
+    margin = margin_of(requirement, value)
+    return Verdict(in_words(requirement), margin >= 0, value, place, margin, unit)
+
+
+def _over_motion(verdict: Verdict, requirement: Requirement, table: Table, column: str) -> Verdict:
+    """The verdict of the worst row, or of a worse place of the motion between the rows; what it does not speak of."""
+    scope = table.scope
+    if scope is None:
+        return verdict
+    signs = [-1] * (requirement.at_least is not None) + [1] * (requirement.at_most is not None)
+    if scope.worst is not None and not requirement.where and not np.isnan(verdict.margin):
+        for sign in signs:
+            between = scope.worst(column, sign, requirement.abs)
+            if between is not None:
+                one = _verdict(requirement, between[0], between[1], verdict.unit)
+                verdict = one if one.margin < verdict.margin else verdict
+    notes = [POSES_ONLY] if scope.poses_only else []
+    if scope.missing:
+        verdict = verdict if requirement.unassembled else replace(verdict, met=False)
+        notes.append(scope.missing)
+    return replace(verdict, note="; ".join(notes))
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement) -> int | None:
     """The row that is worst: one without a value, or else the farthest beyond a limit; None where none counts."""
-    rows, values = np.flatnonzero(chosen.counts), chosen.values
+    counts = chosen.counts
+    if requirement.unassembled and "valid" in chosen.table:
+        counts = counts & chosen.table["valid"].astype(bool)
+    rows, values = np.flatnonzero(counts), chosen.values
     if not rows.size:
         return None
     undefined = rows[np.isnan(values[rows])]

@@ -14,6 +14,7 @@ from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.study.schema import paths
+from mechdesign.study.schema.paths import PointPath, Polyline, between
 from mechdesign.study.schema.poses import PoseSection, Sweep
 from mechdesign.study.text.inputs import Folder
 
@@ -61,8 +62,10 @@ class Poses:
     # study's units.
     places: Mapping[str, Floats] = field(default_factory=dict)
     parameters: Mapping[str, Floats] = field(default_factory=dict)
-    motion: bool = False  # whether one design passes them one after the other: a sweep of one coordinate, or a path
-    closed: bool = False  # whether the motion goes on from the last pose to the first
+    motion: bool = False  # whether they are passed one after the other: a sweep of one coordinate, or a path
+    # Paths of points, by point. Other coordinates change evenly from pose to pose.
+    paths: Mapping[str, PointPath] = field(default_factory=dict)
+    corners: Floats = field(default_factory=lambda: np.empty(0))  # places of a motion that are not smooth, in rows
     # Along the path of a point, shape (count,): first and second derivative of every coordinate given by the path's
     # length, in the study's units; nan where the path has no direction.
     slopes: Mapping[str, Floats] = field(default_factory=dict)
@@ -70,6 +73,13 @@ class Poses:
     # Of a grid of rays over a workspace: one a value of its held coordinates.
     regions: tuple[Sectors, ...] = ()
     rows: Ints | None = None  # of some poses of a long motion or grid: their rows among all
+
+    @classmethod
+    def single(cls, values: Mapping[str, Floats], grid: tuple[int, ...] = ()) -> Poses:
+        """Poses of one motion, or of a grid, that give the same coordinates, each of shape (count,)."""
+        count = len(next(iter(values.values()), (0,)))
+        group, grid = PoseGroup(tuple(values), values, np.arange(count)), grid or (count,)
+        return cls((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,6 +96,79 @@ class Poses:
             for name in group.names:
                 columns[name][group.rows] = group.values[name]
         return columns
+
+    @property
+    def line(self) -> int:
+        """Poses that follow one another: those of a motion, or of a line of a grid along its last coordinate."""
+        return self.grid[-1]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the motion goes on from the last pose to the first."""
+        return any(path.closed for path in self.paths.values())
+
+    @property
+    def end(self) -> int:
+        """Last place of a motion or a line, in rows."""
+        return self.line - 1 + self.closed
+
+    def along(self, line: Ints, s: Floats) -> Poses:
+        """Poses at places of some lines, in rows from 0 to `end`; beyond these the motion goes on straight or round.
+
+        Parameters
+        ----------
+        line, s : ndarray, shape (n,)
+            The lines are numbered design by design.
+        """
+        (group,) = self.groups
+        values = {}
+        for name in group.names:
+            owner, _, axis = name.rpartition(".")
+            if owner in self.paths and axis in ("x", "y"):
+                place = self.paths[owner].at(s)
+                values[name] = place.real if axis == "x" else place.imag
+            else:
+                rows = group.values[name].reshape(-1, self.line)
+                rows = np.concatenate([rows, rows[:, :1]], axis=1) if self.closed else rows
+                values[name] = between(rows, line, s)
+        first = line * self.line
+        places, parameters = (
+            {name: column[first] for name, column in part.items()} for part in (self.places, self.parameters)
+        )
+        poses = Poses(
+            (PoseGroup(group.names, values, np.arange(len(s))),), len(s), False, (len(s),), places=places,
+            parameters=parameters,
+        )  # fmt: skip
+        if not self.slopes:
+            return poses
+        slopes, bends = _by_length(self.groups[0], self.paths, self.closed, s)
+        return replace(poses, slopes=slopes, bends=bends)
+
+    @property
+    def followed(self) -> bool:
+        """Whether they are those of motions, a line each, of which something can be said between the poses."""
+        return not self.listed and len(self.grid) == 1 and self.line > 1 and not self.regions
+
+    @property
+    def swept(self) -> str | None:
+        """The one coordinate that moves along a motion; None of listed poses, and where several do."""
+        if self.listed:
+            return None
+        moving = [name for name, values in self.values.items() if np.ptp(values) > 0]
+        return moving[0] if len(moving) == 1 else None
+
+    def pace(self, line: Ints, s: Floats) -> Floats:
+        """How fast a motion passes places, shape (n,): length of a point's path a row, or change of what is swept.
+
+        Means along the motion are by these; where several coordinates move without a path they are by rows.
+        """
+        moving = _moving(self.paths)
+        if len(moving) == 1:
+            return moving[0][1].course(s)[2]
+        if self.swept is None:
+            return np.ones(len(s))
+        rows = self.groups[0].values[self.swept].reshape(-1, self.line)
+        return np.asarray(np.abs(np.diff(rows, axis=1))[line, np.clip(np.floor(s), 0, self.line - 2).astype(np.intp)])
 
     @property
     def numbers(self) -> Floats:
@@ -127,9 +210,10 @@ def stacked(poses: Poses, designs: int, places: Mapping[str, ArrayLike], paramet
     )
     count = poses.count * designs
     slopes, bends = ({name: np.tile(v, designs) for name, v in part.items()} for part in (poses.slopes, poses.bends))
-    return Poses(
-        groups, count, poses.listed, poses.grid, designs, each(places), each(parameters), slopes=slopes, bends=bends
-    )
+    return replace(
+        poses, groups=groups, count=count, designs=designs, places=each(places), parameters=each(parameters),
+        slopes=slopes, bends=bends,
+    )  # fmt: skip
 
 
 def sweep_values(sweep: Sweep) -> Floats:
@@ -185,24 +269,20 @@ def _grid(axes: Mapping[str, Floats]) -> Poses:
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     values = {name: points.ravel() for name, points in zip(axes, mesh, strict=True)}
     swept = tuple(len(values) for values in axes.values() if len(values) > 1)
-    return _single(values, count, swept or (1,))
-
-
-def _single(values: Mapping[str, Floats], count: int, grid: tuple[int, ...]) -> Poses:
-    group = PoseGroup(tuple(values), values, np.arange(count))
-    return Poses((group,), count, False, grid, motion=len(grid) == 1 and count > 1)
+    return Poses.single(values, swept or (1,))
 
 
 def _path(path: Mapping[str, paths.PathSection], folder: Folder) -> Poses:
     if not path:
         raise StudyError("an empty path; give its points, [[x, y], ...]")
     columns: dict[str, Floats] = {}
-    found: dict[str, paths.PointPath] = {}
+    points: dict[str, PointPath] = {}
     for name, given in path.items():
         course = paths.course(name, given, folder)
-        if isinstance(course, paths.PointPath):
-            found[name] = course
-            columns[f"{name}.x"], columns[f"{name}.y"] = course.places.real, course.places.imag
+        if isinstance(course, PointPath):
+            points[name] = course
+            places = course.at(np.arange(course.count, dtype=float))
+            columns[f"{name}.x"], columns[f"{name}.y"] = places.real, places.imag
         else:
             columns[name] = course
     count = max(len(column) for column in columns.values())
@@ -210,25 +290,44 @@ def _path(path: Mapping[str, paths.PathSection], folder: Folder) -> Poses:
         if len(column) not in (1, count):
             raise StudyError(f"path: {name!r} has {len(column)} values where another coordinate has {count}")
     values = {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}
-    for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(found):
+    for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(points):
         if f"{owner}.y" in columns:
-            found[owner] = paths.polyline(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
-    poses = _single(values, count, (count,))
-    # The way of a point that stays where it is says nothing.
-    moving = [(owner, one) for owner, one in found.items() if len(one.places) == count and one.way[-1] > 0]
-    if len(moving) != 1:
+            points[owner] = Polyline.through(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
+    points = {owner: course for owner, course in points.items() if course.count == count}
+    listed = np.array([column for name, column in values.items() if name.rpartition(".")[0] not in points])
+    corners = [course.corners for course in points.values()] + ([paths.bends(listed)] if len(listed) else [])
+    poses = replace(Poses.single(values), paths=points, corners=np.unique(np.concatenate(corners)))
+    if len(_moving(points)) != 1:
         return poses
-    ((owner, along),) = moving
+    slopes, bends = _by_length(poses.groups[0], points, poses.closed, np.arange(count, dtype=float))
+    return replace(poses, slopes=slopes, bends=bends)
+
+
+def _moving(points: Mapping[str, PointPath]) -> list[tuple[str, PointPath]]:
+    """Paths that have a length: the way of a point that stays where it is says nothing."""
+    return [(owner, course) for owner, course in points.items() if course.way(np.array([course.count - 1.0]))[0] > 0]
+
+
+def _by_length(
+    group: PoseGroup, points: Mapping[str, PointPath], closed: bool, s: Floats
+) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
+    """Derivatives of what poses give by the length of a point's path, at places in rows: `slopes` and `bends`."""
+    count = len(group.rows)
+    ((owner, course),) = _moving(points)
+    way = np.diff(course.way(np.arange(count + closed, dtype=float)))
     slopes: dict[str, Floats] = {}
-    for name, column in values.items():
+    for name, column in group.values.items():
         # What is listed along with the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.where(np.diff(column) == 0, 0.0, np.diff(column) / np.diff(along.way))
-        slopes[name] = np.append(steps, steps[-1:])
-    bends = dict.fromkeys(values, np.zeros(count))
+            rise = np.diff(np.append(column, column[:1]) if closed else column)
+            steps = np.where(rise == 0, 0.0, rise / way)
+        slopes[name] = steps[np.clip(np.floor(s), 0, len(steps) - 1).astype(np.intp)]
+    slopes_of_point, bends_of_point, _ = course.course(s)
+    bends = dict.fromkeys(group.names, np.zeros(len(s)))
     for axis, part in (("x", np.real), ("y", np.imag)):
-        slopes[f"{owner}.{axis}"], bends[f"{owner}.{axis}"] = part(along.directions).copy(), part(along.bends).copy()
-    return replace(poses, closed=along.closed, slopes=slopes, bends=bends)
+        slopes[f"{owner}.{axis}"] = part(slopes_of_point).copy()
+        bends[f"{owner}.{axis}"] = part(bends_of_point).copy()
+    return slopes, bends
 
 
 def default(description: Description) -> Poses:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from helpers.linkages import FourBar, cut, swept
 from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics.analysis import kinematics
@@ -14,84 +15,6 @@ Seeds = Callable[[int], Iterator[int]]
 # Own looks at a motion (a hundredth of a degree apart or so), and beside each place where it ends.
 LOOKS = 40_001
 BESIDE = np.concatenate([-np.geomspace(1e-9, 1.0, 60), [0.0], np.geomspace(1e-9, 1.0, 60)])
-
-
-def cut(one: np.ndarray, r: float, other: np.ndarray, s: float, side: float) -> np.ndarray:
-    """Where circles about two places meet, left (`side` 1) or right of the way from one to the other; nan if not."""
-    span = other - one
-    d = np.abs(span)
-    x = (d * d + r * r - s * s) / (2 * d)
-    square = r * r - x * x
-    square = np.where((square < 0) & (square > -1e-13 * r * r), 0.0, square)
-    with np.errstate(invalid="ignore"):
-        return one + span / d * (x + side * 1j * np.sqrt(square))
-
-
-class FourBar:
-    """A crank, a rod with a point P, and a rocker; P may carry a dyad to a second pivot."""
-
-    def __init__(self, rng: np.random.Generator, six: bool) -> None:
-        self.six = six
-        while True:
-            self.a, self.b, self.c = rng.uniform(20, 120, 3).tolist()
-            self.d = 100.0
-            self.p = complex(*rng.uniform(-80, 80, 2))
-            self.side = rng.choice([-1.0, 1.0])
-            self.e, self.f, self.g = complex(*rng.uniform(-150, 150, 2)), *rng.uniform(60, 250, 2).tolist()
-            self.side2 = rng.choice([-1.0, 1.0])
-            self.drawn = float(rng.uniform(0, 360))
-            shortest, *middle, longest = sorted([self.a, self.b, self.c, self.d])
-            if abs(sum(middle) - shortest - longest) < 0.5:
-                continue
-            near = {k: complex(v[0]) for k, v in self.points(np.array([self.drawn])).items()}
-            # Not drawn near a dead centre, of which the side would not be clear.
-            angles = [near["B"] - near["A"], near["B"] - 100.0]
-            sine = abs(np.sin(np.angle(angles[0] / angles[1])))
-            if np.isnan(sine) or sine < 0.1:
-                continue
-            if six:
-                two = [near["F"] - near["P"], near["F"] - self.e]
-                sine = abs(np.sin(np.angle(two[0] / two[1])))
-                if np.isnan(sine) or sine < 0.1:
-                    continue
-            self.near = near
-            return
-
-    def points(self, crank: np.ndarray) -> dict[str, np.ndarray]:
-        a = self.a * np.exp(1j * np.radians(crank))
-        b = cut(a, self.b, np.full_like(a, self.d), self.c, self.side)
-        p = a + self.p * (b - a) / self.b
-        found = {"A": a, "B": b, "P": p}
-        if self.six:
-            found["F"] = cut(p, self.f, np.full_like(p, self.e), self.g, self.side2)
-        return found
-
-    def measured(self, crank: np.ndarray) -> dict[str, np.ndarray]:
-        at = self.points(crank)
-        last = at["F"] if self.six else at["P"]
-        lost = np.isnan(last)
-        found = {"P.x": at["P"].real, "P.y": at["P"].imag, "gap": np.abs(at["P"] - self.d)}
-        if self.six:
-            found |= {"F.x": at["F"].real, "F.y": at["F"].imag}
-        found["P.y_error"] = at["P"].imag - (20 + 10 * np.sin(2 * np.radians(crank)))
-        product = (at["B"] - at["A"]) * np.conj(at["B"] - self.d)
-        sine = np.abs(product.imag) / (self.b * self.c)
-        found["transmission"] = np.degrees(np.arcsin(np.minimum(sine, 1)))
-        return {name: np.where(lost, np.nan, values) for name, values in found.items()}
-
-    def text(self) -> str:
-        places = {k: f"[{v.real:.6f}, {v.imag:.6f}]" for k, v in self.near.items() if k != "P"}
-        more = f", E: [{self.e.real!r}, {self.e.imag!r}]" if self.six else ""
-        dyad = f"    arm: [P, F, {self.f!r}]\n    lever: [E, F, {self.g!r}]\n" if self.six else ""
-        return (
-            "mechanism:\n  links:\n"
-            f"    ground: {{O: [0, 0], D: [100, 0]{more}}}\n    crank: [O, A, {self.a!r}]\n"
-            f"    rod: {{from: A, to: B, length: {self.b!r}, points: {{P: [{self.p.real!r}, {self.p.imag!r}]}}}}\n"
-            f"    rocker: [D, B, {self.c!r}]\n{dyad}"
-            "  drives: [crank]\n  measures: {gap: {distance: [D, P]}}\n"
-            '  targets: {P.y: "20 + 10*sin(2*crank)"}\n'
-            f"  sketch: {{{', '.join(f'{k}: {v}' for k, v in places.items())}}}\n"
-        )
 
 
 def dense(function: Callable[[np.ndarray], dict[str, np.ndarray]], low: float, high: float) -> np.ndarray:
@@ -127,16 +50,6 @@ def compare(text: str, function: Callable[[np.ndarray], dict[str, np.ndarray]], 
         assert found == pytest.approx((np.nanmin(values), np.nanmax(values)), abs=2e-2, rel=1e-5), (name, text)
         for sign, value in ((1, np.nanmin(values)), (-1, np.nanmax(values))):
             assert sign * found[0 if sign == 1 else 1] <= sign * value + 1e-6 * max(1.0, abs(value)), (name, text)
-
-
-def swept(rng: np.random.Generator, drawn: float) -> tuple[float, float, float]:
-    """A closed sweep, or an open one about the pose drawn, in steps of up to 30 deg."""
-    step = float(rng.choice([5, 7.5, 10, 15, 20, 30]))
-    if rng.random() < 0.5:
-        return 0.0, 360.0, step
-    count = int(rng.integers(3, 12))
-    low = drawn - step * float(rng.uniform(0.2, count - 0.2))
-    return low, low + step * count, step
 
 
 def check_four_bar(seed: int, six: bool) -> None:

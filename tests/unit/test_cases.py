@@ -6,23 +6,21 @@ import math
 import pickle
 
 import pytest
+from helpers.studies import IN_LINE
 
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, variant
 
-SLIDER_CRANK = """
-mechanism:
-  parameters: {r: 30, l: 100}
-  links: {ground: {O: [0, 0]}, crank: [O, A, r], rod: [A, B, l], slider: {B: [0, 0]}}
-  joints: {guide: {prismatic: [ground, slider], through: O}}
-  drives: [crank]
-  sketch: {A: [0, 30], B: [95, 0]}
+SLIDER_CRANK = (
+    IN_LINE
+    + """\
 kinematics: {sweep: {crank: {from: 0, to: 360, step: 30}}, outputs: [B.x, rod.angle]}
 requirements:
   - {result: kinematics.extremes.B.x.range, at_least: 70}
   - {result: kinematics.rod.angle, abs: true, at_most: 25}
 """
+)
 FOUR_BAR = """
 mechanism:
   links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, 30], rod: [A, B, 90], rocker: [D, B, 60]}

@@ -17,6 +17,7 @@ ORDER = (
     ("mechdesign.study.building",),
     ("mechdesign.study.schema", "mechdesign.study.poses"),
     ("mechdesign.study",),
+    ("mechdesign.curve",),
     ("mechdesign.analyses", "mechdesign.analyses.region"),
     ("mechdesign.analyses.kinematics",),
     ("mechdesign.analyses.stiffness",),

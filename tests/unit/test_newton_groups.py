@@ -88,7 +88,7 @@ def test_the_end_of_a_motion_is_found_to_the_last_digits() -> None:
     given = [float(near.value(by_last.coordinate("last")))]
     pose = by_last.forward.solve([np.array(given[0])])
     assert pose.valid
-    found = turning_point(by_last.forward, given, 0, pose)
+    found = turning_point(by_last.forward, lambda value: [value], given[0], 0.1, pose)
     assert found is not None
     value, there, index = found
     assert value == pytest.approx(expected, abs=1e-11)
@@ -103,7 +103,7 @@ def test_no_end_is_found_where_there_is_none() -> None:
     mechanism = mechdesign.load(CONFIGS / "planar_3rpr.yaml").mechanism
     sketch = mechanism.sketch_configuration
     given = [float(sketch.value(mechanism.coordinate(name))) for name in mechanism.drives]
-    assert turning_point(mechanism.forward, given, 0, sketch) is None
+    assert turning_point(mechanism.forward, lambda value: [value, *given[1:]], given[0], 0.1, sketch) is None
 
 
 def test_a_pose_does_not_depend_on_its_batch_or_order() -> None:

@@ -319,22 +319,6 @@ workspace: {point: P, indices: [], assembly: any}
     assert found == pytest.approx(alone, rel=1e-9, abs=1e-9, nan_ok=True)
 
 
-def test_an_expression_that_turns_often_along_a_ray() -> None:
-    """Three sectors of an arm, of which the sketch's counts."""
-    text = """
-mechanism:
-  parameters: {l1: 10, l2: 6}
-  links: {ground: {O: [0, 0]}, upper: [O, A, l1], fore: [A, P, l2]}
-  drives: {q1: {angle: upper}, q2: {angle: fore, from: upper}}
-  sketch: {A: [8, 6], P: [8, 12]}
-  measures: {m: cos(3*q1)}
-workspace: {point: P, indices: []}
-"""
-    found = design_area(text, "min: -0.622222", "l1=6.585 l2=7.825")
-    # Each degree of the upper link sweeps as much.
-    assert found == pytest.approx(4 * np.pi * 6.585 * 7.825 * np.arccos(-0.622222) / (3 * np.pi), rel=1e-4)
-
-
 SECTORS = """
 mechanism:
   parameters: {l1: 10, l2: 6}
@@ -344,6 +328,14 @@ mechanism:
   measures: {m: cos(3*q1)}
 workspace: {point: P, indices: []}
 """
+
+
+def test_an_expression_that_turns_often_along_a_ray() -> None:
+    """Three sectors of an arm, of which the sketch's counts."""
+    text = SECTORS.replace("A: [5, 4], P: [5, 11]", "A: [8, 6], P: [8, 12]")
+    found = design_area(text, "min: -0.622222", "l1=6.585 l2=7.825")
+    # Each degree of the upper link sweeps as much.
+    assert found == pytest.approx(4 * np.pi * 6.585 * 7.825 * np.arccos(-0.622222) / (3 * np.pi), rel=1e-4)
 
 
 @pytest.mark.parametrize("hand", ["[5, 11]", "[3, 8]"])

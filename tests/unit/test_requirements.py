@@ -18,6 +18,7 @@ class Asked:
     abs: bool = False
     at_least: float | None = None
     at_most: float | None = None
+    unassembled: str | None = None
 
 
 def result(**columns):

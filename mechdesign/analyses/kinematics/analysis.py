@@ -9,26 +9,36 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.kinematics import peaks, targets
-from mechdesign.analyses.kinematics.boundaries import Boundary, motion_limits
+from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.extremes import extremes, targets_table
 from mechdesign.analyses.kinematics.instant_centres import MOTIONS, REST, TRANSLATION
-from mechdesign.analyses.kinematics.lines import PoseLine
-from mechdesign.analyses.kinematics.loops import functions, loops_table, toggles_table
+from mechdesign.analyses.kinematics.limits import (
+    Limit,
+    change_points,
+    hidden,
+    limits_of,
+    limits_table,
+    place_in_words,
+)
+from mechdesign.analyses.kinematics.loops import Toggle, loops_table, toggles_of, toggles_table
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
 from mechdesign.analyses.kinematics.passage import Mark, Passage, pass_over
 from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
+from mechdesign.mechanism import Reason
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
-from mechdesign.mechanism.four_bars import four_bars
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.mechanism.four_bars import FourBar, four_bars
+from mechdesign.numerics.arrays import Flags
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Column, LongTable, Result, Table
+from mechdesign.results import Column, LongTable, Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -62,55 +72,94 @@ def kinematics(
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
-    swept = swept_of(poses)
-    passage = pass_over(question, swept, _marks, progress, jobs)
+    passage = pass_over(question, _marks, progress, jobs)
     motion, marks = passage.motion, passage.marks
     warnings, failed = judge_failures(study, poses, passage.reason)
     warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
     warnings += _untargeted(question, marks)
-    tables, ends = {"motion": motion_table(motion)}, list[Boundary]()
-    resolved = True
-    if swept is not None and not passage.followed:
-        warnings.append(
-            "the sweep goes round too often to follow the motion between its poses: extremes are those of the poses, "
-            "and limits of motion and links in line are not looked for; sweep fewer turns"
-        )
-    if swept is not None and passage.followed:
-        limits, told, ends, resolved = motion_limits(motion, swept)
-        warnings += told
-    between, torn = tables_between(motion, ends, every=poses, followed=passage.followed)
-    if torn.any() or not resolved:
-        warnings.append(
-            f"the steps of {swept} are too long for the motion between the poses: limits, extremes and toggles there "
-            "may be missing; sweep in smaller steps, or less far"
-        )
-    tables["extremes"] = between["extremes"]
-    if swept is not None and passage.followed:
-        tables["limits"] = limits
-    tables |= between
+    loops = four_bars(study.mechanism)
+    along = along_of(question, loops=loops, toggles=True, passages=True)
+    tables = {"motion": motion_table(motion), "extremes": extremes(motion, along)}
+    limits: list[Limit] = []
+    toggles: list[Toggle] = []
+    if along is not None:
+        limits, toggles = limits_of(along), toggles_of(loops, along)
+        tables["limits"] = limits_table(limits, along)
+        warnings += hidden(limits, along, np.equal(passage.reason, 0)) + change_points(along)
+    if poses.followed and (along is None or along.functions.unresolved.any()):
+        warnings.append(_unfollowed(poses))
+    if loops:
+        tables["loops"] = loops_table(question, loops, along)
+        if along is not None:
+            tables["toggles"] = toggles_table(toggles, along)
     if motion.errors:
-        tables["targets"] = targets_table(motion, passage.sums)
+        tables["targets"] = targets_table(motion, along, passage.sums)
     if question.square:
         tables["jacobian"] = jacobian_table(motion)
     if question.centres:
         tables["instant_centres"] = centres_table(motion)
         warnings += _without_centre(question, marks)
+    whole, own = scopes_of(question, along, passage.reason)
+    tables = {
+        name: dataclasses.replace(table, scope=own if name in A_ROW_A_POSE else whole) for name, table in tables.items()
+    }
     counts = {"poses": poses.count, "invalid": int(np.count_nonzero(passage.reason))}
     drawn: dict[str, Any] = {"poses": motion.question.poses, "motion": passage.shown}
-    drawn["special"] = special_poses(motion, passage.shown, swept, ends, tables.get("toggles"))
+    drawn["special"] = special_poses(motion, passage.shown, along, limits, toggles)
     if all_modes:
-        modes, told, counts["modes"], drawn["modes"] = _modes(passage, swept, jobs)
+        modes, told, counts["modes"], drawn["modes"] = _modes(passage, jobs)
         tables["modes"] = modes
         warnings += told
     result = Result("kinematics", tables, warnings, counts, failed, drawn=drawn, absent=question.absent)
     if not passage.long:
         return result
-    whole = {name: passage.table(make, jobs) for name, make in A_ROW_A_POSE.items() if name in tables}
-    return dataclasses.replace(result, tables=tables | whole, pictured=result)
+    long = {name: passage.table(make, jobs, own) for name, make in A_ROW_A_POSE.items() if name in tables}
+    return dataclasses.replace(result, tables=tables | long, pictured=result)
+
+
+def along_of(
+    question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
+    also: Collection[str] = (), toggles: bool = False, passages: bool = False,
+) -> Along | None:  # fmt: skip
+    """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
+    curve = question.curve
+    if curve is None or curve.spent.all():
+        return None
+    return Along(question, curve, names, loops, also=also, toggles=toggles, passages=passages)
+
+
+def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.int8]) -> tuple[Scope, Scope]:
+    """What tables say of the motion as a whole, and those with a row a pose."""
+    bad, missing = int(np.count_nonzero(reason)), []
+    if bad:
+        counts = {kind.text: int(np.count_nonzero(reason == kind)) for kind in Reason if kind}
+        kinds = ", ".join(f"{count} {text}" for text, count in counts.items() if count)
+        missing.append(f"{bad} of {len(reason)} poses are not valid ({kinds})")
+    if along is not None and not along.whole[0]:
+        missing.append(f"{100 * (1 - along.present[0]):.3g} % of the motion is missing")
+
+    def worst(name: str, sign: int, absolute: bool) -> tuple[float, str] | None:
+        own = along_of(question, [name])
+        if own is None or own.curve.spent[0] or not own.follows(name):
+            return None
+        value, place = own.worst(name, sign, absolute=absolute)
+        return float(value[0]), place_in_words(own, float(place[0]))
+
+    whole = Scope(along is None, " and ".join(missing))
+    return whole, dataclasses.replace(whole, worst=worst)
+
+
+def _unfollowed(poses: Poses) -> str:
+    """A warning of a motion that cannot be followed between its poses."""
+    what = f"the steps of {poses.swept} are" if poses.swept is not None else "the steps of the path are"
+    return (
+        f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
+        "poses only, and limits of motion, singularities and links in line are not looked for; sweep fewer turns"
+    )
 
 
 def _modes(
-    drawn: Passage, swept: str | None, jobs: int | None
+    drawn: Passage, jobs: int | None
 ) -> tuple[Table, list[str], int, dict[str, Shown]]:  # fmt: skip
     """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
     study, poses = drawn.question.study, drawn.question.poses
@@ -122,7 +171,7 @@ def _modes(
         passage = drawn
         if not assembly.drawn:
             other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
-            passage = pass_over(other, swept, _marks, NULL, jobs)
+            passage = pass_over(other, _marks, NULL, jobs)
         if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
             pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = passage.shown
         passages[assembly.label] = passage
@@ -152,64 +201,9 @@ def _mode(label: str, motion: Motion) -> Table:
     return Table("modes", (column, *motion.columns()), "the motion of every assembly mode")
 
 
-def swept_of(poses: Poses) -> str | None:
-    """The one coordinate that moves along a sweep; None of listed poses, and where several do."""
-    moving = [name for name in poses.names if np.ptp(poses.values[name]) > 0]
-    return moving[0] if not poses.listed and len(moving) == 1 else None
-
-
 def motion_table(motion: Motion) -> Table:
     """Every pose with all outputs."""
     return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
-
-
-def tables_between(
-    motion: Motion, ends: Sequence[Boundary] = (), wanted: Collection[str] = ("extremes", "loops", "toggles"),
-    names: Collection[str] | None = None, every: Poses | None = None, followed: bool = True,
-) -> tuple[dict[str, Table], Flags]:  # fmt: skip
-    """Tables of what happens between the poses of a sweep, too.
-
-    Parameters
-    ----------
-    ends : sequence of Boundary
-        Limits of motion, of a single design.
-    names : collection of str, optional
-        Outputs, errors and efforts whose extremes between the poses are wanted; all where left out.
-    every : Poses, optional
-        All poses, where the motion may have only some of them.
-    followed : bool
-        Whether the motion can be followed between the poses.
-
-    Returns
-    -------
-    (dict of str to Table, bool array of shape (designs,))
-        Tables ``extremes``, ``loops`` where there are four-bars and slider-cranks, and of a sweep their ``toggles``;
-        and the designs whose motion ends where no limit is known, so that the tables do not answer for them.
-    """
-    poses, swept, line = motion.question.poses, swept_of(motion.question.poses), None
-    loops = four_bars(motion.question.study.mechanism) if {"loops", "toggles"} & set(wanted) else ()
-    torn = np.zeros(poses.designs, dtype=bool)
-    if swept is not None and followed and (loops or "extremes" in wanted):
-        coordinates = peaks.needed(motion, names) if "extremes" in wanted else []
-        others = functions(loops, "toggles" in wanted)
-        if "extremes" in wanted:
-            others |= peaks.functions(motion, names)
-        line = PoseLine(motion, swept, coordinates, others, ends)
-    tables = {}
-    if "extremes" in wanted:
-        tables["extremes"] = peaks.extremes(motion, swept, line, names)
-    if loops:
-        tables["loops"] = loops_table(motion, loops, line, every)
-    if loops and line is not None and "toggles" in wanted:
-        tables["toggles"] = toggles_table(motion, loops, line)
-    return tables, torn if line is None else line.torn
-
-
-def targets_table(motion: Motion, sums: Floats | None = None) -> Table:
-    """Errors against the targets; `sums` are `targets.totals` of all poses, where the motion has only some of them."""
-    poses, errors, valid = motion.question.poses, motion.errors, motion.valid
-    sums = targets.totals(errors, poses.designs, valid) if sums is None else sums
-    return targets.table(motion.question.study, errors, poses, swept_of(poses), valid, sums)
 
 
 def jacobian_table(motion: Motion) -> Table:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.lines import Function, PoseLine
-from mechdesign.analyses.kinematics.motion import Motion, as_given
-from mechdesign.analyses.kinematics.peaks import peaks, zeros
+from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.motion import MotionQuestion
 from mechdesign.analyses.poses import solve_poses
-from mechdesign.mechanism import Configuration
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
-from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -21,55 +19,19 @@ from mechdesign.study.poses import Poses
 
 # Angles nearer than this are the same (radians).
 SAME_ANGLE = 1e-12
-# Transmission angles this near to 0 or a right angle are that (radians): they have a corner there.
-AT_CORNER = 1e-10
-# Links are in line where the sine of their angle is below this at a limit of motion,
-IN_LINE_AT_LIMIT = 1e-6
-# and at other poses.
-IN_LINE_AT_POSE = 1e-12
+# Links are in line where the sine of their angle is below this and turns back, or where the motion ends.
+IN_LINE = 1e-6
 # Toggles this near to each other are one, in rows of the sweep.
 SAME_TOGGLE = 1e-5
 ROLES = ("frame", "input", "coupler", "output")
 
 
-def functions(loops: Sequence[FourBar], toggles: bool) -> dict[str, Function]:
-    """Functions of a line for each loop: transmission angle, square of its sine, and for `toggles` sines and cosines.
-
-    The square has the same extremes as the angle and is smooth where that is 0 or a right angle.
-    """
-    found: dict[str, Function] = {}
-    for k, loop in enumerate(loops):
-        found[f"square {k}"] = _sine(loop, 3, 2)
-        found[f"angle {k}"] = Function(loop.transmission, lambda configuration, _: np.nan)
-        for end in (0, 3) if toggles else ():
-            found[f"sine {k} {end}"] = _sine(loop, end, 1)
-            found[f"cosine {k} {end}"] = _cosine(loop, end)
-    return found
-
-
-def _sine(loop: FourBar, end: int, power: int) -> Function:
-    """A power of the sine of the angle from the arm of the input (`end` 0) or output (3) to the coupler's action."""
-
-    def slope(configuration: Configuration, velocity: Rates) -> Value:
-        sine, cosine = loop.squareness(configuration, end)
-        return power * sine ** (power - 1) * cosine * loop.turning(configuration, velocity, end)
-
-    return Function(lambda configuration: loop.squareness(configuration, end)[0] ** power, slope)
-
-
-def _cosine(loop: FourBar, end: int) -> Function:
-    return Function(lambda configuration: loop.squareness(configuration, end)[1], lambda configuration, _: np.nan)
-
-
-def loops_table(
-    motion: Motion, loops: Sequence[FourBar], line: PoseLine | None, every: Poses | None = None
-) -> Table:  # fmt: skip
+def loops_table(question: MotionQuestion, loops: Sequence[FourBar], along: Along | None) -> Table:
     """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
 
-    `line` is the motion along its sweep, with `functions` of the loops; None where not just one coordinate is swept.
-    `every` are all poses, where the motion may have only some of them.
+    `along` is the motion with the loops; None of listed poses and grids.
     """
-    study, poses = motion.question.study, motion.question.poses
+    study, poses = question.study, question.poses
     length, angle = study.units.label("length"), study.units.label("angle")
     columns = [
         Column("kind", np.array([loop.kind for loop in loops]), "", "what the four bodies and their joints are"),
@@ -90,9 +52,9 @@ def loops_table(
         ]  # fmt: skip
     columns = [Column(c.name, np.tile(c.values, poses.designs), c.unit, c.meaning) for c in columns]
     at_unit, where = "", "row at the"
-    if line is not None:
-        at_unit, where = study.units.label(study.mechanism.quantity(line.swept)), f"{line.swept} at the"
-    both = _at_poses(study, every or poses, loops) if line is None else _between(motion, line, len(loops))
+    if along is not None and poses.swept is not None:
+        at_unit, where = study.units.label(study.mechanism.quantity(poses.swept)), f"{poses.swept} at the"
+    both = _at_poses(study, poses, loops) if along is None else _between(along, len(loops))
     for (values, places), end, which in zip(both, ("min", "max"), ("smallest", "largest"), strict=True):
         name = f"transmission_{end}"
         meaning = f"{which} angle between coupler and output, up to 90 deg"
@@ -100,7 +62,7 @@ def loops_table(
             Column(name, values.T.ravel() / study.units.angle_factor, angle, meaning),
             Column(f"{name}_at", places.T.ravel(), at_unit, f"{where} {which} value"),
         ]
-    return Table("loops", tuple(columns), "four-bars and slider-cranks, and how well they transmit")
+    return Table("loops", tuple(columns), over("four-bars and slider-cranks, and how well they transmit", along, ()))
 
 
 @quiet
@@ -121,54 +83,64 @@ def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tupl
     return found
 
 
-def _between(motion: Motion, line: PoseLine, count: int) -> list[tuple[Floats, Floats]]:
-    """Smallest and largest transmission angle over a swept motion, and the swept coordinate there."""
-    squares = np.array([line.rows[f"square {k}"] for k in range(count)])
-    angles = np.array([line.rows[f"angle {k}"] for k in range(count)])
-    found = []
-    for peak in peaks(line, squares, np.full((count, line.poses.designs), SAME_ANGLE), all_poses=True):
-        values = line.at(peak.node.ravel(), peak.place.ravel())[angles].reshape(count, *peak.node.shape)
-        value = np.stack([values[k, k] for k in range(count)])
-        for whole in (0.0, np.pi / 2):
-            value = np.where(np.abs(value - whole) <= AT_CORNER, whole, value)
-        place = as_given(motion, line.swept, peak.place, np.nan_to_num(peak.position))
-        found.append((np.where(np.isnan(peak.place), np.nan, value), place))
+def _between(along: Along, count: int) -> list[tuple[Floats, Floats]]:
+    """Smallest and largest transmission angle over motions, and their places; shape (loops, designs)."""
+    found, every = [], np.arange(along.curve.lines)
+    for name, angle in (("sine", np.arcsin), ("cosine", np.arccos)):
+        both = [along.worst(f"{name} {k} 3", -1, absolute=True, still=SAME_ANGLE) for k in range(count)]
+        values = np.stack([angle(np.clip(value, 0.0, 1.0)) for value, _ in both])
+        found.append((values, np.stack([along.shown(every, place) for _, place in both])))
     return found
 
 
-def toggles_table(motion: Motion, loops: Sequence[FourBar], line: PoseLine) -> Table:
-    """Every place at which the coupler of a loop comes into line with its input or its output."""
-    study, swept = motion.question.study, line.swept
+@dataclass(frozen=True)
+class Toggle:
+    """Where the coupler of a loop comes into line with its input or its output: the place in rows, and words."""
+
+    place: float
+    links: str
+    state: str
+    joints: str
+    effect: str
+    loop: str
+
+
+def toggles_of(loops: Sequence[FourBar], along: Along) -> list[Toggle]:
+    """Every toggle of a motion, in the order of its places."""
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
-    sines, cosines = (np.array([line.rows[f"{name} {k} {end}"] for k, end in which]) for name in ("sine", "cosine"))
-    found = zeros(line, sines, IN_LINE_AT_POSE, IN_LINE_AT_LIMIT)
-    found = found.take(_once(found.position(line), found.function))
-    position = found.position(line)
-    cosine = line.at(found.node, found.place)[cosines[found.function], np.arange(len(found.node))]
-    together = _together(position, found.function % len(loops))
-    places = as_given(motion, swept, found.place, position)
-    texts = [
-        _words(loops[which[function][0]], which[function][1], value, both)
-        for function, value, both in zip(found.function.tolist(), cosine.tolist(), together.tolist(), strict=True)
+    zeros = along.functions.zeros([f"sine {k} {end}" for k, end in which], IN_LINE)
+    zeros = zeros.take(_once(along.snapped(zeros.place), zeros.function))
+    if not len(zeros.place):
+        return []
+    configuration = along.curve.solve(zeros.line, along.curve.inside(zeros.line, zeros.place), judged=False)[1]
+    together = _together(zeros.place, zeros.function % len(loops))
+    cosines = {end: [loop.squareness(configuration, end)[1] for loop in loops] for end in (0, 3)}
+    found = []
+    for number, (function, place, both) in enumerate(
+        zip(zeros.function.tolist(), along.snapped(zeros.place).tolist(), together.tolist(), strict=True)
+    ):
+        k, end = which[function]
+        found.append(Toggle(place, *_words(loops[k], end, float(cosines[end][k][number]), both)))
+    return found
+
+
+def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
+    """Every place at which the coupler of a loop comes into line with its input or its output."""
+    place = np.array([toggle.place for toggle in toggles])
+    meanings = {
+        "links": "the two links in line", "state": "extended, folded, or perpendicular to the slide",
+        "joints": "joints of the two links", "effect": "what it does", "loop": "the four-bar or slider-crank",
+    }  # fmt: skip
+    words = [
+        Column(name, np.array([getattr(toggle, name) for toggle in toggles], dtype=str), "", meaning)
+        for name, meaning in meanings.items()
     ]
-    links, states, joints, effects, names = zip(*texts, strict=True) if texts else ((), (), (), (), ())
-    return Table(
-        "toggles",
-        (
-            Column(swept, places, study.units.label(study.mechanism.quantity(swept)),
-                   "value at which the links are in line"),
-            Column("links", np.array(links, dtype=str), "", "the two links in line"),
-            Column("state", np.array(states, dtype=str), "", "extended, folded, or perpendicular to the slide"),
-            Column("joints", np.array(joints, dtype=str), "", "joints of the two links"),
-            Column("effect", np.array(effects, dtype=str), "", "what it does"),
-            Column("loop", np.array(names, dtype=str), "", "the four-bar or slider-crank"),
-        ),
-        "links of four-bars and slider-cranks that come into line",
-    )  # fmt: skip
+    columns = [*along.place_columns(place, "value at which the links are in line"), *words]
+    return Table("toggles", tuple(columns), "links of four-bars and slider-cranks that come into line")
 
 
 def _once(position: Floats, function: Ints) -> Ints:
-    """Toggles in the order of the sweep; of those of the same links that are one, the one found first."""
+    """Toggles in the order of the motion; of those of the same links that are one, the one found first."""
     order = np.lexsort((position, function))
     begins = np.flatnonzero(_apart(position[order], function[order]))
     first = np.minimum.reduceat(order, begins) if len(order) else order

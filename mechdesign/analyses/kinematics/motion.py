@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,14 @@ from mechdesign.analyses.kinematics.targets import Error, errors, needed
 from mechdesign.analyses.poses import (
     SolvedPoses,
     expand_outputs,
+    followed_angles,
     in_study_units,
     pose_columns,
     radians,
     solve_poses,
     study_poses,
 )
+from mechdesign.curve.motion import Curve
 from mechdesign.errors import counted
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, quiet
@@ -38,8 +41,6 @@ from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.poses import KinematicsSection
 
-# A place this near to a pose or to zero, as a part of the sweep, is at it.
-AT_GIVEN_PLACE = 1e-12
 # Poses with a conditioning below this have lost digits.
 NEAR_SINGULAR = 1e-3
 # Step of the interpolation at change points (radians, or parts of the mechanism's size): its error is about 1e-12, that
@@ -47,10 +48,6 @@ NEAR_SINGULAR = 1e-3
 CHANGE_POINT_STEP = 1e-2
 STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
 STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
-# Of a sweep of more poses than about this some are left out where the motion between the poses is followed,
-ENOUGH_POSES = 4096
-# but no step becomes longer than this (radians, or parts of the mechanism's size).
-LONGEST_STEP = 0.02
 # An output that moves less than this part of its input (lengths in sizes of the mechanism) stands still: at a toggle.
 STANDS_STILL = 1e-12
 
@@ -134,6 +131,21 @@ class MotionQuestion:
             found.append(Static(f"{name}_advantage", unit, meaning))
         return found
 
+    @cached_property
+    def curve(self) -> Curve | None:
+        """The motion that the poses are, with its angles; None of listed poses and grids."""
+        if not self.poses.followed:
+            return None
+        mechanism = self.study.mechanism
+        plan = mechanism.plan(self.poses.groups[0].names)
+        return Curve(self.study, self.poses, followed_angles(mechanism, plan, self.watched))
+
+    @property
+    def lean(self) -> MotionQuestion:
+        """The question without rates, Jacobian and instant centres."""
+        nothing: dict[str, object] = {"rates": {}, "accelerations": {}, "speed": None, "instant_centres": ()}
+        return replace(self, section=self.section.model_copy(update=nothing), square=False, of_given=False)
+
     @property
     def mixed(self) -> bool:
         """Whether the Jacobian mixes lengths and angles, and the study gives no length that makes them comparable."""
@@ -197,8 +209,7 @@ class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
     `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
-    point whose values are those of the motion that goes through it. Where the poses are some of a long motion, one in
-    `stride` of all is enough to follow it.
+    point whose values are those of the motion that goes through it.
     """
 
     question: MotionQuestion
@@ -206,7 +217,6 @@ class Motion:
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    stride: int | None = None
 
     @property
     def valid(self) -> Flags:
@@ -219,8 +229,8 @@ class Motion:
             self.arrays[name] = np.full(self.question.poses.count, np.nan)
         self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
 
-    def fill(self, solved: SolvedPoses) -> None:
-        """Take up poses that give the same coordinates."""
+    def fill(self, solved: SolvedPoses) -> Linearization:
+        """Take up poses that give the same coordinates; returns their loop equations."""
         study, rows, configuration = self.question.study, solved.rows, solved.configuration
         given = self.question.poses.values
         self.reason[rows] = configuration.reason
@@ -244,6 +254,7 @@ class Motion:
             self._centres(linear, rows, linear.velocity([1.0]) if len(study.mechanism.drives) == 1 else velocity)
         if self.question.square or section.loads or section.mechanical_advantage:
             self._statics(linear, rows, regular)
+        return linear
 
     def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
         assert velocity is not None
@@ -360,50 +371,22 @@ def statics(question: MotionQuestion, linear: Linearization) -> dict[str, Value]
 
 
 @quiet
+def rates_of_advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> tuple[Value, Value]:
+    """Rates of an output and of the input of its mechanical advantage, by a drive that moves the input."""
+    mechanism, drives = question.study.mechanism, [drive.name for drive in question.drives]
+    rows = Jacobian.of(linear, [mechanism.coordinate(name) for name in (output, given)]).entries
+    k = drives.index(given) if given in drives else 0
+    return rows[0][k], rows[1][k]
+
+
+@quiet
 def _advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> Value:
     """Force of an output over that at its input: by virtual work the input's rate over the output's."""
-    mechanism, drives = question.study.mechanism, [drive.name for drive in question.drives]
-    both = [mechanism.coordinate(name) for name in (output, given)]
-    rows = Jacobian.of(linear, both).entries
-    k = drives.index(given) if given in drives else 0
-    given_out, put_in = rows[0][k], rows[1][k]
-    sizes = [mechanism.size if c.quantity == "length" else 1.0 for c in both]
+    mechanism = question.study.mechanism
+    given_out, put_in = rates_of_advantage(question, linear, output, given)
+    sizes = [mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in (output, given)]
     still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
     return np.where(still & (put_in != 0), np.inf, put_in / given_out)
-
-
-def thinned(motion: Motion, swept: str) -> Flags:
-    """Poses of a sweep that are enough to follow the motion: its ends, those where validity changes, some between."""
-    poses, valid = motion.question.poses, motion.valid
-    each = poses.count // poses.designs
-    taken: Flags = poses.numbers % (motion.stride or followed_stride(motion.question.study, poses, swept)) == 0
-    taken[each - 1 :: each] = True
-    change = valid[1:] != valid[:-1]
-    taken[1:] |= change
-    taken[:-1] |= change
-    return taken
-
-
-def followed_stride(study: Study, poses: Poses, swept: str) -> int:
-    """Of so many poses of a sweep one is enough to follow the motion between them."""
-    coordinate, each = study.mechanism.coordinate(swept), poses.count // poses.designs
-    steps = np.diff(poses.groups[0].values[swept][:each])
-    longest = LONGEST_STEP * (1.0 if coordinate.quantity == "angle" else study.mechanism.size)
-    step = float(radians(study, coordinate, max(steps.max(initial=0.0), -steps.min(initial=0.0))))
-    return max(min(-(-each // ENOUGH_POSES), int(longest / max(step, longest / each))), 1)
-
-
-def as_given(motion: Motion, swept: str, places: Floats, positions: Floats) -> Floats:
-    """Places on a sweep (core's units) in the study's unit; those at a pose exactly as the study gives it.
-
-    `positions` is where they are along the sweep, in rows.
-    """
-    (group,), study = motion.question.poses.groups, motion.question.study
-    given = group.values[swept]
-    values = in_study_units(study, study.mechanism.coordinate(swept), places)
-    beside, near = given[np.round(positions).astype(int)], AT_GIVEN_PLACE * np.ptp(given)
-    with np.errstate(invalid="ignore"):
-        return np.where(np.abs(beside - values) <= near, beside, np.where(np.abs(values) <= near, 0.0, values))
 
 
 def entry(output: Coordinate, drive: Coordinate) -> str:
@@ -427,7 +410,7 @@ def move(
     """
     study, poses = question.study, question.poses
     motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
-    for solved in solve_poses(study, poses, question.watched, jobs):
+    for solved in solve_poses(study, poses, question.watched, jobs, question.curve):
         motion.fill(solved)
         if also is not None:
             also(solved)
@@ -439,7 +422,7 @@ def move(
 def pieces(question: MotionQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, Motion]]:
     """The motion of poses of one kind in pieces, with their solved poses; what is held is a few pieces."""
     study, poses = question.study, question.poses
-    for solved in solve_poses(study, poses, question.watched, jobs):
+    for solved in solve_poses(study, poses, question.watched, jobs, question.curve):
         rows = solved.rows
         some = poses.take(slice(int(rows[0]), int(rows[-1]) + 1))
         motion = Motion(replace(question, poses=some), reason=np.zeros(len(rows), dtype=np.int8))

@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, followed_stride, move, pieces
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, move, pieces
 from mechdesign.analyses.kinematics.targets import Error
 from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
-from mechdesign.results import LongTable, Table
+from mechdesign.results import LongTable, Scope, Table
 
-# Of a long sweep that needs more poses than this to follow it, what lies between its poses is not looked at.
-MOST_FOLLOWED = 1 << 18
 # Which poses of a motion something is to be said of, by what it is.
 Marks = Callable[[Motion], Mapping[str, Flags]]
 
@@ -38,8 +36,8 @@ class Passage:
     Attributes
     ----------
     motion : Motion
-        Of all poses; of a long motion of those with the extremes of each column, those where validity or the sign of
-        the determinant changes, and as many between as a picture and the search between the poses need.
+        Of all poses; of a long motion of those with the extremes of each column, those where validity changes, and as
+        many between as a picture needs.
     shown : Shown
         The poses that a picture shows, of those of the motion.
     reason : int8 array, shape (poses,)
@@ -48,8 +46,6 @@ class Passage:
         What is to be said of how many of all poses.
     sums : ndarray
         `mechdesign.analyses.kinematics.targets.totals` of all poses.
-    followed : bool
-        Whether the poses of the motion are near enough to each other to follow it between them.
     """
 
     question: MotionQuestion
@@ -58,27 +54,24 @@ class Passage:
     reason: NDArray[np.int8]
     marks: Mapping[str, Mark]
     sums: Floats
-    followed: bool = True
 
     @property
     def long(self) -> bool:
         """Whether the motion has not all poses."""
         return self.motion.question is not self.question
 
-    def table(self, make: Callable[[Motion], Table], jobs: int | None) -> Table:
-        """A table with a row a pose; of a long motion its rows are made anew where they are wanted."""
-        like = make(self.motion)
-        return LongTable(like, self.question.poses.count, partial(self.blocks, make, jobs)) if self.long else like
+    def table(self, make: Callable[[Motion], Table], jobs: int | None, scope: Scope) -> Table:
+        """A table with a row a pose of a long motion; its rows are made anew where they are wanted."""
+        like = replace(make(self.motion), scope=scope)
+        return LongTable(like, self.question.poses.count, partial(self.blocks, make, jobs))
 
     def blocks(self, make: Callable[[Motion], Table], jobs: int | None) -> Iterator[Table]:
         """A table with a row a pose in parts."""
         return (make(motion) for _, motion in pieces(self.question, jobs))
 
 
-def pass_over(
-    question: MotionQuestion, swept: str | None, marks: Marks, progress: Progress, jobs: int | None
-) -> Passage:  # fmt: skip
-    """Solve every pose of a question once; `swept` is the coordinate that moves along a sweep.
+def pass_over(question: MotionQuestion, marks: Marks, progress: Progress, jobs: int | None) -> Passage:
+    """Solve every pose of a question once.
 
     Raises
     ------
@@ -91,9 +84,7 @@ def pass_over(
         found = {name: _mark(where, 0) for name, where in marks(motion).items()}
         sums = targets.totals(motion.errors, poses.designs, motion.valid)
         return Passage(question, motion, keeper.shown, motion.reason, found, sums)
-    stride = followed_stride(question.study, poses, swept) if swept is not None else poses.count
-    followed = poses.count // stride <= MOST_FOLLOWED
-    picked = _Picked(question, stride if followed else poses.count // MOST_FOLLOWED, keeper.rows)
+    picked = _Picked(question, keeper.rows)
     reason, told, sums = np.empty(poses.count, dtype=np.int8), dict[str, Mark](), np.zeros(())
     for solved, motion in pieces(question, jobs):
         reason[solved.rows] = motion.reason
@@ -108,9 +99,7 @@ def pass_over(
     motion, shown = picked.motion(), keeper.shown
     assert motion.question.poses.rows is not None
     rows = np.searchsorted(motion.question.poses.rows, shown.rows)
-    return Passage(
-        question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, told, sums, followed
-    )  # fmt: skip
+    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, told, sums)
 
 
 def _is_long(question: MotionQuestion) -> bool:
@@ -127,10 +116,9 @@ def _mark(where: Flags, begin: int) -> Mark:
 
 @dataclass
 class _Picked:
-    """Those poses of a long motion that stay in memory: every so many, the ones shown, and where something changes."""
+    """Those poses of a long motion that stay in memory: the ones shown, and where something changes."""
 
     question: MotionQuestion
-    stride: int
     shown: Ints
     _rows: list[Ints] = field(default_factory=list)
     _motions: list[Motion] = field(default_factory=list)
@@ -138,13 +126,12 @@ class _Picked:
     def add(self, begin: int, motion: Motion) -> None:
         """Take over the poses of the next piece, which begins with the row `begin`."""
         rows = begin + np.arange(len(motion.reason))
-        some = (rows % self.stride == 0) | np.isin(rows, self.shown)
+        some = np.isin(rows, self.shown)
         # Changes between two pieces lie between their ends.
         some[[0, -1]] = True
-        _beside(some, motion.valid[1:] != motion.valid[:-1])
-        if "det_J" in motion.arrays:
-            with np.errstate(invalid="ignore"):
-                _beside(some, (motion.arrays["det_J"][1:] > 0) != (motion.arrays["det_J"][:-1] > 0))
+        changes = motion.valid[1:] != motion.valid[:-1]
+        some[1:] |= changes
+        some[:-1] |= changes
         for values in [*motion.arrays.values(), *(error.values for error in motion.errors)]:
             known = motion.valid & np.isfinite(values)
             if known.any():
@@ -169,11 +156,4 @@ class _Picked:
                 for k, error in enumerate(parts[0].errors)
             ],
             np.concatenate([part.smooth for part in parts]),
-            self.stride,
         )
-
-
-def _beside(some: Flags, changes: Flags) -> None:
-    """Keep the poses on both sides of changes."""
-    some[1:] |= changes
-    some[:-1] |= changes

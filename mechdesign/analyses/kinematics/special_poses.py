@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.boundaries import Boundary
+from mechdesign.analyses.kinematics.along import Along
 from mechdesign.analyses.kinematics.instant_centres import Centre
-from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.limits import Limit
+from mechdesign.analyses.kinematics.loops import Toggle
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
 from mechdesign.analyses.kinematics.rates import drive_rates
-from mechdesign.analyses.poses import Shown, SolvedPoses, in_study_units, pose_in_words, solve_poses
+from mechdesign.analyses.poses import Shown, SolvedPoses, pose_in_words
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import quiet
-from mechdesign.mechanism.derivatives import STALLED, Jacobian, regularity
-from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.roots import bracketed_roots
-from mechdesign.results import Table
-from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.numerics.arrays import Ints
+from mechdesign.study.poses import Poses
 
 # Poses that are shown at most, and at least along a motion.
 MOST = 6
@@ -32,26 +32,24 @@ COMPARED = 200
 SAME = 1e-6
 DIGITS = 4
 LIMIT = "limit of motion"
+PASSED = "passes a singularity"
 SINGULAR = "singular: det_J is 0"
-# Of the place of a singularity, as a part of a step.
-ROOT_PRECISION = 1e-12
-AT_ZERO = 1e-10  # part of the sweep's range: a place as near to zero is zero
 CHANGE_POINT = "change point: all links in line"
 
 
 class Event(NamedTuple):
-    """A place on a sweep (study's units), what happens there, and the pose where it is known already."""
+    """A place on a motion, in rows, and what happens there."""
 
     place: float
     words: tuple[str, ...]
-    configuration: Configuration | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class SpecialPose:
     """One pose and how its points move: complex velocities and accelerations by point, nan where there are none."""
 
-    place: float  # along the sweep, in the study's units
+    row: float  # place along the motion, in rows
+    place: float  # what is swept there, in the study's units; else the row
     where: str  # ``crank = 40 deg``
     what: str  # what is special about it; empty of a pose without anything special
     configuration: Configuration  # a batch, of which it is pose `index`
@@ -76,9 +74,9 @@ class SpecialPoses:
 
 
 def special_poses(
-    motion: Motion, kept: Shown, swept: str | None, ends: Sequence[Boundary], toggles: Table | None
+    motion: Motion, kept: Shown, along: Along | None, limits: Sequence[Limit], toggles: Sequence[Toggle]
 ) -> SpecialPoses:  # fmt: skip
-    """The limits of a sweep and its toggles, with evenly spread poses where these are few; else listed poses.
+    """The limits of a motion and its toggles, with evenly spread poses where these are few; else listed poses.
 
     Of a grid there are none. `kept` are the solved poses that pictures show.
     """
@@ -87,23 +85,26 @@ def special_poses(
     if not poses.motion and not poses.listed:
         return SpecialPoses((), 0, rates)
     found, more = list[SpecialPose](), 0
-    if poses.motion and swept is not None:
-        events = _events(motion, swept, ends, toggles)
-        found, more = _distinct(motion, _at_events(motion, swept, events[:COMPARED])), len(events[COMPARED:])
+    if along is not None:
+        events = _events(along, limits, toggles)
+        found, more = _distinct(motion, _at_events(along, events[:COMPARED])), len(events[COMPARED:])
     valid = np.flatnonzero(kept.configuration.valid)
     some, left_out = valid[:MOST], max(len(valid), len(found)) - MOST
-    along = poses.values[swept] if swept is not None else np.arange(poses.count, dtype=float)
     if poses.motion:
-        some, left_out = _spread(motion, kept, along, [each.place for each in found]), len(found) + more - MOST
+        some, left_out = _spread(motion, kept, [each.row for each in found]), len(found) + more - MOST
     configuration = kept.configuration.take(some)
-    words = [(float(along[row]), pose_in_words(kept.study, poses, int(row), DIGITS), "") for row in kept.rows[some]]
+    swept = poses.numbers if poses.swept is None else poses.values[poses.swept]
+    words = [
+        (float(poses.numbers[k]), float(swept[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
+        for k in kept.rows[some].tolist()
+    ]
     solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)
-    found += _moving(motion, poses, solved, words)
-    found.sort(key=lambda each: (each.place - along[0]) * (along[-1] - along[0]))
+    found += _moving(motion.question, poses, solved, words)
+    found.sort(key=lambda each: each.row)
     return SpecialPoses(found[:MOST], max(left_out, 0), rates)
 
 
-def _spread(motion: Motion, kept: Shown, along: Floats, special: Sequence[float]) -> Ints:
+def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
     """Further poses of a motion, up to `FEW` of all: evenly spread, or where the gaps between special ones are widest.
 
     A motion that goes round has no ends.
@@ -111,11 +112,12 @@ def _spread(motion: Motion, kept: Shown, along: Floats, special: Sequence[float]
     valid, count = np.flatnonzero(kept.configuration.valid), FEW - len(special)
     if count < 1 or not len(valid):
         return np.empty(0, dtype=np.intp)
+    poses = motion.question.poses
     first, last = ({p: complex(kept.configuration.point(p)[k]) for p in _points(motion)} for k in valid[[0, -1]])
-    round_again = motion.question.poses.closed or _same(first, last, motion.question.study.mechanism.size)
+    round_again = poses.closed or _same(first, last, motion.question.study.mechanism.size)
     parts = ((np.arange(count) + 0.5) / count if round_again else np.linspace(0, 1, count)).tolist()
     if special:
-        begin, end = along[kept.rows[valid[[0, -1]]]]
+        begin, end = poses.numbers[kept.rows[valid[[0, -1]]]]
         marks = sorted((place - begin) / (end - begin) if end != begin else 0.0 for place in special)
         marks, parts = [*marks, marks[0] + 1] if round_again else [0.0, *marks, 1.0], []
         for _ in range(count):
@@ -125,93 +127,55 @@ def _spread(motion: Motion, kept: Shown, along: Floats, special: Sequence[float]
     return np.asarray(valid[np.unique((np.array(parts) * (len(valid) - 1)).round().astype(int))])
 
 
-def _events(motion: Motion, swept: str, ends: Sequence[Boundary], toggles: Table | None) -> list[Event]:
-    """Limits and toggles in the order of the sweep; those at one place are one."""
-    study = motion.question.study
-    coordinate, values = study.mechanism.coordinate(swept), motion.question.poses.groups[0].values[swept]
+def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) -> list[Event]:
+    """Limits, singularities and toggles in the order of the motion; those at one place are one."""
     found = []
-    for end in ends:
-        where = f" at {end.cause.joint}" if end.cause.joint else ""
-        place = float(in_study_units(study, coordinate, end.place))
-        found.append(Event(place, (f"{LIMIT}: {end.cause.kind}{where}",), end.configuration))
-    for row in toggles or ():
-        names = row["loop"].split(" (")[0].split("-")
-        pair = next(f"{one} and {two}" for one, two in pairwise(names) if f"{one} {two}" == row["links"])
-        state = row["state"].replace("perpendicular", "perpendicular to the slide")
-        whole = row["effect"] == "change point"
-        found.append(Event(row[swept], (CHANGE_POINT if whole else f"{pair} {state}: {row['effect']}",)))
-    found += [Event(place, (SINGULAR,)) for place in _singular(motion, swept)]
-    found.sort(key=lambda event: (event.place - values[0]) * (values[-1] - values[0]))
+    for limit in limits:
+        where = f" at {limit.cause.joint}" if limit.cause.joint else ""
+        what = PASSED if limit.end is None else f"{LIMIT}: {limit.cause.kind}"
+        found.append(Event(limit.place, (f"{what}{where}",)))
+    for toggle in toggles:
+        names = toggle.loop.split(" (")[0].split("-")
+        pair = next(f"{one} and {two}" for one, two in pairwise(names) if f"{one} {two}" == toggle.links)
+        state = toggle.state.replace("perpendicular", "perpendicular to the slide")
+        whole = toggle.effect == "change point"
+        found.append(Event(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
+    found += [Event(place, (SINGULAR,)) for place in _singular(along)]
+    found.sort(key=lambda event: event.place)
     merged: list[Event] = []
     for event in found:
-        if merged and abs(event.place - merged[-1].place) <= SAME * float(np.ptp(values)):
+        if merged and abs(event.place - merged[-1].place) <= SAME * along.curve.poses.end:
             before = merged.pop()
-            words = tuple(dict.fromkeys(before.words + event.words))
-            event = Event(before.place, words, before.configuration or event.configuration)
+            event = Event(before.place, tuple(dict.fromkeys(before.words + event.words)))
         merged.append(event)
     return merged
 
 
-def _singular(motion: Motion, swept: str) -> list[float]:
-    """Where the determinant of a Jacobian of several outputs changes its sign along a sweep, in the study's units.
+def _singular(along: Along) -> list[float]:
+    """Where the determinant of a Jacobian of several outputs is zero along a motion, in rows.
 
     Of one output and one drive that is where the output turns back.
     """
-    question = motion.question
+    question = along.question
     if not question.square or len(question.drives) < 2:
         return []
-    study, values, det = question.study, question.poses.groups[0].values[swept], motion.arrays["det_J"]
-    known = motion.valid & np.isfinite(det)
-    rows = np.flatnonzero(known[:-1] & known[1:] & ((det[:-1] > 0) != (det[1:] > 0)))
-
-    def determinant(_: Ints, places: Floats) -> Floats:
-        (solved,) = solve_poses(study, _poses_at(motion, swept, places))
-        linear = study.mechanism.linearize(solved.configuration)
-        value = np.where(solved.configuration.valid, Jacobian.of(linear, question.listed).determinant, np.nan)
-        return np.broadcast_to(value, places.shape)
-
-    low, high, none = values[rows], values[rows + 1], np.full(len(rows), np.nan)
-    tolerance = ROOT_PRECISION * np.abs(high - low)
-    roots = bracketed_roots(determinant, low, det[rows], high, det[rows + 1], none, none, tolerance)
-    # A determinant that jumps through infinity has no root.
-    size = np.nanmax(np.abs(det[known]), initial=0.0)
-    roots = np.where(np.abs(roots) <= AT_ZERO * np.ptp(values), 0.0, roots)
-    return roots[np.abs(determinant(rows, roots)) <= SAME * size].tolist() if len(rows) else []
+    own = Along(question, along.curve, ["det_J"])
+    return [float(place) for place in own.functions.zeros(["det_J"], 0.0).place]
 
 
-def _poses_at(motion: Motion, swept: str, places: Floats) -> Poses:
-    """Places on a sweep as poses that stand for themselves."""
-    whole, count = motion.question.poses, len(places)
-    (group,) = whole.groups
-    along = np.argsort(group.values[swept], kind="stable")
-
-    def there(values: Floats) -> Floats:
-        return np.asarray(np.interp(places, group.values[swept][along], values[along]))
-
-    values = {name: places if name == swept else there(group.values[name]) for name in group.names}
-    return Poses(
-        (PoseGroup(group.names, values, np.arange(count)),), count, True, (count,),
-        slopes={name: there(each) for name, each in whole.slopes.items()},
-        bends={name: there(each) for name, each in whole.bends.items()},
-    )  # fmt: skip
-
-
-def _at_events(motion: Motion, swept: str, events: Sequence[Event]) -> list[SpecialPose]:
+def _at_events(along: Along, events: Sequence[Event]) -> list[SpecialPose]:
     """The poses of events; those that cannot be assembled (at infinity) are left out."""
-    study, count = motion.question.study, len(events)
-    poses = _poses_at(motion, swept, np.array([event.place for event in events]))
-    (solved,) = solve_poses(study, poses) if count else (None,)
-    found = []
-    for k, event in enumerate(events):
-        assert solved is not None
-        configuration, words = solved.configuration.take(np.array([k])), "; ".join(event.words)
-        if not configuration.valid[0] and event.configuration is not None:
-            # Rounding puts a limit beyond itself.
-            reason = event.configuration.reason.reshape(1)
-            configuration = replace(event.configuration, shape=(1,), reason=reason)
-        if configuration.valid[0]:
-            one = SolvedPoses(np.array([k]), solved.given, configuration)
-            found += _moving(motion, poses, one, [(event.place, pose_in_words(study, poses, k, DIGITS), words)])
+    if not events:
+        return []
+    line, s = np.zeros(len(events), dtype=np.intp), np.array([event.place for event in events])
+    poses, configuration = along.curve.solve(line, along.curve.inside(line, s), judged=False)
+    at, shown, found = along.curve.poses.along(line, s), along.shown(line, s), []
+    for k in np.flatnonzero(configuration.reason == 0).tolist():
+        # Of a pose at a limit the words have the limit.
+        where = pose_in_words(along.question.study, at, k, DIGITS)
+        words = [(events[k].place, float(shown[k]), where, "; ".join(events[k].words))]
+        one = SolvedPoses(np.array([k]), along.question.poses.groups[0].names, configuration.take(np.array([k])))
+        found += _moving(along.question, poses, one, words)
     return found
 
 
@@ -235,10 +199,10 @@ def _points(motion: Motion) -> Sequence[str]:
 
 @quiet
 def _moving(
-    motion: Motion, poses: Poses, solved: SolvedPoses, words: Sequence[tuple[float, str, str]]
+    question: MotionQuestion, poses: Poses, solved: SolvedPoses, words: Sequence[tuple[float, float, str, str]]
 ) -> list[SpecialPose]:  # fmt: skip
     """Solved poses with the rates of all points and the instant centres asked; `words` are where and what each is."""
-    question, configuration = motion.question, solved.configuration
+    configuration = solved.configuration
     mechanism, section = question.study.mechanism, question.section
     linear = mechanism.linearize(configuration)
     regular = np.broadcast_to(regularity(linear) >= STALLED, configuration.shape)

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
-from mechdesign.results import Column, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.targets import Target, timing
@@ -47,6 +46,22 @@ def needed(study: Study, poses: Poses) -> tuple[str, ...]:
         drive = timing(study.mechanism.drives, poses) if target.timed else None
         names += [drive] if drive is not None else []
     return tuple(dict.fromkeys(names))
+
+
+def followed(study: Study, poses: Poses) -> Iterator[tuple[str, Quantity]]:
+    """Names and quantities of the errors that have values between the poses: not of targets with a value for each."""
+    for target in study.targets.values():
+        if _a_value_each(target, poses):
+            continue
+        for name in target.coordinates:
+            yield f"{name}_error", study.mechanism.quantity(name)
+        if len(target.coordinates) == 2:
+            yield f"{target.owner}_error", "length"
+
+
+def _a_value_each(target: Target, poses: Poses) -> bool:
+    """Whether a target has a value for each pose of a design."""
+    return target.table is not None and not target.timed and len(target.table) == poses.count // poses.designs
 
 
 def errors(
@@ -95,7 +110,7 @@ def _wanted(
         assert drive is not None
         turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else None
         return _interpolated(table, values[drive], turn)
-    if len(table) == poses.count // poses.designs:
+    if _a_value_each(target, poses):
         return None if between else list(table[rows % len(table)].T)
     x, y = (values[name] for name in target.coordinates)
     foot = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
@@ -142,41 +157,6 @@ def totals(found: Sequence[Error], designs: int, valid: Flags) -> Floats:
         values = np.where(known, error.values.reshape(known.shape), 0.0)
         sums[:, :, k] = known.sum(axis=1), values.sum(axis=1), (values**2).sum(axis=1)
     return sums
-
-
-def table(study: Study, found: Sequence[Error], poses: Poses, swept: str | None, valid: Flags, sums: Floats) -> Table:
-    """Mean and largest errors of each design over the valid poses that have a target; `sums` are their `totals`."""
-    shape = (poses.designs, poses.count // poses.designs)
-    at = poses.values[swept] if swept is not None else poses.numbers
-    found_at = np.full((4, poses.designs, len(found)), np.nan)
-    for k, error in enumerate(found):
-        known = (valid & np.isfinite(error.values)).reshape(shape)
-        some = known.any(axis=1)
-        values = np.where(known, error.values.reshape(shape), 0.0)[some]
-        worst = np.where(known[some], np.abs(values), -1.0).argmax(axis=1)
-        lane, (count, total, squares) = np.arange(len(worst)), sums[:, some, k]
-        found_at[:, some, k] = (
-            np.sqrt(squares / count),
-            total / count,
-            np.abs(values[lane, worst]),
-            at.reshape(shape)[some][lane, worst],
-        )
-    rms, mean, largest, where = found_at.reshape(4, -1)
-    unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
-    units = np.tile(np.array([study.units.label(error.quantity) for error in found], dtype=str), poses.designs)
-    outputs = np.tile(np.array([error.output for error in found], dtype=str), poses.designs)
-    return Table(
-        "targets",
-        (
-            Column("output", outputs, "", "what has a target"),
-            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance), in `unit`"),
-            Column("mean", mean, "", "mean error, in `unit`"),
-            Column("max_abs", largest, "", "largest absolute error, in `unit`"),
-            Column("at", where, unit, f"{swept or 'row (from 0)'} at the largest error"),
-            Column("unit", units, "", "unit of its errors"),
-        ),
-        "errors of the outputs against their targets, over the valid poses",
-    )
 
 
 def untargeted(study: Study, found: Sequence[Error], valid: Flags) -> dict[str, Flags]:

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.analysis import A_ROW_A_POSE
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
 from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
@@ -30,6 +32,7 @@ from mechdesign.study import Study
 from mechdesign.study.variants import faults, follows, variant
 
 NO_REGION = "nothing of the workspace can be reached"
+BETWEEN = "the motion cannot be assembled between its poses"
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 # Why a pose fails, by `mechdesign.mechanism.Reason`.
 FAILED = np.array([
@@ -91,8 +94,9 @@ class Evaluator:
         # Goals of commands and tables whose answers are found for all designs at once; those asked of each design.
         self._together: dict[str, dict[str, list[Goal]]] = {}
         self._alone: dict[str, list[Goal]] = {}
-        # Outputs whose extremes are asked.
+        # Outputs whose extremes are asked, and columns whose worst value counts between the poses, too.
         self._outputs: set[str] = set()
+        self._columns_between: set[str] = set()
         self._regional = [each for each in self.goals if each.regional]
         whole = [each for each in self._regional if each.shape is None]
         self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
@@ -152,13 +156,17 @@ class Evaluator:
         together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)
         if command in stacked.TABLES:
             poses = stacked.poses_of(self.study, command)(1, {}, {})
-            result = stacked.tables(self.study, command, stacked.TABLES[command], poses).result
+            gates = [each.column for each in goals if each.gate and not each.where]
+            columns = [column.removeprefix(f"{table}.") for column in gates for table in A_ROW_A_POSE]
+            stack = stacked.tables(self.study, command, stacked.TABLES[command], poses, columns=columns)
             for each in list(goals):
                 with suppress(UnknownColumnError):
-                    chosen = self._count(each, result)
+                    chosen = self._count(each, stack.result, stack.along)
                     goals.remove(each)
                     if chosen.table.name == "extremes":
                         self._outputs.update(chosen.table["output"][chosen.counts].tolist())
+                    elif chosen.table.name in A_ROW_A_POSE and each.gate and not each.where:
+                        self._columns_between.add(chosen.column)
                     if together:
                         self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(each)
                     else:
@@ -175,16 +183,16 @@ class Evaluator:
                 except UnknownColumnError as error:
                     yield self.study.problem(str(error), *self._keys.get(each, ()))
 
-    def _count(self, each: Goal, result: Result) -> Chosen:
+    def _count(self, each: Goal, result: Result, along: Along | None = None) -> Chosen:
         """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
         chosen = choose(result, each.column, dict(each.where))
         if chosen.missing:
             raise UnknownColumnError(chosen.missing)
-        _, rows, squares = each.judge(result)
-        if squares:
+        judgement = each.judge(result, 1, along)
+        if judgement.squares:
             self.squares.add(each)
-        if rows is not None and (squares or rows.size > 1):
-            self._rows[each] = rows.size
+        if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
+            self._rows[each] = judgement.rows.size
         return chosen
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
@@ -202,9 +210,8 @@ class Evaluator:
             rows, size = batch.feasible, max(1, POSES_AT_ONCE // self._poses[command](1, {}, {}).count)
             for begin in range(0, len(rows), size):
                 self._tables(batch, command, tables, rows[begin : begin + size])
-        alone = bool(self._alone) or not self._regions_together
-        for k in batch.feasible.tolist():
-            if alone or k in batch.left:
+        if self._alone or not self._regions_together:
+            for k in batch.feasible.tolist():
                 batch.reasons[k] = self._one(batch, k)
         for each, values in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
             batch.note(slice(None), np.isnan(values), f"{each.name} has no value")
@@ -245,25 +252,21 @@ class Evaluator:
     def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
         poses = self._poses[command](len(rows), batch.take(batch.places, rows), batch.take(batch.parameters, rows))
         wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
-        stack = stacked.tables(self.study, command, wanted, poses, self._outputs)
+        stack = stacked.tables(self.study, command, wanted, poses, self._outputs, self._columns_between)
         failed = FAILED[_first(stack.reason)]
         wrong = stack.reason != 0
-        # The errors of the poses that are left would be the smaller the more of them are lost.
-        whole = poses.listed or "targets" in tables
-        batch.note(rows, wrong.any(axis=1) if whole else wrong.all(axis=1), failed)
+        partly = all(each.unassembled for goals in tables.values() for each in goals)
+        batch.note(rows, wrong.all(axis=1) if partly else wrong.any(axis=1), failed)
+        batch.note(rows, ~stack.whole & (not partly), BETWEEN)
         clear = self.layout.assembly.get(command)
         if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
             margins = stacked.assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None:
                 batch.table[rows, clear] = margins
-        for table, goals in tables.items():
-            left = stack.open.get(table, np.zeros(len(rows), dtype=bool))
-            for each in goals:
-                lost = np.isnan(batch.judge(each, stack.result, rows)) & ~left
-                batch.note(rows, lost & (failed != ""), failed)
-            for k in rows[left].tolist():
-                batch.left.setdefault(k, {}).setdefault(command, []).extend(goals)
+        for each in [each for goals in tables.values() for each in goals]:
+            lost = np.isnan(batch.judge(each, stack.result, rows, stack.along))
+            batch.note(rows, lost & (failed != ""), failed)
 
     def _needed(self, study: Study) -> Study:
         """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
@@ -278,7 +281,7 @@ class Evaluator:
 
     def _one(self, batch: _Batch, k: int) -> str:
         """Ask what is left of one design; returns why it is infeasible."""
-        row, left = np.array([k]), batch.left.get(k, {})
+        row = np.array([k])
         command = ""
         try:
             other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
@@ -287,13 +290,12 @@ class Evaluator:
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
             other = self._needed(other)
-            for command in dict.fromkeys((*self._alone, *left)):
-                result, asked = ask(other, command), (*self._alone.get(command, ()), *left.get(command, ()))
-                whole = any(choose(result, each.column, dict(each.where)).table.name == "targets" for each in asked)
-                if result.failed or (whole and self._pose_reason(batch, k, other, command)):
-                    return self._pose_reason(batch, k, other, command)
-                if any(np.isnan(batch.judge(each, result, row)).any() for each in asked):
-                    return self._pose_reason(batch, k, other, command)
+            for command, goals in self._alone.items():
+                result = ask(other, command)
+                partly = [not each.unassembled and _missing(each, result) for each in goals]
+                values = [batch.judge(each, result, row) for each in goals]
+                if result.failed or any(partly) or np.isnan(values).any():
+                    return self._pose_reason(batch, k, other, command) or (BETWEEN if any(partly) else "")
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
@@ -325,8 +327,6 @@ class _Batch:
         self.reasons = np.array(faults(evaluator.study, self.parameters, self.places, count), dtype=object)
         self.table = np.full((count, self._layout.width), np.nan)
         self.table[self.feasible, self._layout.shortfall] = 1.0
-        # What is still to be asked of single designs, by their row and by command.
-        self.left: dict[int, dict[str, list[Goal]]] = {}
 
     @property
     def feasible(self) -> Ints:
@@ -338,9 +338,9 @@ class _Batch:
         count = len(self.reasons)
         return {name: np.broadcast_to(np.asarray(v, dtype=float), count)[rows] for name, v in values.items()}
 
-    def judge(self, each: Goal, result: Result, rows: Ints) -> Floats:
+    def judge(self, each: Goal, result: Result, rows: Ints, along: Along | None = None) -> Floats:
         """Note the values of a goal by a result of some designs; returns them."""
-        values, listed, _ = each.judge(result, len(rows))
+        values, listed, _ = each.judge(result, len(rows), along)
         self.table[rows, self._layout.column[each]] = values
         place = self._layout.rows.get(each, slice(0))
         if listed is not None and listed.shape[1] == place.stop - (place.start or 0):
@@ -350,6 +350,12 @@ class _Batch:
     def note(self, rows: Ints | slice, wrong: Flags, reasons: NDArray[np.object_] | str) -> None:
         """Say what is wrong with some of the rows, where nothing has been said yet."""
         self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
+
+
+def _missing(each: Goal, result: Result) -> bool:
+    """Whether a part of the motion that a goal is of is not valid."""
+    scope = choose(result, each.column, dict(each.where)).table.scope
+    return scope is not None and bool(scope.missing)
 
 
 def _first(reason: NDArray[np.int8]) -> Ints:

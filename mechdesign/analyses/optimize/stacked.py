@@ -10,13 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.analyses.kinematics import analysis as kinematics
+from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.extremes import extremes, targets_table
+from mechdesign.analyses.kinematics.loops import loops_table
 from mechdesign.analyses.kinematics.motion import Motion, motion_question, move
+from mechdesign.analyses.kinematics.targets import followed
 from mechdesign.analyses.poses import SolvedPoses, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
 from mechdesign.expressions import Expression
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -26,12 +31,11 @@ from mechdesign.study.variants import follows
 
 _OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
     "motion": kinematics.motion_table,
-    "targets": kinematics.targets_table,
     "jacobian": kinematics.jacobian_table,
     "instant_centres": kinematics.centres_table,
 }
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": (*_OF_MOTION, "extremes", "loops"),
+    "kinematics": (*_OF_MOTION, "extremes", "loops", "targets"),
     "stiffness": ("stiffness", "compliance", "deflections"),
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
@@ -48,15 +52,18 @@ class Stack(NamedTuple):
     ----------
     reason : int8 array, shape (designs, poses)
         See `mechdesign.mechanism.Reason`.
-    open : mapping of str to bool array, shape (designs,)
-        By table, the designs that it does not answer for.
+    whole : bool array, shape (designs,)
+        Whether the motion has no gap between the poses, as far as they are those of one.
+    along : Along, optional
+        The motions of the designs between their poses.
     solved : list of SolvedPoses
         The poses, where the command solves them as they are; else empty.
     """
 
     result: Result
     reason: NDArray[np.int8]
-    open: Mapping[str, Flags]
+    whole: Flags
+    along: Along | None
     solved: list[SolvedPoses]
 
 
@@ -151,7 +158,8 @@ def _formulas(study: Study, command: str) -> Mapping[tuple[int, str], Expression
 
 
 def tables(
-    study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None
+    study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None,
+    columns: Collection[str] = (),
 ) -> Stack:  # fmt: skip
     """Answers of a command for the poses of several designs.
 
@@ -161,29 +169,36 @@ def tables(
         Names of tables.
     outputs : collection of str, optional
         Of the extremes; all where left out.
+    columns : collection of str
+        Others that are followed between the poses.
     """
-    torn = np.zeros(poses.designs, dtype=bool)
     solved: list[SolvedPoses] = []
     absent: Mapping[str, str] = {}
+    along = None
     if command == "kinematics":
         motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
-        known = {"motion": True, "targets": bool(motion.errors), "jacobian": motion.question.square,
-                 "instant_centres": bool(motion.question.centres)}  # fmt: skip
+        question, absent = motion.question, motion.question.absent
+        known = {"motion": True, "jacobian": question.square, "instant_centres": bool(question.centres)}
         found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
-        # Torn are designs whose motion ends where no limit is known.
-        between, torn = kinematics.tables_between(motion, (), wanted, outputs)
-        found, reason, absent = found | between, motion.reason, motion.question.absent
+        loops = four_bars(study.mechanism) if "loops" in wanted else ()
+        errors = [name for name, _ in followed(study, poses)] if "targets" in wanted else []
+        along = kinematics.along_of(question, outputs, loops, also=[*columns, *errors])
+        if "extremes" in wanted:
+            found["extremes"] = extremes(motion, along, outputs)
+        if loops:
+            found["loops"] = loops_table(question, loops, along)
+        if motion.errors and "targets" in wanted:
+            found["targets"] = targets_table(motion, along)
+        reason = motion.reason
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
-        question = stiffness.ask(study)
-        held = stiffness.solve(study, question, poses)
-        found, reason = stiffness.tables(study, question, poses, held), held.reason
+        body = stiffness.ask(study)
+        held = stiffness.solve(study, body, poses)
+        found, reason = stiffness.tables(study, body, poses, held), held.reason
         found = {name: table for name, table in found.items() if name in TABLES[command]}
-    reason = reason.reshape(poses.designs, -1)
-    return Stack(
-        Result(command, found, absent=absent), reason, {"loops": torn | reason.any(axis=1), "extremes": torn}, solved
-    )
+    whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
+    return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
 
 
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:

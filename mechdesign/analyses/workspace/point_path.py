@@ -4,66 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.kinematics.boundaries import boundaries
-from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.poses import in_study_units
+from mechdesign.curve.functions import Functions
+from mechdesign.curve.motion import Curve
 from mechdesign.errors import AssemblyError, Problem, StudyError
-from mechdesign.mechanism.margins import SweepMargins
+from mechdesign.mechanism.algebra import quiet
+from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.numerics.roots import bracketed_roots
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 
-# Poses in which the motion is looked for, a turn; rows of the table of one path.
-POSES, ROWS = 720, 361
-# Gauss nodes of the arc length between two rows; that of the second rule tells the error.
-NODES, FEWER = 8, 6
-# The rows of a path end this far (as a part of it) before a singularity, where rates are infinite.
-INSET = 1e-9
-# A speed ratio this many times the usual one is infinite.
-ENDLESS = 1e7
+# Rows of the table of one path.
+ROWS = 361
+# A motion shorter than this part of the drive's range is rounding.
+SHORTEST = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A point as a function of the place t in [0, pi] along one motion, of which the drive is (radians or length)
+    """One motion of the drive from `low` to `high` (radians or length), and what ends it."""
 
-        low + (high - low) (1 - cos t)/2
-
-    Where the drive turns back (a dead centre) the point moves as the root of what is left of the range: smooth in t.
-    `ends` says what ends the motion.
-    """
-
-    margins: SweepMargins
-    outputs: tuple[str, str]
+    study: Study
+    drive: str
     low: float
     high: float
     ends: tuple[str, str] = ("", "")
     closed: bool = False
 
-    def drive(self, t: Floats) -> Floats:
-        t = np.clip(t, INSET, np.pi - INSET)
-        return self.low + (self.high - self.low) * np.sin(t / 2) ** 2
+    def functions(self, outputs: Sequence[str]) -> Functions:
+        """The point's coordinates and its speed by the drive along the motion, which is one row long."""
+        mechanism = self.study.mechanism
+        curve = _curve(self.study, self.drive, self.low, self.high)
+        coordinates = [mechanism.coordinate(name) for name in outputs]
 
-    def of(self, t: Floats) -> tuple[Floats, Floats]:
-        """Place (2, n), and its slope by the drive (2, n)."""
-        mechanism = self.margins.mechanism
-        pose = self.margins.solve(self.drive(t), limits=False)
-        rates = mechanism.linearize(pose).velocity([1.0])
-        coordinates = [mechanism.coordinate(name) for name in self.outputs]
-        place = np.stack([np.broadcast_to(pose.value(c), t.shape) for c in coordinates])
-        slope = np.stack([np.broadcast_to(first(pose, c, rates), t.shape) for c in coordinates])
-        return place, slope
+        @quiet
+        def evaluate(line: Ints, s: Floats) -> tuple[Floats, Floats]:
+            pose = curve.solve(line, s, judged=False)[1]
+            linear = mechanism.linearize(pose)
+            rates = linear.velocity([1.0])
+            slope = [first(pose, c, rates) for c in coordinates]
+            rows = [*(pose.value(c) for c in coordinates), np.hypot(*slope)]
+            conditioning = np.broadcast_to(regularity(linear), s.shape)
+            return np.stack([np.broadcast_to(row, s.shape) for row in rows]), conditioning
 
-    def speed(self, t: Floats) -> Floats:
-        """Slope of the place by t."""
-        t = np.clip(t, INSET, np.pi - INSET)
-        return self.of(t)[1] * (0.5 * (self.high - self.low) * np.sin(t))
+        sizes = [mechanism.size, mechanism.size, 0.0]
+        return Functions(curve, [*outputs, _SPEED], evaluate, sizes, extremes=outputs, means=[_SPEED])
+
+
+_SPEED = "speed"
+
+
+def _curve(study: Study, drive: str, low: float, high: float) -> Curve:
+    """The motion of a drive between two values; the whole path is wanted, however many turns its limits leave it."""
+    ends = np.array([low, high]) / (study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else 1.0)
+    return Curve(study, Poses.single({drive: ends}), turning=False)
 
 
 def point_path(study: Study) -> Result:
@@ -90,18 +90,22 @@ def point_path(study: Study) -> Result:
     rows: list[list[Floats]] = []
     totals: list[list[float]] = []
     for k, path in enumerate(paths):
-        place, slope = path.of(t)
-        ratio = np.hypot(*slope)
-        # At a dead centre the point moves and the drive does not; rounding leaves a large number of it.
-        ratio = np.where(ratio < ENDLESS * np.nanmedian(ratio), ratio, np.inf) if ratio.any() else ratio
-        turns = _turns(path, t)
-        arc, error = _along(path, np.concatenate(turns), t)
-        box = [path.of(np.concatenate([t[[0, -1]], at]))[0][axis] for axis, at in enumerate(turns)]
+        functions, line = path.functions(outputs), np.zeros(ROWS, dtype=np.intp)
+        part = np.sin(t / 2) ** 2
+        *places, ratio = functions.at(line, functions.curve.inside(line, part))
+        for end, side, fold in ((0, -1, functions.curve.pieces.fold[0]), (-1, 1, functions.curve.pieces.fold[-1])):
+            for name, values in zip(outputs, places, strict=True):
+                values[end] = functions.at_end(name, 0, float(end == -1), side)
+            # At a dead centre the point moves and the drive does not.
+            ratio[end] = np.inf if fold else ratio[end]
+        (arc, error), travel = functions.integral(_SPEED, line, part), path.high - path.low
+        arc, error = arc * travel, error * travel
+        still = np.zeros((2, 1))
+        box = [functions.extremes(outputs, sign, still).value[:, 0] * sign for sign in (-1, 1)]
         with np.errstate(divide="ignore"):
-            rows.append([np.full(ROWS, k), path.drive(t), *place, ratio, 1 / ratio, arc])
+            rows.append([np.full(ROWS, k), path.low + travel * part, *places, ratio, 1 / ratio, arc])
         totals.append([
-            arc[-1], error, *(side.min() for side in box), *(np.ptp(side) for side in box),
-            arc[-1] / (path.high - path.low), ratio.min(), ratio.max(),
+            arc[-1], error, *box[0], *(box[1] - box[0]), arc[-1] / travel, ratio.min(), ratio.max(),
         ])  # fmt: skip
     piece, at, x, y, ratio, inverse, arc = (np.concatenate(parts) for parts in zip(*rows, strict=True))
     told = (
@@ -141,29 +145,26 @@ def point_path(study: Study) -> Result:
 
 def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
     """The motions of the mechanism: that of the sketch, or of every range in which it can be assembled."""
-    mechanism, unit = study.mechanism, study.units.angle_factor
+    mechanism = study.mechanism
     coordinate = mechanism.coordinate(drive)
     drawn = float(mechanism.sketch_configuration.value(coordinate))
     turning = coordinate.quantity == "angle"
     low, high = (drawn - 2 * np.pi, drawn + 2 * np.pi) if turning else _range(study, drive)
-    number = (2 if turning else 1) * POSES + 1
-    place = np.linspace(low, high, number) / (unit if turning else 1.0)
-    # The whole path is wanted, however many turns the limits leave the drive.
-    near = {name: np.full(number, value) for name, value in mechanism.drawn_angles().items()}
-    margins = SweepMargins(mechanism, {drive: radians(study, coordinate, place)}, drive, near, counted=False)
-    valid = margins.solve(margins.at).valid
-    ends = boundaries(margins, valid)[0]
-    if not valid.any() and not ends:
+    curve = _curve(study, drive, low, high)
+    pieces = curve.pieces
+    if not len(pieces.line):
         raise AssemblyError(f"no position of drive {drive} can be assembled within the limits")
-    if not ends and turning:
-        return [_Path(margins, outputs, drawn - np.pi, drawn + np.pi, closed=True)]
-    # Stretches between neighbouring ends whose middle is valid.
+    if not curve.ends and turning:
+        return [_Path(study, drive, drawn - np.pi, drawn + np.pi, closed=True)]
+    # Stretches of the motion between its ends.
     end = f"end of the range of {drive}"
-    marks = [(low, end), *((end.place, f"{end.cause.kind}: {end.cause.joint}") for end in ends), (high, end)]
+    causes = {mark.place: f"{mark.cause.kind}: {mark.cause.joint}" for mark in curve.ends}
+    breaks = np.flatnonzero(np.append(True, ~pieces.joined_to_next | np.isin(pieces.end[:-1], list(causes))))
+    stretches = zip(pieces.begin[breaks], pieces.end[np.append(breaks[1:] - 1, -1)], strict=True)
     paths = [
-        _Path(margins, outputs, a, b, (cause_a, cause_b))
-        for (a, cause_a), (b, cause_b) in pairwise(sorted(marks, key=lambda mark: mark[0]))
-        if b - a > INSET * (high - low) and margins.solve(np.array([0.5 * (a + b)])).valid.all()
+        _Path(study, drive, low + (high - low) * a, low + (high - low) * b, (causes.get(a, end), causes.get(b, end)))
+        for a, b in stretches
+        if b - a > SHORTEST
     ]
     if turning:
         # Once round only: each is met twice.
@@ -181,32 +182,3 @@ def _range(study: Study, drive: str) -> tuple[float, float]:
         message = f"the path of a point needs the range of drive {drive}: give it limits, {{drive: {drive}, min, max}}"
         raise StudyError((Problem(message, "mechanism.limits", str(study.path or "")),))
     return max(lows), min(highs)
-
-
-def _turns(path: _Path, t: Floats) -> list[Floats]:
-    """Places where the velocity is along an axis: those where it is along y, and along x."""
-    found = []
-    for axis, speed in enumerate(path.speed(t)):
-        cell = np.flatnonzero(speed[1:] * speed[:-1] < 0)
-
-        def slope(which: Ints, at: Floats, axis: int = axis) -> Floats:
-            part: Floats = path.speed(at)[axis]
-            return part
-
-        nan = np.full(len(cell), np.nan)
-        ends = (t[cell], speed[cell], t[cell + 1], speed[cell + 1])
-        found.append(bracketed_roots(slope, *ends, nan, nan, np.full(len(cell), 1e-13)))
-    return found
-
-
-def _along(path: _Path, turns: Floats, t: Floats) -> tuple[Floats, float]:
-    """Length up to each place, and the error of the whole; at the turns the point may go back."""
-    every = np.unique(np.concatenate([t, turns]))
-    half = 0.5 * np.diff(every)
-    parts = []
-    for number in (NODES, FEWER):
-        nodes, weights = np.polynomial.legendre.leggauss(number)
-        at = (every[:-1] + half)[:, None] + half[:, None] * nodes
-        parts.append((np.hypot(*path.speed(at.ravel())).reshape(at.shape) @ weights) * half)
-    arc = np.concatenate([[0.0], np.cumsum(parts[0])])[np.searchsorted(every, t)]
-    return arc, float(np.abs(parts[0] - parts[1]).sum())

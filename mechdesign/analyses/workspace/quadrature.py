@@ -260,9 +260,14 @@ def _segments(designs: Designs, integrands: Sequence[Integrand], segments: Parts
         for j, integrand in enumerate(integrands):
             found[j, at], doubt[j, at] = RADII.apply(integrand.values(local) * measure)
         if not designs.field.same_assembly:
-            with np.errstate(divide="ignore"):
-                crossing[at] = _sign_change(v, 1 / np.broadcast_to(local.determinant, r.shape))
+            crossing[at] = _sign_change(v, _inverse_determinant(local, r.shape))
     return found, doubt, crossing
+
+
+def _inverse_determinant(local: Local, shape: tuple[int, ...]) -> Floats:
+    """One by the determinant of the Jacobian, which changes its sign at a forward singularity."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.broadcast_to(1 / local.determinant, shape)
 
 
 def _sign_change(x: Floats, values: Floats) -> Floats:
@@ -283,8 +288,8 @@ def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
     around = v + step * np.array([-1.0, 0.0, 1.0])[:, None]
     r = spread(segments["inner"], segments["outer"], around, cosine)[0]
     local = Local.on_rays(designs, segments["design"], segments["theta"], r)
+    low, middle, high = _inverse_determinant(local, r.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
-        low, middle, high = np.broadcast_to(1 / local.determinant, r.shape)
         shift = 2 * middle / (low - high)
     return np.asarray(v + step * np.where(np.abs(shift) < 1, shift, 0.0))
 

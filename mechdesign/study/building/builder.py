@@ -74,7 +74,8 @@ class Builder:
         `what` may be the quantity that they give: an angle is that of links, a distance that of points.
         """
         what = {"angle": "link", "distance": "point"}.get(what, what)
-        known: Iterable[str] = self.section.owners if what == "point" else getattr(self.section, f"{what}s")
+        points = [*self.section.owners, *self.section.ends]
+        known: Iterable[str] = points if what == "point" else getattr(self.section, f"{what}s")
         # All of them are looked up, so that every mistake is reported.
         found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)

@@ -262,6 +262,10 @@ def _measures(builder: Builder) -> dict[str, Measure]:
                 found[name] = Measure(name, "expression", None, expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             found[name] = Measure(name, section.kind, pair)
+            one, other = (item.rpartition(".")[2] for item in pair)
+            if section.distance is not None and one == other:
+                message = f"{one!r} twice is one place, whose distance has no sign: give {pair[1]}.x - {pair[0]}.x"
+                builder.report((*path, "distance"), message)
         known.append(name)
     return found
 
@@ -284,7 +288,10 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
             if quantity != "none":
                 builder.reporter.kind((*ROOT, *path, end), quantity)
             bounds.append(None if value is None else builder.place(f"limits.{index}.{end}", value, quantity))
-        _check_bounds(builder, section, quantity, path)
+        expression = (
+            kind == "measure" and given in builder.section.measures and builder.section.measures[given].expression
+        )
+        _check_bounds(builder, section, "none" if expression else quantity, path)
         if right:
             found.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
     return tuple(found)

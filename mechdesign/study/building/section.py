@@ -7,14 +7,15 @@ long form before validation, so that no model is a union and every error has one
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import cut, suggestion
-from mechdesign.expressions import Expression
-from mechdesign.mechanism.graph import GROUND
+from mechdesign.expressions import Expression, ExpressionError
+from mechdesign.mechanism.graph import GROUND, OF_LINKS
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, StudyNumber, failure, read_expression, read_rows, shown
@@ -45,6 +46,7 @@ Point = Annotated[tuple[fields.LengthValue, fields.LengthValue], fields.pair_of(
 PointValues = tuple[StudyNumber, StudyNumber]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
 TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
+TwoEnds = Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two names")]
 
 
 class Link(fields.Model):
@@ -204,10 +206,14 @@ class Measure(fields.Model):
     )
     angle: TwoLinks | None = None
     """Angle from the first link's x axis to the second's, [a, b]. Example: [rod, rocker]"""
-    distance: TwoPoints | None = None
-    """Distance between two points, [P, Q]. Example: [P, Q]"""
+    distance: TwoEnds | None = None
+    """Distance between two points, [P, Q]; of a pin that gives or has a clearance rod.B is its end on link rod.
+    Example: [P, Q]
+    """
     expression: str | None = None
-    """Expression over coordinates, parameters and the measures above it. Example: B.x - A.x"""
+    """Expression over coordinates, also of a link's end of a pin (rod.B.x), parameters and the measures above it.
+    Example: B.x - A.x
+    """
 
 
 class Limit(fields.Model):
@@ -343,9 +349,15 @@ class MechanismSection(fields.Model):
                 found.setdefault(point, []).append(link)
         return found
 
+    @cached_property
+    def ends(self) -> Mapping[str, tuple[str, str]]:
+        """Points of links as ``rod.B``, which at a pin is the end on that link; link and point of each."""
+        points = [(link, point) for link in self.links for point in self.points_of(link) if point not in OF_LINKS]
+        return {".".join(end): end for end in points}
+
     def coordinates_of(self, name: str) -> tuple[str, ...]:
-        """The coordinates of a point; of what is no point, its name."""
-        return (f"{name}.x", f"{name}.y") if name in self.owners else (name,)
+        """The coordinates of a point, also of one of a link; of what is no point, its name."""
+        return (f"{name}.x", f"{name}.y") if name in self.owners or name in self.ends else (name,)
 
     @cached_property
     def moving(self) -> list[str]:
@@ -377,12 +389,26 @@ class MechanismSection(fields.Model):
     @cached_property
     def measured_kinds(self) -> Mapping[str, Quantity]:
         """Measures and the kind of each."""
-        quantities: dict[str, Quantity] = {"angle": "angle", "distance": "length", "expression": "none"}
-        return {name: quantities[measure.kind] for name, measure in self.measures.items()}
+        known, found = dict(self._coordinates), dict[str, Quantity]()
+        for name, measure in self.measures.items():
+            found[name] = "angle" if measure.kind == "angle" else "length"
+            if measure.expression is not None:
+                found[name] = "none"
+                # What is no expression is reported where it is built.
+                with suppress(ExpressionError):
+                    found[name] = "angle" if Expression.parse(measure.expression).is_angle(known) else "none"
+            known[name] = found[name]
+        return found
 
     @cached_property
     def coordinates(self) -> Mapping[str, Quantity]:
-        """Every coordinate and its kind, measures last."""
+        """Every coordinate and its kind, measures and those of a link's points last."""
+        ends: dict[str, Quantity] = {f"{end}.{axis}": "length" for end in self.ends for axis in "xy"}
+        return {**self._coordinates, **self.measured_kinds, **ends}
+
+    @cached_property
+    def _coordinates(self) -> Mapping[str, Quantity]:
+        """Every coordinate but measures and those of a link's points."""
         found: dict[str, Quantity] = dict(self.driven_kinds)
         for point in self.owners:
             found[f"{point}.x"] = found[f"{point}.y"] = "length"
@@ -392,7 +418,7 @@ class MechanismSection(fields.Model):
             found[f"{leg}.length"] = "length"
         for slide in self.slides:
             found[f"{slide}.slide"] = "length"
-        return found | dict(self.measured_kinds)
+        return found
 
 
 def _unit_of(kind: str) -> fields.Read:

@@ -64,7 +64,7 @@ class Checker:
         seen: set[str] = set()
         for index, name in enumerate(outputs or ()):
             parts = self.mechanism.coordinates_of(name)
-            if name not in self.mechanism.owners:
+            if parts == (name,):
                 self.coordinate(name, (*path, index))
             if seen.intersection(parts):
                 self.report((*path, index), f"{name!r} is listed twice")

@@ -29,6 +29,9 @@ _METHODS = {
 }
 
 
+_UNASSEMBLED = {"allowed": "only the part of the motion that is valid counts; how much is missing is said"}
+
+
 class Variable(fields.Model):
     """Range of a design variable; bounds may be expressions over parameters and the variables above it."""
 
@@ -97,6 +100,12 @@ class Judged(fields.Model):
     """
     where: dict[str, str | float | int] = Field(default_factory=dict)
     """Rows that count: those whose columns have these values. Left out: all rows. Example: {method: monte_carlo}"""
+    abs: bool = False
+    """Whether the absolute value is judged."""
+    unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
+    """What is said of a motion with poses that cannot be assembled or lie outside the limits. Left out: it has to be
+    valid at every pose asked for and between them. Example: allowed
+    """
 
     @property
     def name(self) -> str:
@@ -116,8 +125,6 @@ class Condition(Judged):
     """A result and its bounds."""
 
     bare, short = "", ()
-    abs: bool = False
-    """Whether the absolute value is judged."""
     at_least: fields.Number | None = None
     """Lowest value, in the result's unit. At least one of ``at_least`` and ``at_most`` is given. Example: 0.35"""
     at_most: fields.Number | None = None

@@ -97,7 +97,7 @@ _Index = Annotated[str, fields.choice(INDEX_NAMES, "local index")]
 class WorkspaceSection(fields.Model):
     """The region that a point can reach, and indices of how well the mechanism works there."""
 
-    point: fields.PointName
+    point: fields.EndName
     """Point whose region is asked for; the mechanism has two degrees of freedom or more. Example: C"""
     at: dict[fields.CoordinateName, At] = Field(default_factory=dict)
     """Coordinates that are held where the mobility is beyond two, as many as it is beyond: one value, a list (a region
@@ -120,7 +120,7 @@ class WorkspaceSection(fields.Model):
     def checked(self, checker: Checker) -> Self:
         """Check names, units and ranges against the mechanism."""
         root: KeyPath = ("workspace",)
-        checker.known(self.point, checker.mechanism.owners, "point", (*root, "point"))
+        checker.known(self.point, [*checker.mechanism.owners, *checker.mechanism.ends], "point", (*root, "point"))
         checker.coordinates(self.at, (*root, "at"))
         ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
         if len(ranges) > 1:

@@ -36,6 +36,7 @@ PAIR_FORM: Form = {"type": "array", "items": NUMBER_FORM, "minItems": 2, "maxIte
 
 NAME = re.compile(r"[^\W\d]\w*")
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
+_END = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*)?")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:\s*[^\W\d].*)?")
 # Magnitudes beyond which a number is a slip of writing, as its square or reciprocal would soon overflow: of numbers,
 # and of lengths, which are multiplied with one another more often.
@@ -435,6 +436,7 @@ Bound = Annotated[Expression, Read(read_expression, NUMBER_FORM)]
 
 LinkName = Annotated[str, name_of("a link")]
 PointName = Annotated[str, name_of("a point")]
+EndName = Annotated[str, name_of("a point (such as B, or rod.B of link rod)", _END)]
 JointName = Annotated[str, name_of("a joint")]
 DriveName = Annotated[str, name_of("a drive")]
 MeasureName = Annotated[str, name_of("a measure")]

@@ -1,0 +1,159 @@
+"""What a motion comes to: extremes of outputs, errors and efforts, the times between them, means of errors."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.targets import totals
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.results import Column, Table
+
+# A range below this part of a function's size is rounding.
+STILL = 1e-12
+
+
+def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
+    """Smallest and largest value of each output, error and effort over the motion, and the ratio of the times between.
+
+    Along a motion they are those of all of it, from limit to limit, between its poses too; elsewhere those of the valid
+    poses. Efforts and mechanical advantages are infinite at their poles. `time_ratio` is the longer over the shorter
+    part of a full turn of the swept angle between the two extremes, for a drive of constant speed; nan elsewhere.
+    `min_at` is what is swept, or the place in rows where nothing or more than one coordinate is.
+
+    Between the poses those of `names` are wanted, or all.
+    """
+    question = motion.question
+    study, poses, mechanism = question.study, question.poses, question.study.mechanism
+    curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in question.outputs}
+    curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
+    units = [study.units.label(quantity) for quantity, _ in curves.values()]
+    for static in question.statics:
+        curves[static.name] = ("none", motion.arrays[static.name])
+        units.append(static.unit)
+    swept = poses.swept
+    at = poses.values[swept] if swept is not None else poses.numbers
+    turn = 2 * np.pi / study.units.angle_factor
+    sizes = {"length": mechanism.size, "angle": turn}
+    # By curve and design; of both ends the value and its place.
+    table = np.stack([values for _, values in curves.values()]).reshape(len(curves), poses.designs, -1)
+    places = at.reshape(poses.designs, -1)
+    known = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
+    row = np.stack([np.where(known, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
+    low, high = (np.take_along_axis(table, each[..., None], axis=2)[..., 0] for each in row)
+    finite = np.where(known & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
+    size = np.array([sizes.get(quantity, 0.0) for quantity, _ in curves.values()])[:, None]
+    still = STILL * np.maximum(finite, size)
+    with np.errstate(invalid="ignore"):
+        moving = high - low > still
+    # A curve that stands still has both extremes at its first pose.
+    row = np.where(moving, row, known.argmax(axis=2))
+    values = np.stack([np.take_along_axis(table, each[..., None], axis=2)[..., 0] for each in row])
+    found = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
+    found = np.where(known.any(axis=2), found, np.nan)
+    if along is not None:
+        mine = [k for k, name in enumerate(curves) if name in along.columns and (names is None or name in names)]
+        _between(along, [list(curves)[k] for k in mine], mine, found, still, moving)
+    (low, low_at), (high, high_at) = found
+    timed = np.zeros(poses.designs, dtype=bool)
+    if along is not None and swept is not None and mechanism.quantity(swept) == "angle":
+        timed = (np.ptp(places, axis=1) >= turn * (1 - 1e-9)) & along.whole
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
+        ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
+        span = high - low
+    ratio[~np.isfinite(ratio)] = np.nan
+    where = f"{swept or 'place in rows (from 0)'} at the"
+    unit = study.units.label(mechanism.quantity(swept)) if swept is not None else ""
+    return Table(
+        "extremes",
+        (
+            Column(
+                "output",
+                np.tile(np.array(list(curves)), poses.designs),
+                "",
+                "output, error, effort or mechanical advantage, in its own unit",
+            ),
+            Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
+            Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
+            Column("max", high.T.ravel(), "", "largest value over the motion, in `unit`"),
+            Column("max_at", high_at.T.ravel(), unit, f"{where} largest value"),
+            Column("range", span.T.ravel(), "", "max - min, in `unit`"),
+            Column("time_ratio", ratio.T.ravel(), "", "longer over shorter time between the extremes, constant speed"),
+            Column("unit", np.tile(np.array(units, dtype=str), poses.designs), "", "unit of min, max and range"),
+        ),
+        over("extremes of the outputs", along, list(curves)),
+    )
+
+
+def _between(
+    along: Along, names: Sequence[str], rows: Sequence[int], found: Floats, still: Floats, moving: Flags
+) -> None:
+    """Put the extremes of motions between their poses into `found`, shape (2, 2, curves, designs): value and place.
+
+    `moving`, shape (curves, designs), says which curves do not stand still.
+    """
+    line = np.broadcast_to(np.arange(found.shape[3]), (len(names), found.shape[3]))
+    peaks = {sign: along.functions.extremes(names, sign, still[rows]) for sign in (-1, 1)}
+    with np.errstate(invalid="ignore"):
+        moves = peaks[1].value + peaks[-1].value > still[rows]
+    moving[rows] |= moves
+    for end, sign in enumerate((-1, 1)):
+        peak = peaks[sign]
+        known = np.isfinite(peak.place) & moves
+        places = along.shown(line.ravel(), peak.place.ravel()).reshape(line.shape)
+        for part, new in enumerate((sign * peak.value, places)):
+            found[end, part, rows] = np.where(known, new, found[end, part, rows])
+
+
+def targets_table(motion: Motion, along: Along | None, sums: Floats | None = None) -> Table:
+    """Mean and largest errors of each design over the motion, or over the valid poses that have a target.
+
+    `along` is the motion between the poses, None of listed poses and grids; `sums` are the `targets.totals` of all
+    poses, where the motion has only some of them.
+    """
+    study, poses, found, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
+    sums = totals(found, poses.designs, valid) if sums is None else sums
+    shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
+    at = poses.values[swept] if swept is not None else poses.numbers
+    found_at = np.full((4, poses.designs, len(found)), np.nan)
+    for k, error in enumerate(found):
+        known = (valid & np.isfinite(error.values)).reshape(shape)
+        some = known.any(axis=1)
+        values = np.where(known, error.values.reshape(shape), 0.0)[some]
+        worst = np.where(known[some], np.abs(values), -1.0).argmax(axis=1)
+        lane, (count, total, squares) = np.arange(len(worst)), sums[:, some, k]
+        found_at[:, some, k] = (
+            np.sqrt(squares / count),
+            total / count,
+            np.abs(values[lane, worst]),
+            at.reshape(shape)[some][lane, worst],
+        )
+        if along is not None and error.name in along.columns:
+            size = {"length": study.mechanism.size, "angle": 2 * np.pi / study.units.angle_factor}
+            still = STILL * size.get(error.quantity, 1.0)
+            value, place = along.worst(error.name, 1, absolute=True, still=still)
+            between = np.stack([
+                np.sqrt(along.mean(error.name, 2)), along.mean(error.name), value,
+                along.shown(np.arange(len(place)), place),
+            ])  # fmt: skip
+            found_at[:, :, k] = np.where(along.curve.spent, found_at[:, :, k], between)
+    rms, mean, largest, where = found_at.reshape(4, -1)
+    unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
+    units = np.tile(np.array([study.units.label(error.quantity) for error in found], dtype=str), poses.designs)
+    outputs = np.tile(np.array([error.output for error in found], dtype=str), poses.designs)
+    return Table(
+        "targets",
+        (
+            Column("output", outputs, "", "what has a target"),
+            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance), in `unit`"),
+            Column("mean", mean, "", "mean error, in `unit`"),
+            Column("max_abs", largest, "", "largest absolute error, in `unit`"),
+            Column("at", where, unit, f"{swept or 'row (from 0)'} at the largest error"),
+            Column("unit", units, "", "unit of its errors"),
+        ),
+        over("errors of the outputs against their targets", along, [error.name for error in found]),
+    )

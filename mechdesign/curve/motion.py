@@ -1,0 +1,491 @@
+"""A motion as a curve: poses of a mechanism over one parameter, from limit to limit, with angles that do not jump.
+
+The parameter is the place s along the motion, in rows of its poses from 0. Sweeps, paths, and lines of a grid along its
+last coordinate are such curves, of one design or several; each has a line of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.curve.pieces import Pieces, Search
+from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.mechanism.algebra import TURN, Value
+from mechdesign.mechanism.change_points import TOUCHING
+from mechdesign.mechanism.configuration import joined
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.margins import ZERO_LENGTH, Cause, Margins, turning_point
+from mechdesign.mechanism.mechanism import begun
+from mechdesign.numerics import chebyshev
+from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Nodes at which a motion is looked at, at most.
+BUDGET = 1 << 18
+# Poses solved at once: their arrays stay within some megabytes.
+AT_ONCE = 65536
+# What is given moves at most this far in a piece to begin with: an angle, and a length as a part of the mechanism's
+# size.
+FIRST_TURN, FIRST_LENGTH = np.pi / 4, 0.25
+# Poses of a motion from which groups without a closed form are continued.
+ANCHORS = 721
+# So far beyond the first and the last pose, as a part of the motion, it must go on: else its end is a limit. What ends
+# it is looked for as far beyond other ends.
+BEYOND = 1e-9
+# Margins are looked at so far beside the end of a piece, as a part of it.
+BESIDE = 1e-6
+# An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
+ON_THE_CUT = 1e-9
+# Links that come into line are looked for within so many last digits of a dead centre.
+STRAIGHT = 128
+# A place at an end of a motion is taken so far inside, as a part of the motion.
+INSET = 1e-9
+# Slides that become parallel are so within this part of their sine's size, and a leg has no length within this part of
+# the mechanism's.
+PARALLEL, ZERO_LEG = 1e-9, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a motion ends, `before` or behind a piece of it; both where it goes to infinity between two pieces.
+
+    Parameters
+    ----------
+    line : int
+    place : float
+        Along the line, in rows.
+    cause : Cause
+    piece : int
+        The piece at whose end (`x` 1) or begin (-1) it lies.
+    endless : bool
+        Whether the motion goes on behind it, through infinity.
+    """
+
+    line: int
+    place: float
+    cause: Cause
+    piece: int
+    x: int
+    endless: bool = False
+
+
+def units_of(study: Study, coordinates: Sequence[Coordinate]) -> list[float]:
+    """What one of the study's units of each coordinate is in the core's."""
+    return [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in coordinates]
+
+
+class Curve:
+    """The motions of some poses that give the same coordinates, a line each.
+
+    Parameters
+    ----------
+    angles : sequence of Coordinate
+        Angles that are followed: those that no pose gives and whose turns count.
+    turning : bool
+        Whether limits count the turns of angles that are given or followed; else each turn is judged alike.
+
+    Attributes
+    ----------
+    pieces : Pieces
+        Intervals of the lines, in order, on which the mechanism assembles and lies within its limits.
+    spent : bool array, shape (lines,)
+        Lines with too many turns to be followed; they have no pieces.
+    """
+
+    def __init__(
+        self, study: Study, poses: Poses, angles: Sequence[Coordinate] = (), *, turning: bool = True
+    ) -> None:  # fmt: skip
+        self.study, self.poses, self.angles, self._turning = study, poses, tuple(angles), turning
+        self.mechanism: Mechanism = study.mechanism
+        (group,) = poses.groups
+        self.plan = self.mechanism.plan(group.names)
+        self._units = units_of(study, self.plan.structure.given)
+        self.lines = poses.count // poses.line
+        self.spent = np.zeros(self.lines, dtype=bool)
+        self.margins = Margins(self.mechanism, self.plan)
+        first = self._begin()
+        closed = len(self.margins.causes) - self.margins.limited
+        crossing = self.plan.change_points is None
+        search = Search(self._look, self._fold, self.margins.causes[:closed], BUDGET, crossing, self.spent)
+        self._closed = search.pieces(first)
+        self.pieces = self._closed
+        if self.margins.limited:
+            search = Search(
+                self._look_at_limits, self._fold, self.margins.causes[closed:], BUDGET, crossing, self.spent
+            )
+            self.pieces = search.pieces(self._closed)
+
+    def given(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
+        """Poses at places of lines, and what they give (radians, lengths)."""
+        poses = self.poses.along(line, s)
+        columns = zip(poses.groups[0].columns(), self._units, strict=True)
+        return poses, [np.asarray(column * unit, dtype=float) for column, unit in columns]
+
+    def solve(self, line: Ints, s: Floats, *, judged: bool = True) -> tuple[Poses, Configuration]:
+        """Poses at places of lines, shape (n,); `judged` by the stated limits."""
+        poses, given = self.given(line, s)
+        configuration = self.with_turns(line, s, self._solved(line, s, poses, given))
+        if judged:
+            self.plan.judge(configuration)
+        return poses, configuration
+
+    def with_turns(self, line: Ints, s: Floats, configuration: Configuration) -> Configuration:
+        """Solved poses, their angles in the turn of the motion."""
+        near: dict[str, Value] = dict(zip((angle.name for angle in self.angles), self.turned(line, s), strict=True))
+        if not self._turning:
+            near |= self.mechanism.drawn_angles() | self.mechanism.turns({})
+            return replace(configuration, near={**configuration.near, **near}, counted=frozenset())
+        return replace(configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys())
+
+    def turned(self, line: Ints, s: Floats) -> Floats:
+        """The angles followed at places of lines (radians), shape (angles, n), without jumps.
+
+        They hold to a few digits only: enough to tell the turn of an angle.
+        """
+        if not self.angles:
+            return np.empty((0, len(s)))
+        pieces, coefficients = self._turns
+        if not len(pieces.line):
+            return np.full((len(self.angles), len(s)), np.nan)
+        k = self.piece_at(line, s, pieces)
+        x = pieces.take(k).within(s)
+        values = [
+            chebyshev.value(row[k], x) * (angle.turn / TURN)
+            for row, angle in zip(coefficients, self.angles, strict=True)
+        ]
+        return np.stack(values)
+
+    def piece_at(self, line: Ints, s: Floats, pieces: Pieces | None = None) -> Ints:
+        """The piece of each place, or the nearest before it; the line's first where there is none before."""
+        pieces = self.pieces if pieces is None else pieces
+        span = self.poses.end + 2.0
+        k = np.searchsorted(pieces.line * span + pieces.begin, line * span + s, side="right") - 1
+        first = np.searchsorted(pieces.line, line)
+        return np.clip(np.maximum(k, first), 0, len(pieces.line) - 1)
+
+    def holds(self, line: Ints, s: Floats) -> Flags:
+        """Whether the mechanism assembles within its limits at places of lines, as the pieces have it."""
+        if not len(self.pieces.line):
+            return np.zeros(len(s), dtype=bool)
+        k = self.piece_at(line, s)
+        return np.asarray((self.pieces.line[k] == line) & (s >= self.pieces.begin[k]) & (s <= self.pieces.end[k]))
+
+    def inside(self, line: Ints, s: Floats) -> Floats:
+        """Places of lines at which poses assemble: those at ends of motions or beyond are taken a little inside.
+
+        At a dead centre it is the place at which links lie straight, as far as rounding forgives: nearer to the motion
+        poses have half of the digits, for positions change as the root of what is left.
+        """
+        pieces, k = self.pieces, self.piece_at(line, s)
+        after = np.minimum(k + 1, len(pieces.line) - 1)
+        later = (pieces.line[after] == line) & (pieces.begin[after] - s < s - pieces.end[k])
+        k = np.where((s > pieces.end[k]) & later, after, k)
+        begin, end, fold = pieces.begin[k], pieces.end[k], pieces.fold[k]
+        inset = np.minimum(INSET * self.poses.end, (end - begin) / 2)
+        dead = np.where(fold < 0, begin, end)
+        at_dead = (fold != 0) & (np.abs(s - dead) <= inset)
+        places = np.where((s < begin) | (s > end), np.clip(s, begin + inset, end - inset), s)
+        places[at_dead] = self._straight(line[at_dead], dead[at_dead], fold[at_dead])
+        return places
+
+    def _straight(self, line: Ints, s: Floats, fold: Ints) -> Floats:
+        """Dead centres of pieces as far as rounding forgives."""
+        steps = (
+            np.arange(-STRAIGHT // 2, STRAIGHT // 2) * np.spacing(np.maximum(np.abs(s), 1e-3 * self.poses.end))[:, None]
+        )
+        places = s[:, None] + fold[:, None] * steps
+        valid = self.solve(np.repeat(line, STRAIGHT), places.ravel(), judged=False)[1].valid.reshape(places.shape)
+        last = STRAIGHT - 1 - valid[:, ::-1].argmax(axis=1)
+        inset = s - fold * INSET * self.poses.end
+        return np.where(valid.any(axis=1), places[np.arange(len(s)), last], inset)
+
+    def _begin(self) -> Pieces:
+        """Lines divided at their corners, and so that what is given moves little in each piece."""
+        poses, end = self.poses, float(self.poses.end)
+        if not end > 0:
+            return Pieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
+        marks = np.unique(np.concatenate([[0.0, end], poses.corners[(poses.corners > 0) & (poses.corners < end)]]))
+        count = np.ones((self.lines, len(marks) - 1))
+        (group,) = poses.groups
+        for coordinate, column, unit in zip(self.plan.structure.given, group.columns(), self._units, strict=True):
+            size = FIRST_TURN if coordinate.quantity == "angle" else FIRST_LENGTH * (self.mechanism.size or 1.0)
+            rows = column.reshape(self.lines, -1)
+            rows = np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows
+            way = np.concatenate([np.zeros((self.lines, 1)), np.cumsum(np.abs(np.diff(rows, axis=1)), axis=1)], axis=1)
+            at = np.clip(np.floor(marks), 0, rows.shape[1] - 2).astype(np.intp)
+            moved = np.diff(way[:, at] + (marks - at) * (way[:, at + 1] - way[:, at]), axis=1)
+            count = np.maximum(count, np.ceil(moved * unit / size - BEYOND))
+        self.spent |= count.sum(axis=1) * chebyshev.COUNT > BUDGET
+        numbers: Ints = np.where(self.spent[:, None], 0, count).astype(np.intp)
+        line, segment = (np.repeat(part.ravel(), numbers.ravel()) for part in np.indices(numbers.shape))
+        number = np.arange(len(line)) - np.repeat(np.cumsum(numbers) - numbers.ravel(), numbers.ravel())
+        parts = numbers[line, segment]
+        low, high = marks[segment], marks[segment + 1]
+        begin, stop = (low + (high - low) * (k / parts) for k in (number, number + 1))
+        return Pieces.of(line, begin, np.where(number + 1 == parts, high, stop))
+
+    def _solved(self, line: Ints, s: Floats, poses: Poses, given: Sequence[Floats]) -> Configuration:
+        start = None if self._anchors is None else self._anchors.take(self._anchor_of(line, s))
+        return self.plan.solve(given, poses.places, start=start, limits=False)
+
+    @cached_property
+    def _anchors(self) -> Configuration | None:
+        """Poses that groups without a closed form are continued from: some of each line, and one of the sketch."""
+        if not self.plan.iterative:
+            return None
+        rows = evenly(self.poses.line, ANCHORS)
+        line, s = (part.ravel() for part in np.meshgrid(np.arange(self.lines), rows.astype(float), indexing="ij"))
+        poses, given = self.given(line, s)
+        sketch = begun(self.mechanism, {name: v[:: len(rows)] for name, v in poses.places.items()})
+        start = sketch.take(line) if sketch.shape else sketch
+        solved = self.plan.solve(given, poses.places, start=start, limits=False)
+        if not sketch.shape:
+            sketch = replace(sketch, shape=(1,), reason=sketch.reason.reshape(1))
+        own = [np.broadcast_to(np.arange(sketch.shape[0]), (self.lines,))]
+        sketch = sketch.take(own[0])
+        places = {name: np.concatenate([v, v[:: len(rows)]]) for name, v in poses.places.items()}
+        # Of another plan a pose has other closures.
+        parts = [replace(part, closures=()) for part in (solved, sketch)]
+        anchors = joined(parts, (len(line) + self.lines,), self.mechanism.geometry.vectors(places), places)
+        near = {
+            angle.name: np.concatenate([np.broadcast_to(part.value(angle), part.shape) for part in parts])
+            for angle in self.plan.angles
+        }
+        anchors = replace(anchors, near=near)
+        # By line and anchor the nearest that is valid; where none is, the sketch.
+        valid = np.asarray(solved.valid).reshape(self.lines, -1)
+        numbers = np.arange(valid.shape[1])
+        away = np.where(valid[:, None, :], np.abs(numbers[:, None] - numbers), len(numbers))
+        nearest = away.argmin(axis=2) + len(numbers) * np.arange(self.lines)[:, None]
+        lost = np.broadcast_to(~valid.any(axis=1)[:, None], nearest.shape)
+        nearest = np.where(lost, len(line) + np.arange(self.lines)[:, None], nearest)
+        self._anchor_rows, self._nearest = rows, nearest
+        return anchors
+
+    def _anchor_of(self, line: Ints, s: Floats) -> Ints:
+        rows = self._anchor_rows
+        beside = np.clip(np.searchsorted(rows, s), 1, max(len(rows) - 1, 1))
+        before = np.minimum(beside, len(rows) - 1) - (len(rows) > 1)
+        nearer = np.where(s - rows[before] <= rows[np.minimum(beside, len(rows) - 1)] - s, before, beside)
+        return np.asarray(self._nearest[line, np.minimum(nearer, len(rows) - 1)])
+
+    def _look(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        margins, angles = [], []
+        for k in range(0, max(len(s), 1), AT_ONCE):
+            some = slice(k, k + AT_ONCE)
+            poses, given = self.given(line[some], s[some])
+            configuration = self._solved(line[some], s[some], poses, given)
+            margins.append(self.margins.of(configuration, given))
+            angles.append(self._angles_of(configuration))
+        return np.concatenate(margins, axis=1), np.concatenate(angles, axis=1)
+
+    def _angles_of(self, configuration: Configuration) -> Floats:
+        """Angles in parts of their turn, times a whole turn."""
+        values = [
+            np.broadcast_to(configuration.value(angle) * (TURN / angle.turn), configuration.shape)
+            for angle in self.angles
+        ]
+        return np.array(values).reshape(len(self.angles), *configuration.shape)
+
+    def _look_at_limits(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        parts = []
+        for k in range(0, max(len(s), 1), AT_ONCE):
+            some = slice(k, k + AT_ONCE)
+            configuration = self.solve(line[some], s[some], judged=False)[1]
+            lost = configuration.reason != Reason.OK
+            # At the very end of a piece rounding may leave a pose open.
+            parts.append(np.where(lost, np.nan, self.margins.of_limits(configuration)))
+        return np.concatenate(parts, axis=1), np.empty((0, len(s)))
+
+    @cached_property
+    def _turns(self) -> tuple[Pieces, Floats]:
+        """Series of the angles followed on the pieces, shape (angles, pieces, nodes), one after the other."""
+        pieces = self._closed
+        if not len(pieces.line):
+            return pieces, np.empty((len(self.angles), 0, chebyshev.COUNT))
+        s = pieces.nodes
+        angles = self._look(np.repeat(pieces.line, s.shape[1]), s.ravel())[1]
+        values = np.unwrap(angles.reshape(len(angles), *s.shape), axis=2)
+        jumps = values[:, 1:, 0] - values[:, :-1, -1]
+        new = np.append(True, pieces.line[1:] != pieces.line[:-1])
+        turns = np.zeros(values.shape[:2])
+        turns[:, 1:] = -np.round(jumps / TURN)
+        turns = np.cumsum(turns, axis=1)
+        turns -= turns[:, np.maximum.accumulate(np.where(new, np.arange(len(new)), 0))] if len(new) else 0.0
+        coefficients = chebyshev.series(values + TURN * turns[..., None])
+        self._begin_turns(pieces, coefficients)
+        return pieces, coefficients
+
+    def _begin_turns(self, pieces: Pieces, coefficients: Floats) -> None:
+        """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it."""
+        lines, first = np.unique(pieces.line, return_index=True)
+        rows = np.ceil(pieces.begin)
+        inside = np.flatnonzero(rows <= pieces.end)
+        some, which = np.unique(pieces.line[inside], return_index=True)
+        first[np.searchsorted(lines, some)] = inside[which]
+        place = np.minimum(rows[first], pieces.end[first])
+        x = pieces.take(first).within(place)
+        rank = np.searchsorted(lines, pieces.line)
+        for angle, row in zip(self.angles, coefficients, strict=True):
+            begin = chebyshev.value(row[first], x)
+            turns = -np.ceil((begin - np.pi) / TURN - ON_THE_CUT)
+            if angle.name in self.mechanism.drives and len(lines):
+                values = chebyshev.at_places(row) + TURN * turns[rank][:, None]
+                least, most = (f.reduceat(g(values, axis=1), np.searchsorted(pieces.line, lines))
+                               for f, g in ((np.minimum, np.min), (np.maximum, np.max)))  # fmt: skip
+                sizes = {name: place[lines * self.poses.line] for name, place in self.poses.places.items()}
+                turns += drive_turns(self.mechanism, angle.name, begin + TURN * turns, least, most, sizes)
+            row[:, 0] += TURN * turns[rank]
+
+    def _fold(self, line: int, good: float, bad: float) -> float | None:
+        """Where a group without a closed form turns back between a place at which it closes and one where not."""
+        fold = self._turning_point(line, good, abs(bad - good))
+        return None if fold is None else fold[0]
+
+    def _turning_point(self, line: int, place: float, reach: float) -> tuple[float, Configuration, int] | None:
+        def given(s: float) -> list[float]:
+            return [float(v[0]) for v in self.given(np.array([line]), np.array([s]))[1]]
+
+        at = np.array([line]), np.array([place])
+        near = self._solved(*at, *self.given(*at)).take(0)
+        return turning_point(self.plan, given, place, reach, near) if near.valid else None
+
+    @cached_property
+    def _sizes(self) -> Floats:
+        """Size of every margin along each line, shape (causes, lines)."""
+        s, line = self.pieces.nodes, self.pieces.line
+        table = np.abs(self._margins(np.repeat(line, s.shape[1]), s.ravel()))
+        table = table.reshape(len(table), *s.shape)
+        sizes = np.zeros((len(table), self.lines))
+        for row, size in zip(np.where(np.isfinite(table), table, 0.0), sizes, strict=True):
+            np.maximum.at(size, line, row.max(axis=1, initial=0.0))
+        return np.where(sizes > 0, sizes, 1.0)
+
+    def _margins(self, line: Ints, s: Floats) -> Floats:
+        """All margins at places of lines, shape (causes, n)."""
+        rows = [self._look(line, s)[0]]
+        if self.margins.limited:
+            rows.append(self._look_at_limits(line, s)[0])
+        return np.concatenate(rows)
+
+    @cached_property
+    def ends(self) -> tuple[End, ...]:
+        """Where the motions end and where they go to infinity, in order along the lines."""
+        pieces, found = self.pieces, list[End]()
+        joined = pieces.joined_to_next
+        if not len(pieces.line):
+            return ()
+        for x, open_ in ((-1, np.append(True, ~joined)), (1, np.append(~joined, True))):
+            place, beyond = (pieces.end, BEYOND) if x > 0 else (pieces.begin, -BEYOND)
+            piece = np.flatnonzero(open_)
+            outer = place[piece] == (self.poses.end if x > 0 else 0.0)
+            outside = place[piece] + beyond * self.poses.end
+            held = np.zeros(len(piece), dtype=bool)
+            if outer.any() and not self.poses.closed:
+                # The motion ends with its poses only where it cannot go on.
+                held[outer] = self.solve(pieces.line[piece[outer]], outside[outer])[1].valid
+            held |= outer & self.poses.closed
+            piece, outside = piece[~held], outside[~held]
+            causes = self._causes(pieces.line[piece], outside)
+            found += [
+                End(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
+                for k, cause in zip(piece.tolist(), causes, strict=True)
+            ]
+        found += [
+            End(int(pieces.line[k]), float(pieces.end[k]), self.margins.causes[number], k, 1, endless=True)
+            for k, number in self._at_joints("across", PARALLEL)
+        ]
+        return tuple(sorted(found, key=lambda end: (end.line, end.place, end.x)))
+
+    def changes(self) -> list[tuple[int, float, Cause]]:
+        """Where two assemblies meet and a motion goes on: line, place, cause; the first and last pose count."""
+        pieces = self.pieces
+        inner = [
+            (int(pieces.line[k]), float(pieces.end[k]), self.margins.causes[number])
+            for k, number in self._at_joints("closure", TOUCHING)
+        ]
+        ended = {(end.line, end.place) for end in self.ends}
+        outer = (pieces.begin == 0.0) | (pieces.end == self.poses.end)
+        line, place = pieces.line[outer], np.where(pieces.begin[outer] == 0.0, 0.0, float(self.poses.end))
+        small = self._small("closure", TOUCHING, line, place, pieces.end[outer] - pieces.begin[outer])
+        rims = [
+            (int(line[k]), float(place[k]), self.margins.causes[number])
+            for number, k in np.argwhere(small).tolist()
+            if (int(line[k]), float(place[k])) not in ended
+        ]
+        return sorted(inner + rims, key=lambda change: change[:2])
+
+    def _at_joints(self, role: str, least: float) -> list[tuple[int, int]]:
+        """Pieces at whose end, where the motion goes on, a margin of a role is zero, and the number of its cause."""
+        pieces = self.pieces
+        piece = np.flatnonzero(pieces.joined_to_next)
+        length = pieces.end[piece] - pieces.begin[piece]
+        small = self._small(role, least, pieces.line[piece], pieces.end[piece], length)
+        return [(int(piece[k]), number) for number, k in np.argwhere(small).tolist()]
+
+    def _small(self, role: str, least: float, line: Ints, s: Floats, length: Floats) -> Flags:
+        """Which margins of a role are zero at ends of pieces of some length, shape (causes, n)."""
+        own = np.array([cause.role == role for cause in self.margins.causes], dtype=bool)
+        if not own.any() or not len(line):
+            return np.zeros((len(own), len(line)), dtype=bool)
+        # At the place itself rounding may end the motion before later margins are known.
+        sides = [self._margins(line, s + step * length) for step in (-BESIDE, 0.0, BESIDE)]
+        smallest = np.fmin(np.fmin(np.abs(sides[0]), np.abs(sides[1])), np.abs(sides[2]))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(own[:, None] & (smallest <= least * self._sizes[:, line]))
+
+    def _causes(self, line: Ints, outside: Floats) -> list[Cause]:
+        """What ends motions right before some places: the margin that is farthest below zero there."""
+        if not len(line):
+            return []
+        values = self._margins(line, outside) / self._sizes[:, line]
+        across = np.array([cause.role == "across" for cause in self.margins.causes], dtype=bool)
+        values = np.where(np.isnan(values) | across[:, None], np.inf, values)
+        return [self.margins.causes[k] for k in values.argmin(axis=0).tolist()]
+
+    def _named(self, piece: int, x: int, cause: Cause) -> Cause:
+        """The cause, of a group without a closed form by the group that turns back, or why it does not."""
+        if cause.role != "reached":
+            return cause
+        graph, pieces = self.mechanism.graph, self.pieces.take(np.array([piece]))
+        place = pieces.end[0] if x > 0 else pieces.begin[0]
+        inside = pieces.places(np.array([x * 0.9]))[0]
+        fold = self._turning_point(int(pieces.line[0]), float(inside), 2 * abs(float(place - inside)))
+        if fold is not None:
+            group = self.plan.structure.groups[fold[2]]
+            return replace(cause, joint=" ".join(graph.joined(group.edges)), group=fold[2])
+        pose = self.solve(pieces.line, np.array([inside]))[1]
+        for slide in self.margins.legs:
+            leg = graph.slides[slide]
+            if abs(float(np.ravel(pose.slides[slide])[0])) <= ZERO_LEG * self.mechanism.size:
+                return Cause(ZERO_LENGTH, leg, leg, -1, "leg")
+        return replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
+
+
+def drive_turns(
+    mechanism: Mechanism, drive: str, begin: Floats, least: Floats, most: Floats, sizes: Mapping[str, Value]
+) -> Floats:
+    """Whole turns that take motions of a drive near to where it was drawn, or within its limits.
+
+    Parameters
+    ----------
+    begin, least, most : ndarray, shape (n,)
+        The drive's angle where each motion begins, and its extremes (radians).
+    sizes : mapping
+        Places that differ from the nominal ones, of shape (n,).
+    """
+    drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
+    turns = np.round((drawn - begin) / TURN)
+    for bound in mechanism.bounds:
+        if bound.drive and bound.of_angle and bound.coordinate.name == drive:
+            low, high = bound.ends({**mechanism.nominal, **sizes})
+            # All of the motion where it fits, or else its begin.
+            for smallest, largest in ((begin, begin), (least, most)):
+                fewest, greatest = np.ceil((low - smallest) / TURN), np.floor((high - largest) / TURN)
+                turns = np.where(fewest <= greatest, np.clip(turns, fewest, greatest), turns)
+    return np.asarray(turns)

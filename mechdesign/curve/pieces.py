@@ -1,0 +1,260 @@
+"""Pieces of motions on which functions are smooth, and the search for them: halved, or cut where a margin is zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.mechanism.change_points import TOUCHING
+from mechdesign.mechanism.margins import Cause
+from mechdesign.numerics import chebyshev
+from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
+
+# A piece is halved so often at most: a function that has a corner or jumps there is as good as it gets.
+MOST_HALVINGS = 40
+# Series of margins that leave less than this part of the margin's size are resolved.
+RESOLVED = 1e-12
+# A margin that falls below zero by less than this part of its size, which is rounding, touches it.
+ROUNDING = 1e-13
+# A zero so near to an end of a piece is that end: where the piece is straight, and at a dead centre.
+AT_END, AT_FOLD = 1e-12, 1e-6
+# Zeros of a margin that touches zero, by rounding, lie so near to where it does in a piece.
+BESIDE = 1e-5
+# A closure without this part of its size as slope, over a piece, touches zero.
+STEEP = 1e-6
+# What an angle may turn between neighbouring nodes so that the way round is certain (radians).
+SURE_TURN = np.pi / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces(Lanes):
+    """Intervals of motions, arrays of shape (pieces,).
+
+    A place x in [-1, 1] of a piece is the place s along its line, in rows. At a dead centre positions change as the
+    root of the distance from it: there s is quadratic in x, so that they are smooth in x.
+    """
+
+    line: Ints
+    begin: Floats
+    end: Floats
+    fold: Ints  # -1: a dead centre at the begin; 1: at the end
+    depth: Ints  # how often it has been divided
+
+    @classmethod
+    def of(cls, line: Ints, begin: Floats, end: Floats) -> Pieces:
+        """Pieces without dead centres."""
+        none = np.zeros(len(line), dtype=np.intp)
+        return cls(line, begin, end, none, none)
+
+    def places(self, x: Floats) -> Floats:
+        """Places along the lines of places in each piece, shape (pieces, ...)."""
+        begin, end, fold = (part.reshape(-1, *(1,) * (np.ndim(x) - 1)) for part in (self.begin, self.end, self.fold))
+        part = (1.0 + x) / 2
+        part = np.where(fold == 0, part, np.where(fold < 0, part * part, part * (2.0 - part)))
+        return np.asarray(np.where(x == 1.0, end, begin + (end - begin) * part))
+
+    def within(self, s: Floats) -> Floats:
+        """The place in [-1, 1] of a place along the line in each piece, shape (pieces,)."""
+        part = np.clip((s - self.begin) / (self.end - self.begin), 0.0, 1.0)
+        part = np.where(self.fold == 0, part, np.where(self.fold < 0, np.sqrt(part), 1.0 - np.sqrt(1.0 - part)))
+        return np.asarray(2.0 * part - 1.0)
+
+    @property
+    def nodes(self) -> Floats:
+        """Places along the lines of the nodes, shape (pieces, nodes)."""
+        return self.places(np.broadcast_to(chebyshev.NODES, (len(self.line), chebyshev.COUNT)))
+
+    @property
+    def stretch(self) -> Floats:
+        """Way along the line by the place in the piece, ds/dx, at the nodes, shape (pieces, nodes)."""
+        return np.asarray((self.end - self.begin)[:, None] / 2 * (1.0 - self.fold[:, None] * chebyshev.NODES))
+
+    @property
+    def weights(self) -> Floats:
+        """Weights of integrals along the lines at the nodes, shape (pieces, nodes)."""
+        return np.asarray(self.stretch * chebyshev.WEIGHTS)
+
+    def halves(self) -> Pieces:
+        """Both halves of each piece; a dead centre stays in one of them."""
+        middle = self.places(np.zeros(len(self.line)))
+        first = Pieces(self.line, self.begin, middle, np.minimum(self.fold, 0), self.depth + 1)
+        return Pieces.joined([first, Pieces(self.line, middle, self.end, np.maximum(self.fold, 0), self.depth + 1)])
+
+    def in_order(self) -> Pieces:
+        """The pieces along the lines, one line after the other."""
+        return self.take(np.lexsort((self.begin, self.line)))
+
+    @property
+    def joined_to_next(self) -> Flags:
+        """Whether the motion goes on in the next piece, of pieces in order; shape (pieces - 1,)."""
+        return np.asarray((self.line[1:] == self.line[:-1]) & (self.begin[1:] == self.end[:-1]))
+
+
+# Margins of shape (causes, n), nan where an earlier one is negative, and angles of shape (angles, n), at places s of
+# some lines.
+Look = Callable[[Ints, Floats], tuple[Floats, Floats]]
+# Where a group without a closed form turns back between a place at which it closes and one at which it does not.
+Fold = Callable[[int, float, float], float | None]
+
+
+@dataclass
+class Search:
+    """Finds the pieces of lines in which every margin is positive.
+
+    A line for which more than `budget` nodes would have to be looked at is `spent`: nothing of it is known. Where
+    `crossing`, a closure that touches zero divides the motion, for links may go on with a corner there.
+    """
+
+    look: Look
+    fold: Fold
+    causes: Sequence[Cause]
+    budget: int
+    crossing: bool
+    spent: Flags  # shape (lines,)
+
+    def pieces(self, begin: Pieces) -> Pieces:
+        """The pieces in order along the lines."""
+        lines, valid, pending = len(self.spent), [begin.take(np.empty(0, dtype=np.intp))], begin
+        nodes, sizes = np.zeros(lines), np.zeros((len(self.causes), lines))
+        while len(pending.line):
+            nodes += chebyshev.COUNT * np.bincount(pending.line, minlength=lines)
+            self.spent |= nodes > self.budget
+            pending = pending.take(~self.spent[pending.line])
+            s = pending.nodes
+            margins, angles = self.look(np.repeat(pending.line, s.shape[1]), s.ravel())
+            margins, angles = (table.reshape(len(table), *s.shape) for table in (margins, angles))
+            for row, size in zip(np.abs(margins), sizes, strict=True):
+                np.maximum.at(size, pending.line, np.where(np.isfinite(row), row, 0.0).max(axis=1, initial=0.0))
+            good, halved, parts = self._judged(pending, margins, sizes)
+            turns = np.abs((np.diff(angles, axis=2) + np.pi) % (2 * np.pi) - np.pi)
+            far = good & (turns >= SURE_TURN).any(axis=(0, 2)) & (pending.depth < MOST_HALVINGS)
+            valid.append(pending.take(good & ~far))
+            pending = Pieces.joined([*parts, pending.take(halved | far).halves()])
+        pieces = Pieces.joined(valid)
+        return pieces.take(~self.spent[pieces.line]).in_order()
+
+    def _judged(self, pieces: Pieces, margins: Floats, sizes: Floats) -> tuple[Flags, Flags, list[Pieces]]:
+        """Pieces in which all margins are positive, those to be halved, and the positive parts of those with zeros."""
+        left, halved = np.ones(len(pieces.line), dtype=bool), np.zeros(len(pieces.line), dtype=bool)
+        parts: list[Pieces] = []
+        for number, (cause, table, size) in enumerate(zip(self.causes, margins, sizes, strict=True)):
+            which = np.flatnonzero(left)
+            values, scale = table[which], size[pieces.line[which]]
+            if cause.role == "limit":
+                # What has no value is not limited.
+                values = np.where(np.isnan(values), scale[:, None] + 1.0, values)
+            # Slides cross each other either way round.
+            positive = (values >= 0) | (cause.role == "across")
+            last = pieces.depth[which] >= MOST_HALVINGS
+            alike = np.isfinite(values).all(axis=1) & (positive.all(axis=1) | ~positive.any(axis=1))
+            if not len(which):
+                break
+            if cause.role == "reached":
+                sure = alike
+                folded = self._folded(pieces.take(which), positive, alike)
+                some, divided = np.flatnonzero([part is not None for part in folded]), [p for p in folded if p]
+            else:
+                coefficients = chebyshev.series(values)
+                rest = chebyshev.remainder(coefficients)
+                smooth = rest <= RESOLVED * scale
+                # Of a margin that is far from zero nothing more has to be known.
+                sure = smooth | (alike & (np.abs(values).min(axis=1) > 4 * chebyshev.COUNT * rest))
+                own = np.flatnonzero(smooth & ~last)
+                some, divided = self._cut(pieces.take(which[own]), coefficients[own], number, scale[own])
+                some = own[some]
+            parts += divided
+            left[which[some]] = False
+            unsure = ~sure & ~last
+            unsure[some] = False
+            halved[which[unsure]] = True
+            left[which[unsure | ~positive.any(axis=1) | (last & ~positive.all(axis=1))]] = False
+        return left, halved, parts
+
+    def _folded(self, pieces: Pieces, positive: Flags, alike: Flags) -> list[Pieces | None]:
+        """The part of each piece up to where a group without a closed form turns back; None where that is not known."""
+        parts: list[Pieces | None] = [None] * len(alike)
+        for k in np.flatnonzero(~alike & (np.count_nonzero(np.diff(positive, axis=1), axis=1) == 1)).tolist():
+            piece, node = pieces.take(np.array([k])), int(np.flatnonzero(np.diff(positive[k]))[0])
+            good, bad = (node, node + 1) if positive[k, node] else (node + 1, node)
+            places = piece.nodes[0]
+            place = self.fold(int(piece.line[0]), float(places[good]), float(places[bad]))
+            if place is None or not min(places[good], places[bad]) <= place <= max(places[good], places[bad]):
+                continue
+            x, before = piece.within(np.array([place])), np.array([bad > good])
+            low, high = np.where(before, -1.0, x), np.where(before, x, 1.0)
+            parts[k] = _parts(piece, low, high, ~before, before)
+        return parts
+
+    def _cut(
+        self, pieces: Pieces, coefficients: Floats, number: int, scale: Floats
+    ) -> tuple[Ints, list[Pieces]]:  # fmt: skip
+        """Pieces with zeros of a margin inside, or with a dead centre at an end, and the positive parts of these."""
+        role = self.causes[number].role
+        table = chebyshev.at_places(coefficients)
+        suspect = np.flatnonzero(table.min(axis=1) <= np.abs(np.diff(table, axis=1)).max(axis=1) + TOUCHING * scale)
+        coefficients, scale, some = coefficients[suspect], scale[suspect], pieces.take(suspect)
+        which, x = chebyshev.zeros(coefficients)
+        owner, marks, dead = which, x, np.full(len(x), role == "closure")
+        if role == "closure":
+            touched, place, value = chebyshev.turning_points(coefficients)
+            steep = np.abs(chebyshev.slopes_at_places(coefficients)[:, [0, -1]].T) > STEEP * scale
+            flat, level = np.nonzero(~steep)
+            touched, place = np.concatenate([touched, level]), np.concatenate([place, 2.0 * flat - 1.0])
+            value = np.concatenate([value, table[suspect][level, -flat]])
+            near = (value >= -ROUNDING * scale[touched]) & (value <= TOUCHING * scale[touched])
+            touched, place = touched[near], place[near]
+            inner = np.abs(place) < 1.0 - BESIDE
+            # Zeros of a closure that rounding alone takes below zero.
+            beside = (which[:, None] == touched) & (np.abs(x[:, None] - place) < BESIDE)
+            owner, marks = which[~beside.any(axis=1)], x[~beside.any(axis=1)]
+            dead = np.ones(len(owner), dtype=bool)
+            if self.crossing:
+                owner, marks = np.concatenate([owner, touched[inner]]), np.concatenate([marks, place[inner]])
+                dead = np.concatenate([dead, np.zeros(np.count_nonzero(inner), dtype=bool)])
+        rims = np.where(np.stack([some.fold == -1, some.fold == 1]), AT_FOLD, AT_END)
+        inside = (marks > -1.0 + rims[0, owner]) & (marks < 1.0 - rims[1, owner])
+        owner, marks, dead = owner[inside], marks[inside], dead[inside]
+        marks = np.where(dead, self._polished(some.take(owner), marks, coefficients[owner], number), marks)
+        if role == "closure":
+            # A dead centre at an end that has no fold yet.
+            bare = (np.abs(table[suspect][:, [0, -1]].T) <= TOUCHING * scale) & (rims == AT_END) & steep
+            end, piece = np.nonzero(bare)
+            owner, marks = np.concatenate([owner, piece]), np.concatenate([marks, 2.0 * end - 1.0])
+            dead = np.concatenate([dead, np.ones(len(piece), dtype=bool)])
+        cut = np.unique(owner)
+        owners, places = np.concatenate([owner, cut, cut]), np.concatenate([marks, 0.0 * cut - 1.0, 0.0 * cut + 1.0])
+        order = np.lexsort((places, owners))
+        owners, places = owners[order], places[order]
+        beside = (owners[1:] == owners[:-1]) & (places[1:] > places[:-1])
+        of, low, high = owners[:-1][beside], places[:-1][beside], places[1:][beside]
+        keep = (chebyshev.value(coefficients[of], (low + high) / 2) >= 0) | (role == "across")
+        of, low, high = of[keep], low[keep], high[keep]
+        owner, marks = owner[dead], marks[dead]
+        ends = [((of[:, None] == owner) & (mark[:, None] == marks)).any(axis=1) for mark in (low, high)]
+        return suspect[cut], [_parts(some.take(of), low, high, *ends)] if len(cut) else []
+
+    def _polished(self, pieces: Pieces, x: Floats, coefficients: Floats, number: int) -> Floats:
+        """Zeros of a margin's series brought to those of the margin itself, by a step of Newton's method."""
+        if not len(x):
+            return x
+        value = self.look(pieces.line, pieces.places(x))[0][number]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved = x - value / chebyshev.slope(coefficients, x)
+        return np.where(np.abs(moved - x) < BESIDE, np.clip(moved, -1.0, 1.0), x)
+
+
+def _parts(pieces: Pieces, low: Floats, high: Floats, dead_low: Flags, dead_high: Flags) -> Pieces:
+    """Parts of pieces between places of these, at which dead centres may lie; one between two of them is halved."""
+    dead_low, dead_high = (
+        dead_low | ((low == -1.0) & (pieces.fold == -1)),
+        dead_high | ((high == 1.0) & (pieces.fold == 1)),
+    )
+    begin, end, middle = pieces.places(low), pieces.places(high), pieces.places((low + high) / 2)
+    both, depth = dead_low & dead_high, pieces.depth + 1
+    fold = np.where(dead_low, -1, np.where(dead_high, 1, 0)).astype(np.intp)
+    first = Pieces(pieces.line, begin, np.where(both, middle, end), fold, depth)
+    second = Pieces(pieces.line, middle, end, np.ones(len(begin), dtype=np.intp), depth).take(both)
+    parts = Pieces.joined([first, second])
+    return parts.take(parts.end > parts.begin)

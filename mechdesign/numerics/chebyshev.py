@@ -1,0 +1,159 @@
+"""Smooth functions on intervals by Chebyshev series: from values at nodes to values, slopes, zeros and integrals.
+
+Source: Trefethen, "Approximation Theory and Approximation Practice", SIAM 2013, chapters 3, 8 and 18.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Floats, Ints
+
+# Nodes of an interval: the zeros of T_16, none of which is an end, where a function may be singular.
+COUNT = 16
+_ORDERS = np.arange(COUNT)
+_ANGLES = np.pi * (np.arange(COUNT)[::-1] + 0.5) / COUNT
+NODES = np.cos(_ANGLES)
+_TO_SERIES = np.cos(np.outer(_ANGLES, _ORDERS)) * np.where(_ORDERS == 0, 1.0, 2.0) / COUNT
+# Places at which series are looked at, both ends among them: near enough that each bend of a series shows.
+PLACES = -np.cos(np.linspace(0.0, np.pi, 3 * COUNT + 1))
+# Integrals of the polynomials through the nodes (Fejer's first rule), over [-1, 1].
+WEIGHTS = _TO_SERIES @ np.where(_ORDERS % 2 == 0, 2.0 / (1.0 - _ORDERS**2.0 + (_ORDERS == 1)), 0.0)
+# After a step of Newton's method so short (in [-1, 1]) a place is exact; halving takes so many at most.
+_LAST_STEP, _STEPS = 1e-8, 60
+
+
+def _basis(x: Floats) -> Floats:
+    """T_k at places, shape (..., COUNT)."""
+    return np.cos(np.arccos(np.clip(x, -1.0, 1.0))[..., None] * _ORDERS)
+
+
+def _slope_basis(x: Floats) -> Floats:
+    """Derivatives of T_k, k U_{k-1}, at places, shape (..., COUNT)."""
+    table = np.zeros((*np.shape(x), COUNT))
+    before, last = np.zeros(np.shape(x)), np.ones(np.shape(x))
+    for k in range(1, COUNT):
+        table[..., k] = k * last
+        before, last = last, 2.0 * x * last - before
+    return table
+
+
+_AT_PLACES, _SLOPES_AT_PLACES = _basis(PLACES).T, _slope_basis(PLACES).T
+# From the coefficients of series to those of their slopes.
+_DERIVATIVE = _slope_basis(NODES).T @ _TO_SERIES
+
+
+def series(values: Floats) -> Floats:
+    """Coefficients of the polynomials through values at the nodes, shape (..., COUNT)."""
+    return np.asarray(values @ _TO_SERIES)
+
+
+def remainder(coefficients: Floats) -> Floats:
+    """What series leave of their functions, about, shape (...): the next coefficients, if these go on to decay.
+
+    Of an even or odd function every other coefficient is zero, so that they count in pairs.
+    """
+    before, last = (np.abs(coefficients[..., pair]).max(axis=-1) for pair in (slice(-4, -2), slice(-2, None)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(last < before, last * last / before, last))
+
+
+def at_places(coefficients: Floats) -> Floats:
+    """Values at `PLACES`, shape (..., places)."""
+    return np.asarray(coefficients @ _AT_PLACES)
+
+
+def slopes_at_places(coefficients: Floats) -> Floats:
+    """Slopes at `PLACES`, shape (..., places)."""
+    return np.asarray(coefficients @ _SLOPES_AT_PLACES)
+
+
+def value(coefficients: Floats, x: Floats) -> Floats:
+    """Values of series of shape (n, COUNT) at a place of each, shape (n,)."""
+    return np.asarray((coefficients * _basis(x)).sum(axis=-1))
+
+
+def slope(coefficients: Floats, x: Floats) -> Floats:
+    """Slopes of series of shape (n, COUNT) at a place of each, shape (n,)."""
+    return value(coefficients @ _DERIVATIVE, x)
+
+
+def primitive(coefficients: Floats, x: Floats) -> Floats:
+    """Integrals of series of shape (n, COUNT) from -1 to a place of each, shape (n,)."""
+    angle, orders = np.arccos(np.clip(x, -1.0, 1.0))[..., None], np.arange(COUNT + 1)
+    raised = np.zeros((*coefficients.shape[:-1], COUNT + 1))
+    raised[..., 1:] += coefficients / (2.0 * orders[1:]) * np.where(_ORDERS == 0, 2.0, 1.0)
+    raised[..., 1 : COUNT - 1] -= coefficients[..., 2:] / (2.0 * orders[1 : COUNT - 1])
+    return np.asarray((raised * (np.cos(angle * orders) - (-1.0) ** orders)).sum(axis=-1))
+
+
+def turning_points(coefficients: Floats) -> tuple[Ints, Floats, Floats]:
+    """Places at which series of shape (n, COUNT) turn back: which series, the place in [-1, 1], the value there."""
+    slopes = slopes_at_places(coefficients)
+    which, cell = np.nonzero((slopes[:, 1:] >= 0) != (slopes[:, :-1] >= 0))
+    some = coefficients[which]
+    x = _root(some @ _DERIVATIVE, PLACES[cell], slopes[which, cell], PLACES[cell + 1], slopes[which, cell + 1])
+    return which, x, value(some, x)
+
+
+def zeros(coefficients: Floats) -> tuple[Ints, Floats]:
+    """Places at which series of shape (n, COUNT) change their sign: which series, and the place in [-1, 1]."""
+    values = at_places(coefficients)
+    which, cell = np.nonzero((values[:, 1:] >= 0) != (values[:, :-1] >= 0))
+    low, high = PLACES[cell], PLACES[cell + 1]
+    at_low, at_high = values[which, cell], values[which, cell + 1]
+    # Between two places with values of one sign a series may turn back beyond zero.
+    turned, place, extreme = turning_points(coefficients)
+    beside = np.clip(np.searchsorted(PLACES, place) - 1, 0, len(PLACES) - 2)
+    one, two = values[turned, beside], values[turned, beside + 1]
+    hidden = ((one >= 0) == (two >= 0)) & ((one >= 0) != (extreme >= 0))
+    turned, place, extreme, beside = turned[hidden], place[hidden], extreme[hidden], beside[hidden]
+    which = np.concatenate([which, turned, turned])
+    low = np.concatenate([low, PLACES[beside], place])
+    high = np.concatenate([high, place, PLACES[beside + 1]])
+    at_low = np.concatenate([at_low, one[hidden], extreme])
+    at_high = np.concatenate([at_high, extreme, two[hidden]])
+    x = _root(coefficients[which], low, at_low, high, at_high)
+    order = np.lexsort((x, which))
+    return which[order], x[order]
+
+
+def _root(coefficients: Floats, low: Floats, at_low: Floats, high: Floats, at_high: Floats) -> Floats:
+    """Zeros of series between places with values of opposite signs."""
+    slopes = coefficients @ _DERIVATIVE
+
+    def both(x: Floats) -> tuple[Floats, Floats]:
+        basis = _basis(x)
+        return (coefficients * basis).sum(axis=-1), (slopes * basis).sum(axis=-1)
+
+    return root(both, low, at_low, high, at_high)
+
+
+def root(
+    function: Callable[[Floats], tuple[Floats, Floats]], low: Floats, at_low: Floats, high: Floats, at_high: Floats
+) -> Floats:
+    """Zeros of functions between places in [-1, 1] with values of opposite signs: Newton's method kept between them.
+
+    `function` gives all values and slopes at places of shape (n,).
+    """
+    low, high = low.copy(), high.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = low - at_low * (high - low) / (at_high - at_low)
+        x = np.where((x >= low) & (x <= high), x, (low + high) / 2)
+        for _ in range(_STEPS):
+            now, slopes = function(x)
+            same = (now >= 0) == (at_low >= 0)
+            low, high = np.where(same, x, low), np.where(same, high, x)
+            step = x - now / slopes
+            step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
+            moved, x = np.abs(step - x), step
+            if not (moved > _LAST_STEP).any():
+                break
+    return x
+
+
+def slope_series(coefficients: Floats) -> Floats:
+    """Series of the slopes of series, shape (..., COUNT)."""
+    return np.asarray(coefficients @ _DERIVATIVE)
