@@ -129,9 +129,9 @@ class Judgement(NamedTuple):
     values : ndarray, shape (designs,)
         The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
-        The signed rows that count, then of a condition the worst between them; None where these are not as many in each design. Of a
-        root mean square over targets, where the result has the motion, errors whose squares have about its square as
-        their sum.
+        The signed rows that count, then of a condition the worst between them; None where these are not as many in each
+        design. Of a root mean square over targets, where the result has the motion, errors whose squares have about its
+        square as their sum.
     squares : bool
         Whether the rows are such errors.
     """
