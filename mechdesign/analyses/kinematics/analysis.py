@@ -28,9 +28,8 @@ from mechdesign.analyses.kinematics.loops import Toggle, loops_table, toggles_of
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
 from mechdesign.analyses.kinematics.passage import Mark, Passage, pass_over
 from mechdesign.analyses.kinematics.special_poses import special_poses
-from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, judge_failures, pose_in_words
+from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, invalid_in_words, judge_failures, pose_in_words
 from mechdesign.errors import Problem, StudyError
-from mechdesign.mechanism import Reason
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
@@ -130,11 +129,7 @@ def along_of(
 
 def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.int8]) -> tuple[Scope, Scope]:
     """What tables say of the motion as a whole, and those with a row a pose."""
-    bad, missing = int(np.count_nonzero(reason)), []
-    if bad:
-        counts = {kind.text: int(np.count_nonzero(reason == kind)) for kind in Reason if kind}
-        kinds = ", ".join(f"{count} {text}" for text, count in counts.items() if count)
-        missing.append(f"{bad} of {len(reason)} poses are not valid ({kinds})")
+    missing = [invalid_in_words(reason)]
     if along is not None and not along.whole[0]:
         missing.append(f"{100 * (1 - along.present[0]):.3g} % of the motion is missing")
 
@@ -145,7 +140,7 @@ def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.
         value, place = own.worst(name, sign, absolute=absolute)
         return float(value[0]), place_in_words(own, float(place[0]))
 
-    whole = Scope(along is None, " and ".join(missing))
+    whole = Scope(along is None, " and ".join(filter(None, missing)))
     return whole, dataclasses.replace(whole, worst=worst)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
-from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
+from mechdesign.analyses.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
 from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
@@ -103,7 +103,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     sampled = next((each.sums for each in found if each.sums), {})
     made += tables.of_drawn(task, sampled)
     result = Result(
-        "reliability", {table.name: table for table in made} | dict(allocated.tables),
+        "reliability", of_poses(made, task.reason) | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
         {"poses": poses, "samples": tables.drawn_samples(task, sampled)},
