@@ -22,7 +22,6 @@ from mechdesign.analyses.kinematics.limits import (
     hidden,
     limits_of,
     limits_table,
-    place_in_words,
 )
 from mechdesign.analyses.kinematics.loops import Toggle, loops_table, toggles_of, toggles_table
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
@@ -138,7 +137,9 @@ def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.
         if own is None or own.curve.spent[0] or not own.follows(name):
             return None
         value, place = own.worst(name, sign, absolute=absolute)
-        return float(value[0]), place_in_words(own, float(place[0]))
+        given = question.poses.along(np.array([0]), place).values
+        moving = [question.poses.swept] if question.poses.swept is not None else given
+        return float(value[0]), ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
 
     whole = Scope(along is None, " and ".join(filter(None, missing)))
     return whole, dataclasses.replace(whole, worst=worst)
