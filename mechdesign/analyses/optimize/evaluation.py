@@ -292,7 +292,7 @@ class Evaluator:
             other = self._needed(other)
             for command, goals in self._alone.items():
                 result = ask(other, command)
-                partly = [not each.unassembled and _missing(each, result) for each in goals]
+                partly = [not each.unassembled and missing(each, result) for each in goals]
                 values = [batch.judge(each, result, row) for each in goals]
                 if result.failed or any(partly) or np.isnan(values).any():
                     return self._pose_reason(batch, k, other, command) or (BETWEEN if any(partly) else "")
@@ -352,10 +352,10 @@ class _Batch:
         self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
 
 
-def _missing(each: Goal, result: Result) -> bool:
-    """Whether a part of the motion that a goal is of is not valid."""
-    scope = choose(result, each.column, dict(each.where)).table.scope
-    return scope is not None and bool(scope.missing)
+def missing(goal: Goal, result: Result) -> str:
+    """Which poses or parts of the motion that a goal is of are not valid, in words; empty where all are."""
+    scope = choose(result, goal.column, dict(goal.where)).table.scope
+    return scope.missing if scope is not None else ""
 
 
 def _first(reason: NDArray[np.int8]) -> Ints:
