@@ -103,8 +103,8 @@ class Judged(fields.Model):
     abs: bool = False
     """Whether the absolute value is judged."""
     unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
-    """What is said of a motion with poses that cannot be assembled or lie outside the limits. Left out: it has to be
-    valid at every pose asked for and between them. Example: allowed
+    """What becomes of a motion with poses that cannot be assembled or lie outside the limits. Left out: it is not met,
+    and a design is infeasible, where one pose is not valid or the motion ends between two. Example: allowed
     """
 
     @property
@@ -143,8 +143,9 @@ class Requirement(Condition):
     """A condition on the result of a command."""
 
     result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "title": "result"})]
-    """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, and
-    nan is not met. Example: kinematics.mu Example: kinematics.extremes.C.x.range
+    """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, along
+    a motion the worst place between the rows, too, and nan is not met. Example: kinematics.mu Example:
+    kinematics.extremes.C.x.range
     """
 
 
