@@ -188,3 +188,13 @@ optimize: {minimize: kinematics.crank_effort, variables: {a: {from: 10, to: 50, 
 """
     (warning,) = mechdesign.optimize(study_of(text)).warnings
     assert warning.startswith("all 5 feasible designs tie: kinematics.crank_effort is")
+
+
+def test_rates_at_a_corner_are_those_behind_it_and_a_warning_says_so() -> None:
+    path = "{path: {P: {through: [[-90, 40], [0, 40], [90, 40], [90, 100]]}}, speed: 50, outputs: [P]}"
+    result = kinematics(study_of(ARM + f"kinematics: {path}\n"))
+    motion = result.tables["motion"]
+    assert motion["P.x_velocity"] == pytest.approx([50, 50, 0, 0], abs=1e-9)
+    assert motion["P.y_velocity"] == pytest.approx([0, 0, 50, 50], abs=1e-9)
+    (warning,) = result.warnings
+    assert warning.startswith("the path has corners at 1 pose, the first: P.x = 90 mm, P.y = 40 mm")

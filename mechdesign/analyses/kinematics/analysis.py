@@ -28,7 +28,7 @@ from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry,
 from mechdesign.analyses.kinematics.passage import Mark, Passage, pass_over
 from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, invalid_in_words, judge_failures, pose_in_words
-from mechdesign.errors import Problem, StudyError
+from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
@@ -73,7 +73,7 @@ def kinematics(
     passage = pass_over(question, _marks, progress, jobs)
     motion, marks = passage.motion, passage.marks
     warnings, failed = judge_failures(study, poses, passage.reason)
-    warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
+    warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
     warnings += _untargeted(question, marks)
     loops = four_bars(study.mechanism)
     along = along_of(question, loops=loops, toggles=True, passages=True)
@@ -337,6 +337,21 @@ def _astray(question: MotionQuestion) -> list[str]:
         f"{off} of {poses.count - 1} steps of the motion do not go where the rates of "
         f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
         "drawn; 'speed' gives those of a point along its path"
+    ]
+
+
+def _corners(question: MotionQuestion) -> list[str]:
+    """A warning where a path that is passed with a speed has corners: its rates there are those behind them."""
+    poses = question.poses
+    if question.section.speed is None or not poses.motion:
+        return []
+    rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
+    if not len(rows):
+        return []
+    return [
+        f"the path has corners at {counted(len(rows), 'pose')}, the first: "
+        f"{pose_in_words(question.study, poses, int(rows[0]))}; velocities there are those of the segment that begins, "
+        "and the acceleration that a corner takes is in no row; a spline has no corners"
     ]
 
 
