@@ -22,6 +22,7 @@ from mechdesign.analyses.kinematics.limits import (
     hidden,
     limits_of,
     limits_table,
+    passed,
 )
 from mechdesign.analyses.kinematics.loops import Toggle, loops_table, toggles_of, toggles_table
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
@@ -83,7 +84,7 @@ def kinematics(
     if along is not None:
         limits, toggles = limits_of(along), toggles_of(loops, along)
         tables["limits"] = limits_table(limits, along)
-        warnings += hidden(limits, along, np.equal(passage.reason, 0)) + change_points(along)
+        warnings += hidden(limits, along, np.equal(passage.reason, 0)) + passed(limits, along) + change_points(along)
     if poses.followed and (along is None or along.functions.unresolved.any()):
         warnings.append(_unfollowed(poses))
     if loops:

@@ -141,7 +141,8 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
         for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
-    for row in rows:
+    between = _between(rule, table, column)
+    for row in rows[:1] if between else rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         if rule.table == "extremes" and words["output"].endswith(("_effort", "_advantage")):
             continue
@@ -154,12 +155,19 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            if rule.row not in ("first", "each") and (place := _pose(table, row)):
-                notes.append(f"at {place}")
+            value, place = between or (values[row], "" if rule.row in ("first", "each") else _pose(table, row))
+            notes += [f"at {place}"] * bool(place)
             if rule.several and len(finite) > 1:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
-            yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+            yield Headline(label, shown(value), unit, "; ".join(notes))
+
+
+def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | None:
+    """The number over the whole motion, and its place, where the table knows the motion between its rows."""
+    if table.scope is None or table.scope.worst is None or rule.row in ("first", "each"):
+        return None
+    return table.scope.worst(column.name, -1 if rule.row == "smallest" else 1, rule.row == "size")
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
