@@ -102,9 +102,9 @@ class Wanted:
         if chosen.missing:
             raise UnknownColumnError(chosen.missing)
         values = chosen.values[chosen.counts]
+        unit = chosen.unit
         if not values.size:
-            return Number(float("nan"), chosen.table.column(chosen.column).unit)
-        unit = requirements.unit_of(chosen.table, chosen.column, int(np.flatnonzero(chosen.counts)[0]))
+            return Number(float("nan"), unit)
         if statistic:
             return Number(float(STATISTICS[statistic](values)), unit)
         if values.size > 1:

@@ -44,7 +44,7 @@ from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, p
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
-from mechdesign.study.text.units import Units
+from mechdesign.study.text.units import Units, text_of
 
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")
@@ -113,17 +113,15 @@ class Study:
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
 
-        That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
+        See `Parameters.kind` for that of a parameter.
         """
         parameters, places = self.parameters, self.mechanism.description.places
         if name in places:
             return self.units.label(places[name].quantity)
         if name not in parameters.nominal:
             return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
-        slopes = parameters.derivatives(name).items()
-        alike = [places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]]
-        found = set(alike) - {"none"}
-        return self.units.label(*found) if len(found) == 1 else None
+        kind = parameters.kind(name, places)
+        return None if kind is None else self.units.label(kind)
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text."""
@@ -262,7 +260,7 @@ def load_document(
     if section is None:
         reporter.done()
     assert section is not None
-    builder = Builder(section, context.units, context.parameters, reporter)
+    builder = Builder(section, context, reporter)
     description = build(builder)
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
@@ -318,6 +316,7 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
     raw = mechanism.get("parameters") if isinstance(mechanism, dict) else None
     raw = raw if isinstance(raw, dict) else {}
     nominal: dict[str, float] = {}
+    quantities: dict[str, str] = {}
     formulas: dict[str, Expression] = {}
     for name, value in raw.items():
         path = ("mechanism", "parameters", name)
@@ -328,14 +327,18 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
             message = f"{name!r} is a word of the expression language; choose another name"
             reporter.report(path, message, at_key=True)
         try:
-            number = read_number(value, Context(units, nominal, [other for other in raw if other not in nominal]))
+            number = read_number(
+                value, Context(units, nominal, [other for other in raw if other not in nominal], quantities)
+            )
         except PydanticCustomError as error:
             reporter.report(path, error.message())
             number = LOST
-        nominal[name] = number.nominal
+        nominal[name] = float(number.nominal)
+        if text := text_of(number.nominal):
+            quantities[name] = text
         if number.expression is not None:
             formulas[name] = number.expression
-    return Context(units, nominal), formulas
+    return Context(units, nominal, quantities=quantities), formulas
 
 
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
@@ -367,6 +370,9 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
 def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
+    for name in checker.parameters.kinds:
+        for kind in checker.parameters.needed(name, checker.places):
+            checker.kind(("mechanism", "parameters", name), kind)
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
@@ -429,7 +435,7 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                 assumed = found or poses.default(mechanism.description)
             except StudyError:
                 continue
-            targets.check_poses(parts["targets"], mechanism.drives, assumed, reporter)
+            targets.check_poses(parts["targets"], mechanism, assumed, reporter)
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:

@@ -12,7 +12,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, Self
 
 from mechdesign.errors import nearest
 
@@ -110,6 +110,46 @@ class QuantityError(ValueError):
     """A quantity that cannot be read or converted; the message says why."""
 
 
+class Amount(float):
+    """A number in the study's units, with the quantity that it was written as; without text, a bare number."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str = "") -> Self:
+        """Make it of a number and the quantity's text."""
+        amount = super().__new__(cls, value)
+        amount.text = text
+        return amount
+
+    @classmethod
+    def of(cls, value: float) -> Self:
+        """The number itself if it is one, else a bare one."""
+        return value if isinstance(value, cls) else cls(value)
+
+    def __str__(self) -> str:
+        return self.text or repr(self)
+
+    def within(self, unit: str) -> float:
+        """The number in a unit of a table.
+
+        Raises
+        ------
+        QuantityError
+            Where the quantity is of another kind than the unit.
+        """
+        if not self.text:
+            return float(self)
+        number, powers, factor = measure(self.text)
+        try:
+            _, expected, divisor = measure(f"1 {unit}") if unit else (1.0, KINDS["none"], 1.0)
+        except QuantityError:
+            raise QuantityError(f"{self.text!r} has a unit, and {unit} is none: give a bare number") from None
+        radian_left_out = expected == KINDS["rotational_stiffness"] and powers == KINDS["moment"]
+        if powers != expected and not radian_left_out:
+            raise QuantityError(f"{self.text!r} is {_describe(powers)}, where {_describe(expected)} is expected")
+        return number * factor / divisor
+
+
 @dataclass(frozen=True)
 class Units:
     """Units of a study's bare numbers; length may be ``dimensionless``."""
@@ -161,6 +201,25 @@ class Units:
         # Stiffness is per radian by the format, so an angle below the line is never in the study's unit.
         scale *= self.angle_factor ** max(powers[1], 0)
         return number * factor / scale
+
+
+def text_of(value: object) -> str:
+    """The quantity as which a number was written; empty for a bare one."""
+    if isinstance(value, Amount):
+        return value.text
+    return value if isinstance(value, str) and QUANTITY.fullmatch(value) else ""
+
+
+def written(value: float) -> str:
+    """A number as a message has it: the quantity as it was written, or 12 digits."""
+    return text_of(value) or f"{value:.12g}"
+
+
+def kind_of(value: object) -> str | None:
+    """Name in `KINDS` of the quantity as which a number was written; None for a bare number and any other quantity."""
+    text = text_of(value)
+    powers = measure(text)[1] if text else None
+    return next((name for name, known in KINDS.items() if known == powers), None)
 
 
 # Units that are read without the registry, which takes a while to build: their kind and SI value.
