@@ -49,6 +49,11 @@ from mechdesign.study.text.units import Units, text_of
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")
 _UNNAMED = "study"
+# What is said of other numbers with which the sketch does not close.
+NOT_CLOSED = (
+    "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that it shows "
+    "without the change, and those that do not close are told"
+)
 # What messages call a text that is no file.
 _TEXT = "<study>"
 
@@ -87,6 +92,7 @@ class Study:
     targets: Mapping[str, Target]  # by the coordinate or point
     kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
+    drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
@@ -181,14 +187,18 @@ def read_file(file: pathlib.Path) -> bytes:
 
 
 def load_data(
-    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder
-) -> Study:
-    """Load a study from a mapping; files that it names lie in a folder. See `load`."""
+    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
+    drawn: Mapping[str, Any] | None = None,
+) -> Study:  # fmt: skip
+    """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
+    folder. See `load`.
+    """
     data = _plain_data(source, "the study")
     document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
+    drawn = drawn or _drawing(document)
     override(document, changes)
     sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-    return load_document(document, None, folder, b"", sha256, changes, seed)
+    return _load_changed(document, None, folder, b"", sha256, changes, seed, drawn)
 
 
 @one_thread()
@@ -201,10 +211,44 @@ def load_bytes(
 ) -> Study:
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     document, changes = read(content, str(path or _TEXT)), _texts(overrides)
+    drawn = _drawing(document)
     override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
-    return load_document(document, path, folder, content, sha256, changes, seed)
+    return _load_changed(document, path, folder, content, sha256, changes, seed, drawn)
+
+
+def _drawing(document: Document) -> dict[str, Any]:
+    """What a sketch is assembled from: a study's units and mechanism."""
+    data = document.data if isinstance(document.data, dict) else {}
+    return {key: plain(data[key]) for key in ("units", "mechanism") if data.get(key) is not None}
+
+
+def _load_changed(
+    document: Document, path: pathlib.Path | None, folder: Folder, text: bytes, sha256: str, changes: tuple[str, ...],
+    seed: int | None, drawn: Mapping[str, Any],
+) -> Study:  # fmt: skip
+    """Load a study whose overrides are applied; its assembly is that of the study before, `drawn`, if that has one."""
+    if drawn == _drawing(document) or not same_sketch(drawn, document.data):
+        return load_document(document, path, folder, text, sha256, changes, seed)
+    original = None
+    with contextlib.suppress(StudyError):
+        own = Document("", plain(drawn), values={(): Mark("")})
+        original = load_document(own, path, folder, b"", "").mechanism
+    study = load_document(document, path, folder, text, sha256, changes, seed, original)
+    if not isinstance(study.mechanism, Variant):
+        return study
+    doubts = []
+    if not study.mechanism.closes:
+        doubts.append(study.problem(NOT_CLOSED, "mechanism", "sketch"))
+    return dataclasses.replace(study, drawn=drawn, warnings=(*study.warnings, *doubts))
+
+
+def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether the data of two studies have the same sketch."""
+    sketches = [each["mechanism"].get("sketch") if isinstance(each.get("mechanism"), dict) else None
+                for each in (one, other)]  # fmt: skip
+    return sketches[0] == sketches[1]
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:

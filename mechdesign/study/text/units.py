@@ -144,9 +144,7 @@ class Amount(float):
             _, expected, divisor = measure(f"1 {unit}") if unit else (1.0, KINDS["none"], 1.0)
         except QuantityError:
             raise QuantityError(f"{self.text!r} has a unit, and {unit} is none: give a bare number") from None
-        radian_left_out = expected == KINDS["rotational_stiffness"] and powers == KINDS["moment"]
-        if powers != expected and not radian_left_out:
-            raise QuantityError(f"{self.text!r} is {_describe(powers)}, where {_describe(expected)} is expected")
+        _check_kind(self.text, powers, expected)
         return number * factor / divisor
 
 
@@ -277,10 +275,15 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     powers, factor = _common(unit) or _unit(unit)
     if max(map(abs, powers)) > MAX_POWER:
         raise QuantityError(f"{unit!r} is no unit: it is {_describe(powers)}, and no power is beyond {MAX_POWER}")
-    radian_left_out = kind == "rotational_stiffness" and powers == KINDS["moment"]
-    if kind is not None and powers != KINDS[kind] and not radian_left_out:
-        raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(KINDS[kind])} is expected")
+    if kind is not None:
+        _check_kind(text, powers, KINDS[kind])
     return float(match["number"]), powers, factor
+
+
+def _check_kind(text: str, powers: Powers, expected: Powers) -> None:
+    radian_left_out = expected == KINDS["rotational_stiffness"] and powers == KINDS["moment"]
+    if powers != expected and not radian_left_out:
+        raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(expected)} is expected")
 
 
 def _common(unit: str) -> tuple[Powers, float] | None:
