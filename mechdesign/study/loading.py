@@ -29,7 +29,7 @@ from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema import targets
+from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
@@ -238,10 +238,8 @@ def _load_changed(
     study = load_document(document, path, folder, text, sha256, changes, seed, original)
     if not isinstance(study.mechanism, Variant):
         return study
-    doubts = []
-    if not study.mechanism.closes:
-        doubts.append(study.problem(NOT_CLOSED, "mechanism", "sketch"))
-    return dataclasses.replace(study, drawn=drawn, warnings=(*study.warnings, *doubts))
+    told = () if study.mechanism.closes else (study.problem(NOT_CLOSED, "mechanism", "sketch"),)
+    return dataclasses.replace(study, drawn=drawn, warnings=(*study.warnings, *told))
 
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
@@ -310,9 +308,11 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    parts = _checked(Checker(builder, parameters, parts, folder))
+    checker = Checker(builder, parameters, parts, folder)
+    parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
+    doubts.note(checker, parts, description)
     assert mechanism is not None
     _check_poses(parts, mechanism, reporter, folder)
     reporter.done()

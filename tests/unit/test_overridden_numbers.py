@@ -38,11 +38,7 @@ def test_dimensions_with_which_the_sketch_does_not_close():
 
 
 def test_a_workspace_is_the_same_by_set_and_by_vary():
-    text = (
-        FIVE_BAR
-        + "workspace: {point: C, directions: 48}\n"
-        + "matrix: {vary: {mechanism.parameters.b: [300]}, results: [area]}\n"
-    )
+    text = FIVE_BAR + "workspace: {point: C}\n" + "matrix: {vary: {mechanism.parameters.b: [300]}, results: [area]}\n"
     (varied,) = mechdesign.sweep(mechdesign.load(text=text)).main["area"]
     (alone,) = mechdesign.workspace(mechdesign.load(text=text, overrides=[WIDE])).main["area"]
     assert alone == pytest.approx(varied, rel=1e-9)

@@ -29,7 +29,7 @@ class Checker:
         self.parameters = parameters
         self.parts, self.folder = parts, folder
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
-        self.report = builder.reporter.report
+        self.report, self.doubt, self.units = builder.reporter.report, builder.reporter.doubt, builder.units
 
     def coordinate(
         self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), order: int | None = None

@@ -99,6 +99,10 @@ class Reporter:
         else:
             self.warnings.append(self._placed(self.written(path), f"nothing uses {what} {name!r}", True))
 
+    def doubt(self, path: Sequence[str | int], message: str) -> None:
+        """Warn of what is likely a mistake at a path of the data."""
+        self.warnings.append(self._placed(self.written(path), message, False))
+
     def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
         known = found
         while known and known not in self.document.values:
