@@ -49,11 +49,6 @@ from mechdesign.study.text.units import Units, text_of
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")
 _UNNAMED = "study"
-# What is said of other numbers with which the sketch does not close.
-NOT_CLOSED = (
-    "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that it shows "
-    "without the change, and those that do not close are told"
-)
 # What messages call a text that is no file.
 _TEXT = "<study>"
 
@@ -238,8 +233,13 @@ def _load_changed(
     study = load_document(document, path, folder, text, sha256, changes, seed, original)
     if not isinstance(study.mechanism, Variant):
         return study
-    told = () if study.mechanism.closes else (study.problem(NOT_CLOSED, "mechanism", "sketch"),)
-    return dataclasses.replace(study, drawn=drawn, warnings=(*study.warnings, *told))
+    warnings = [*study.warnings]
+    if not study.mechanism.closes:
+        warnings.append(study.problem(
+            "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that "
+            "it shows without the change", "mechanism", "sketch",
+        ))  # fmt: skip
+    return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
 
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
