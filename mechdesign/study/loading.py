@@ -239,14 +239,15 @@ def _load_changed(
             "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that "
             "it shows without the change", "mechanism", "sketch",
         ))  # fmt: skip
+    # The units in full, as the data of the study has them.
+    drawn = {**drawn, "units": study.resolved["units"]}
     return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
 
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether the data of two studies have the same sketch."""
-    sketches = [each["mechanism"].get("sketch") if isinstance(each.get("mechanism"), dict) else None
-                for each in (one, other)]  # fmt: skip
-    return sketches[0] == sketches[1]
+    """Whether the data of two studies have the same sketch, in the same units."""
+    mechanisms = [each["mechanism"] if isinstance(each.get("mechanism"), dict) else {} for each in (one, other)]
+    return one.get("units") == other.get("units") and mechanisms[0].get("sketch") == mechanisms[1].get("sketch")
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
