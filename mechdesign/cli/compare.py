@@ -114,7 +114,8 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
     try:
         inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
-        study = load_data(content["study"]["resolved"], (), content["seed"], inputs)
+        about = content["study"]
+        study = load_data(about["resolved"], (), content["seed"], inputs, about.get("drawn"))
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:

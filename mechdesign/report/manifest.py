@@ -56,7 +56,12 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
     return {
         **_versions(),
         "command": command,
-        "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
+        "study": {
+            "name": study.name,
+            "sha256": study.text_sha256,
+            "resolved": plain(study.resolved),
+            **({"drawn": plain(study.drawn)} if study.drawn else {}),
+        },
         **({"inputs": files} if files else {}),
         "overrides": list(study.overrides),
         "seed": study.seed,

@@ -113,6 +113,27 @@ def test_tolerances(folder, results, compared, options, code):
     assert done.exit_code == code
 
 
+@pytest.mark.parametrize(
+    ("allowed", "code", "message"),
+    [
+        ("B.x: {atol: 1 um}", 0, ""),
+        ("B.x: {atol: 0.0008 um}", 1, ""),
+        ("B.x: {atol: 1e-4 cm, rtol: 0}", 0, ""),
+        ("B.x: {atol: 1 deg}", 2, "is an angle, where a length is expected"),
+        ("*: {atol: 1 mm}", 2, "is a length, where an angle is expected"),
+        ("B.x: {atol: -1 mm}", 2, "from 0 on"),
+        ("B.x: {atol: 1 foo}", 2, "unknown unit"),
+        ("B.x: {rtol: 1 mm}", 2, "is a length, where a pure number is expected"),
+    ],
+)
+def test_an_absolute_tolerance_has_a_unit(folder, results, compared, allowed, code, message):
+    results("old", motion())
+    results("new", motion(x=(1 / 3 + 0.9e-6, np.nan, 3.0)))
+    (folder / "allowed.yaml").write_text(f"kinematics.motion.{allowed}\n")
+    done, _ = compared("--tolerances", "allowed.yaml")
+    assert (done.exit_code, message in done.stderr) == (code, True)
+
+
 @pytest.mark.parametrize(("allowed", "code"), [(1e9, 2), (0, 1)])
 def test_a_tolerance_that_fits_nothing_does_not_pass(folder, results, compared, allowed, code):
     """A column that is mistyped beside a pattern for all would let everything pass."""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.report.figures.style import printed, raised
-from mechdesign.report.requirements import unit_of
 from mechdesign.results import Column, Result, Table
+from mechdesign.rows import unit_of
 
 # Most numbers of a question.
 MOST = 8
@@ -146,7 +146,7 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         if rule.table == "extremes" and words["output"].endswith(("_effort", "_advantage")):
             continue
-        unit = unit_of(table, column.name, row)
+        unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))

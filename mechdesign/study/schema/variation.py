@@ -307,9 +307,7 @@ def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: Ke
         nominal = checker.parameters.nominal.get(name)
         if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
-    if name not in checker.parameters.nominal:
-        kinds = {**checker.mechanism.driven_kinds, **LOADS}
-        quantity = checker.places[name].quantity if name in checker.places else kinds[name]
+    if (quantity := LOADS.get(name) or checker.quantity(name)) is not None:
         for key in (dimension.kind, "nominal"):
             checker.kind((*path, key), quantity)
     if dimension.measured is not None:
