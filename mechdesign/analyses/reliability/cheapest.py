@@ -120,11 +120,12 @@ class ToleranceModel:
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Probability of failure at some of the task's settings."""
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
-        from mechdesign.analyses.reliability.probability import failure_probability
+        from mechdesign.analyses.reliability.probability import made_failure
 
         poses = [self.task.settings[k].pose for k in which]
         linear, question = self.linear(scales).take(poses), self.task.question.at(self.task.nominal[:, poses])
-        return failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
+        closing = replace(self.task.closing.take(poses), sources=linear.sources)
+        return made_failure(linear, closing, question.bands, question.discs)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Cost of all that is allocated, and its derivatives by x."""
