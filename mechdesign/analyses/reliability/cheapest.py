@@ -28,7 +28,7 @@ TIGHTEST = 1e-3
 WIDEST = 10.0
 # Step of difference quotients, in log T.
 _LOG_STEP = 1e-4
-# How far a constraint may be broken, in the logarithm of `_distance`.
+# How far a constraint may be broken, in the logarithm of `distance`.
 _SLACK = 1e-9
 # Poses that become constraints at once, and how often more of them may.
 _POSES_ADDED = 6
@@ -134,24 +134,24 @@ class ToleranceModel:
         return float(prices.sum()), -np.array([t.cost.exponent for t in each if t.cost is not None]) * prices
 
 
-def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
-    """Factors of all tolerances; None where not even the tightest keep each pose's failures, of shape (poses,)."""
+def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
+    """Factors of all tolerances; the tightest where not even these keep each pose's failures, of shape (poses,)."""
     from scipy.optimize import minimize
 
     count = len(model.free)
     lowest, highest = model.tightest, np.log(model.widest)
     every = range(len(model.task.settings))
-    wanted = _distance(allowed)
+    wanted = distance(allowed)
 
     def margins(x: Floats, which: Sequence[int]) -> Floats:
-        return _distance(model.failures(model.scales(x), which)) - wanted[list(which)]
+        return distance(model.failures(model.scales(x), which)) - wanted[list(which)]
 
     def slopes(x: Floats, which: Sequence[int]) -> Floats:
         steps = _LOG_STEP * np.eye(count)
         return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _LOG_STEP) for h in steps], axis=1)
 
     if margins(lowest, every).min() < 0:
-        return None
+        return model.scales(lowest)
     if margins(highest, every).min() >= 0:
         return model.scales(highest)
     alike = _shifted(margins, np.zeros(count), lowest, highest, every)
@@ -174,7 +174,7 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
     return model.scales(x if model.cost(x)[0] <= model.cost(alike)[0] else alike)
 
 
-def _distance(failure: Floats) -> Floats:
+def distance(failure: Floats) -> Floats:
     """Log of the distance, in standard deviations, of a limit so often broken: nearly linear in log T."""
     from scipy.special import ndtri
 
