@@ -33,9 +33,10 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.reliability import Precision
 
-# Rounds of learning, from all failures so far, and their samples a dimension and at least.
+# Rounds of learning, from all failures so far, and their samples a dimension, each part besides, and at least.
 _ROUNDS = 6
 _ROUND_SAMPLES = 40
+_PART_SAMPLES = 10
 _ROUND_LEAST = 1600
 # Learned enough where the relative variance of a round's weights is below this.
 _GOOD_VARIANCE = 2.0
@@ -148,7 +149,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
     # Where many of them count, the samples that starts were taken from know of places without a design point.
     if float(explored.sum()) ** 2 > _EXPLORED_MANY * float(explored @ explored):
         parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
-    count = max(_ROUND_LEAST, _ROUND_SAMPLES * problem.dimension)
+    count = max(_ROUND_LEAST, (_ROUND_SAMPLES + _PART_SAMPLES * len(fixed.weight)) * problem.dimension)
     seen, known = [], []
     for rounds in range(1, _ROUNDS + 1):
         mixture = parts.joined(fixed, _FIXED_SHARE)
