@@ -117,10 +117,13 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
             break
         starts = _edges(problem, np.full(starts.shape[1], _ANY), starts)
         margins = problem.margins(starts)
-        known = np.isfinite(margins).all(axis=0)
-        found.append(_worst(problem, np.argmin(margins[:, known], axis=0), starts[:, known], sizes(problem)))
-        still = ~_explained(_distinct(problem, found, seen, lost), starts)
-        found.append(_ended(problem, starts[:, still], rng))
+        limit = np.argmin(np.nan_to_num(margins, nan=np.inf), axis=0)
+        nearest, normal, good = descend(problem, limit, starts, sizes(problem), together=False)
+        # On a jump of the margins the slope is not that of the way to the mean.
+        good &= (nearest * normal).sum(axis=0) >= _SAME_COSINE * np.linalg.norm(nearest, axis=0)
+        found.append((nearest[:, good], limit[good], normal[:, good], np.zeros((int(good.sum()), 0, 2))))
+        good |= _explained(_distinct(problem, found, seen, lost), starts)
+        found.append(_ended(problem, starts[:, ~good], rng))
         before, points = points, _distinct(problem, found, seen, lost)
         if points.near.sum() == before.near.sum():
             break
