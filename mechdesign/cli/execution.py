@@ -45,7 +45,7 @@ OUTCOMES = {
     0: "done",
     1: "requirement not met",
     2: "wrong study",
-    3: "cannot be assembled",
+    3: "cannot be done",
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }

@@ -157,7 +157,9 @@ class Dimension(fields.Model):
     dimension's nominal size. Example: 0.03 Example: [-0.1, 0.3] Example: js9 Example: ISO 2768-m
     """
     sigma: fields.NonNegative | None = None
-    """Standard deviation, in place of a tolerance. Example: 0.01"""
+    """Standard deviation, in place of a tolerance; of truncated_normal that of the normal law before it is cut at 3
+    sigma, which leaves 0.9866 sigma. Example: 0.01
+    """
     distribution: Annotated[str, fields.choice(_OF_DIMENSIONS, "distribution")] = "normal"
     """Distribution of the deviations."""
     shape: (
