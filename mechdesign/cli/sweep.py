@@ -13,8 +13,9 @@ from typing import Any
 from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.ledger import failure, name_of
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit
+from mechdesign.cli.summary import MARK, junit
 from mechdesign.errors import Interrupted, Problem, StudyError
+from mechdesign.files import check_marked
 from mechdesign.report.writer import write_file
 from mechdesign.study.schema.matrix import RANGE
 from mechdesign.study.text.document import read
@@ -85,6 +86,8 @@ def _as_typed(error: StudyError) -> StudyError:
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
     given, label = None, name_of(path)
+    if options.junit is not None:
+        check_marked(options.junit, MARK)
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
@@ -99,4 +102,4 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         return given.exit_code
     finally:
         if options.junit is not None and given is not None:
-            write_file(options.junit, junit([given]).encode())
+            write_file(options.junit, junit([given]).encode(), MARK)
