@@ -13,7 +13,7 @@ from typing import Any
 import mechdesign
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import MARK, junit_text
+from mechdesign.cli.summary import junit_text, mark
 from mechdesign.errors import StudyError, counted
 from mechdesign.files import FORMATS, check_marked, check_writable, marked
 from mechdesign.parallel import one_thread
@@ -63,7 +63,7 @@ def compare(
     default = Tolerance(rtol, atol)
     chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
     if junit is not None:
-        check_marked(junit, MARK)
+        check_marked(junit, mark(junit))
     if out is not None:
         check_writable(out)
         check_marked(out / _TABLE, _HEADER)
@@ -94,7 +94,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--json, --quiet and --allow-files"
         )
     if options.junit is not None:
-        check_marked(options.junit, MARK)
+        check_marked(options.junit, mark(options.junit))
     root = path.parent if path.name == manifest.NAME else path
     recorded = folders.results(path)
     if not recorded:
@@ -155,18 +155,20 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
 
 
 def _write(out: Path, found: Comparison) -> None:
-    mark = writer.CREATOR.encode()
+    creator = writer.CREATOR.encode()
     writer.write_file(out / _TABLE, to_csv(found.table).encode(), _HEADER)
     if not found.moved:
         # None of an older comparison stays.
-        if marked(out / _PICTURE, mark):
+        if marked(out / _PICTURE, creator):
             (out / _PICTURE).unlink()
         return
     from mechdesign.report.figures import style
     from mechdesign.report.figures.differences import differences_figure
 
     with style.context():
-        writer.write_file(out / _PICTURE, style.encoded(differences_figure(found.moved), "png", writer.CREATOR), mark)
+        writer.write_file(
+            out / _PICTURE, style.encoded(differences_figure(found.moved), "png", writer.CREATOR), creator
+        )
 
 
 def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
@@ -184,7 +186,7 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
     else:
         terminal.show_lines([str(each) for each in found.differences if each.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(found, command).encode(), MARK)
+        writer.write_file(junit, _junit(found, command).encode(), mark(junit))
     return 1 if found.differences else 0
 
 

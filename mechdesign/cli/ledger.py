@@ -85,7 +85,7 @@ class Ledger:
     def _check(self) -> None:
         """Find out before the first study is answered that a file about all would replace another."""
         if self.options.junit is not None:
-            check_marked(self.options.junit, summary.MARK)
+            check_marked(self.options.junit, summary.mark(self.options.junit))
         if self.several:
             check_marked(self._root / SUMMARY, _HEADER)
             if self.options.report:
@@ -161,7 +161,7 @@ class Ledger:
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
-            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.MARK)
+            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.mark(options.junit))
         table = summary.summary(answers)
         if self.several and any(given.written for given in answers):
             self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)

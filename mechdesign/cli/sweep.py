@@ -13,7 +13,7 @@ from typing import Any
 from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.ledger import failure, name_of
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import MARK, junit
+from mechdesign.cli.summary import junit, mark
 from mechdesign.errors import Interrupted, Problem, StudyError
 from mechdesign.files import check_marked
 from mechdesign.report.writer import write_file
@@ -87,7 +87,7 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
     given, label = None, name_of(path)
     if options.junit is not None:
-        check_marked(options.junit, MARK)
+        check_marked(options.junit, mark(options.junit))
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
@@ -102,4 +102,4 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         return given.exit_code
     finally:
         if options.junit is not None and given is not None:
-            write_file(options.junit, junit([given]).encode(), MARK)
+            write_file(options.junit, junit([given]).encode(), mark(options.junit))

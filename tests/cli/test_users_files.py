@@ -128,11 +128,11 @@ def test_a_file_that_comes_while_it_is_computed_stays(folder, analysis, invoke):
 @pytest.mark.parametrize(
     ("name", "arguments"),
     [
-        ("junit.xml", ("run", "slider.yaml", "--junit", "junit.xml")),
+        ("junit", ("run", "slider.yaml", "--junit", "junit")),
         ("slider.yaml", ("run", "slider.yaml", "--junit", "slider.yaml")),
-        ("junit.xml", ("sweep", "slider.yaml", "--junit", "junit.xml")),
-        ("junit.xml", ("compare", "results", "results", "--junit", "junit.xml")),
-        ("junit.xml", ("run", "--verify", "results", "--junit", "junit.xml")),
+        ("junit", ("sweep", "slider.yaml", "--junit", "junit")),
+        ("junit", ("compare", "results", "results", "--junit", "junit")),
+        ("junit", ("run", "--verify", "results", "--junit", "junit")),
         ("out/differences.csv", ("compare", "results", "results", "--out", "out")),
         ("out/differences.png", ("compare", "results", "results", "--out", "out")),
         ("out/summary.csv", ("run", "slider.yaml", "other.yaml", "--out", "out")),
@@ -178,11 +178,13 @@ def test_own_files_are_replaced(folder, analysis, invoke, kind):
         f"mechanism.{kind}", f"dimensions.{kind}", "differences.csv", "differences.png"}  # fmt: skip
 
 
-def test_a_device_takes_a_report(folder, analysis, invoke):
+def test_a_junit_file_replaces_its_like(folder, analysis, invoke):
     assert invoke("run", "slider.yaml", "--no-plots", "--junit", "/dev/null").exit_code == 0
-    (folder / "empty.xml").touch()
-    assert invoke("run", "slider.yaml", "--no-plots", "--junit", "empty.xml").exit_code == 0
-    assert (folder / "empty.xml").read_text().startswith("<?xml")
+    (folder / "empty").touch()
+    (folder / "other.xml").write_text("<testsuites/>")
+    for name in ("empty", "other.xml", "empty"):
+        assert invoke("run", "slider.yaml", "--no-plots", "--junit", name).exit_code == 0
+        assert "mechdesign" in (folder / name).read_text()
 
 
 def test_an_answer_in_python_leaves_them_too(folder):
