@@ -146,6 +146,17 @@ INTERRUPTED = {
         print("whole")
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     """,
+    "compiled": """
+        import scipy.stats.qmc
+        import scipy.stats._sobol
+        files = scipy.stats._sobol.importlib.resources.files
+        def slow(package):
+            signal.raise_signal(signal.SIGINT)
+            return files(package)
+        scipy.stats._sobol.importlib.resources.files = slow
+        scipy.stats.qmc.Sobol(2)
+        print("whole")
+    """,
     "queue": """
         class Queue(queue.Queue):
             def _put(self, item):
