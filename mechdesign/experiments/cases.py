@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -23,7 +22,7 @@ from mechdesign.study import Study
 from mechdesign.study.loading import load_document, same_sketch
 from mechdesign.study.schema.matrix import Named
 from mechdesign.study.schema.study_file import override
-from mechdesign.study.text.document import Document, KeyPath, Mark
+from mechdesign.study.text.document import Document, KeyPath, Mark, in_yaml
 
 # What is told of the rows of a result, by the word after its name.
 STATISTICS: Mapping[str, Callable[[Floats], Any]] = {"min": np.min, "max": np.max, "mean": np.mean, "range": np.ptp}
@@ -47,7 +46,7 @@ class Case:
     @property
     def overrides(self) -> tuple[str, ...]:
         """The changes as ``a.b.c=value``."""
-        return tuple(f"{name}={json.dumps(value)}" for name, value in self.changes)
+        return tuple(f"{name}={in_yaml(value)}" for name, value in self.changes)
 
 
 @dataclass(frozen=True)

@@ -84,8 +84,12 @@ class Message(NamedTuple):
         """Whether these words stand in it, or it in these words."""
         if words.casefold() in self.text.casefold():
             return True
-        parts = _PLACE.split(self.source)
-        return sum(map(len, parts)) >= _LETTERS and re.search(".*".join(map(re.escape, parts)), words) is not None
+        parts, end = _PLACE.split(self.source), 0
+        for part in parts:
+            if (start := words.find(part, end)) < 0:
+                return False
+            end = start + len(part)
+        return sum(map(len, parts)) >= _LETTERS
 
 
 @cache

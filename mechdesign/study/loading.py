@@ -40,7 +40,7 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, entry, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
@@ -254,7 +254,7 @@ def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
     """Overrides as ``a.b.c=value``; a value of a mapping is written in JSON, which YAML reads."""
     if isinstance(overrides, Mapping):
         return tuple(
-            f"{name}={json.dumps(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
+            f"{name}={in_yaml(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
         )
     return (overrides,) if isinstance(overrides, str) else tuple(overrides)
 

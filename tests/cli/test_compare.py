@@ -1,6 +1,7 @@
 """Baselines: `compare` of two folders of results, and `run --verify` of what a manifest says."""
 
 import csv
+import hashlib
 import io
 import json
 from pathlib import Path
@@ -266,16 +267,39 @@ def test_nothing_to_compare(folder, results, compared):
         ("tool", ["mechdesign"]),
         ("requirements", [{"requirement": "x at most 1"}]),
         ("tables", {"motion.csv": {"columns": [{"name": ["theta"], "unit": "", "meaning": ""}]}}),
+        ("command", []),
+        ("seed", "1"),
+        ("files", {}),
+        ("files", ["motion.csv"]),
+        ("files", {"motion.csv": "no hash"}),
+        ("files", {"motion.csv": 64 * "0", "../slider.yaml": 64 * "0"}),
+        ("overrides", {}),
+        ("all_modes", 1),
     ],
 )
-def test_a_manifest_of_another_hand_is_none(folder, results, compared, key, value):
+def test_a_manifest_of_another_hand_is_none(folder, results, compared, invoke, key, value):
     for side in ("old", "new"):
         results(f"{side}/kinematics", motion())
     path = folder / "new/kinematics/manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
-    done, _ = compared()
-    assert done.exit_code == 2
-    assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+    for done in (compared()[0], invoke("run", "--verify", "new")):
+        assert done.exit_code == 2
+        assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+
+
+def test_verify_compares_which_files_there_are(folder, analysis, invoke):
+    """Another in the manifest, or one less, is told, though every hash is that of its file."""
+    analysis(lambda study, **ignored: answer(files={"notes.txt": "words"}))
+    invoke("kinematics", "slider.yaml", "--no-plots", "--out", "old")
+    path = folder / "old/manifest.json"
+    content = json.loads(path.read_text())
+    (folder / "old/more.txt").write_text("more")
+    more = content["files"] | {"more.txt": hashlib.sha256(b"more").hexdigest()}
+    for files, name in ((more, "more.txt"), ({"motion.csv": content["files"]["motion.csv"]}, "notes.txt")):
+        path.write_text(json.dumps(content | {"files": files}))
+        done = invoke("run", "--verify", "old")
+        assert done.exit_code == 1
+        assert short(csv.DictReader(io.StringIO(done.stdout))) == {(name, "", "bytes")}
 
 
 def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatch, invoke):

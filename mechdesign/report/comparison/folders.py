@@ -9,7 +9,6 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import SWEEP
@@ -34,37 +33,6 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
-
-
-class _Column(BaseModel):
-    name: str
-    unit: str
-    meaning: str
-
-
-class _Table(BaseModel):
-    columns: list[_Column]
-
-
-class _Study(BaseModel):
-    resolved: dict[str, Any] = {}
-
-
-class _Verdict(BaseModel):
-    requirement: str
-    met: bool
-    worst: float | None = None
-
-
-class _Manifest(BaseModel):
-    """What is read of a manifest here."""
-
-    study: _Study
-    tables: dict[str, _Table]
-    requirements: list[_Verdict]
-    tool: dict[str, str] = {}
-    libraries: dict[str, str] = {}
-    inputs: dict[str, str] = {}
 
 
 def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
@@ -118,16 +86,8 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
         return {".": results(root.parent)["."]}
     if not root.is_dir():
         raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
-    found = {}
-    for path in sorted(root.rglob(manifest.NAME)):
-        content = manifest.read(path.parent)
-        try:
-            _Manifest.model_validate(content, strict=True)
-        except ValidationError:
-            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again") from None
-        assert content is not None
-        found[path.parent.relative_to(root).as_posix()] = content
-    return found
+    folders = [path.parent for path in sorted(root.rglob(manifest.NAME))]
+    return {folder.relative_to(root).as_posix(): manifest.whole(folder) for folder in folders}
 
 
 def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
@@ -274,8 +234,6 @@ def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table
     """
     about = content["tables"][name]
     try:
-        if Path(name).name != name:
-            raise ValueError(name)
         text = (directory / name).read_text(encoding="utf-8")
         return from_csv(text, name.removesuffix(".csv"), about["columns"])
     except OSError as error:

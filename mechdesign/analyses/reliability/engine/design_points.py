@@ -340,9 +340,9 @@ def descend(
             break
         margins, gradients = problem.gradients(u[:, lanes])
         rows, k = limit[lanes], np.arange(len(lanes))
-        g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
-        # Of a limit out of all proportion it is infinite, and its nearest point is not known.
+        # Of a limit out of all proportion they are infinite, and its nearest point is not known.
         with np.errstate(over="ignore"):
+            g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
             size = (slope**2).sum(axis=0)
         known = np.isfinite(g) & np.isfinite(size) & (size > 0)
         active[lanes[~known]] = False
