@@ -20,7 +20,6 @@ from mechdesign.cli.board import Board, Far, Reported
 from mechdesign.cli.crew import Alone, Crew, Tell
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
-    OUTCOMES,
     Outcome,
     Source,
     answer,
@@ -284,7 +283,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -
     return Entry(
         study.name,
         study.label,
-        [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
+        [(given.command, given.word, given.exit_code) for given in told],
         met=sum(verdict.met for verdict in verdicts),
         required=sum(len(judged_by(study, command)) for command, _ in task.questions),
         warnings=len({warning for given in told for warning in given.warnings}),

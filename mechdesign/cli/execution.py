@@ -45,7 +45,7 @@ OUTCOMES = {
     0: "done",
     1: "requirement not met",
     2: "wrong study",
-    3: "cannot be done",
+    3: "cannot be assembled",
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
@@ -78,6 +78,12 @@ class Outcome:
     table: Table | None = None  # the main one
     shard: str = ""  # what became of a part of it, where no more was asked
     left: bool = False  # whether the run ended before it
+    reached: bool = True  # whether what was to be reached by changes was, where all poses assemble
+
+    @property
+    def word(self) -> str:
+        """What came of it, in a word or two."""
+        return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
 def source(path: Path | None, options: Options) -> Source:
@@ -172,7 +178,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, table=result.main,
+        written=True, table=result.main, reached=result.reached,
     )  # fmt: skip
 
 
@@ -322,8 +328,7 @@ def write_report(
     for given in answers:
         path = given.directory / pages.SECTION
         part = json.loads(path.read_text(encoding="utf-8")) if given.written and path.exists() else None
-        outcome = OUTCOMES[given.exit_code]
-        told.append(page.Answered(given.command, outcome, given.exit_code, given.failed, given.verdicts, part))
+        told.append(page.Answered(given.command, given.word, given.exit_code, given.failed, given.verdicts, part))
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(given.directory != directory for given in answers)
     path = directory / pages.REPORT

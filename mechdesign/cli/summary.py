@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.cli.execution import OUTCOMES, Outcome
+from mechdesign.cli.execution import Outcome
 from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
 
@@ -30,7 +30,7 @@ def in_brief(given: Outcome) -> str:
     """What a question failed by, in a line of the list of failures."""
     why = [given.failed.splitlines()[0]] if given.failed else []
     why += [str(verdict) for verdict in given.verdicts if not verdict.met]
-    return f"  {given.study}: {given.command}: {OUTCOMES[given.exit_code]}: {'; '.join(why)}"
+    return f"  {given.study}: {given.command}: {given.word}: {'; '.join(why)}"
 
 
 def summary(answers: Sequence[Outcome]) -> Table:
@@ -42,7 +42,7 @@ def summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "outcome": (str, lambda given: given.shard or given.word + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),

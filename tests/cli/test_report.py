@@ -185,7 +185,7 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     page = Page("results/index.html")
     check(page)
     rows = [" ".join(text.split()) for text in page.said("tr")][1:]
-    assert "stiffness: ✗ cannot be done" in rows[0]
+    assert "stiffness: ✗ cannot be assembled" in rows[0]
     assert "✗ 0 of 2 met" in rows[0]
     assert "wrong study" in rows[1]
     assert "mechanism.links.crank" in rows[1]
@@ -194,7 +194,7 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     assert len(page.all("img")) == 2
     failed = Page("results/both/report.html")
     check(failed)
-    assert "cannot be done: cannot reach <there>" in " ".join(failed.said("p"))
+    assert "cannot be assembled: cannot reach <there>" in " ".join(failed.said("p"))
     assert "not judged" in failed.text
 
 
