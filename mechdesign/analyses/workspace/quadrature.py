@@ -40,7 +40,7 @@ FINEST_AREA = 1e-6
 # A piece smaller than this part of the whole region is measured by the whole: its boundary may be rough all over.
 SLIVER = 1e-3
 # Cells of one design at most; what is in doubt then stays so, and its error tells.
-MOST_CELLS = 1000
+MOST_CELLS = 256
 # Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
 SINGLE_RAY = 0.01
 # Rays, and nodes of each, of the rules of comparison unless the study says how many.
