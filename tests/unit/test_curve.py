@@ -38,6 +38,16 @@ MEASURES
 kinematics: {sweep: {crank: {from: 0, to: 360, step: 10}}, outputs: OUTPUTS}
 """
 
+LOADED = """\
+mechanism:
+  parameters: {a: 30}
+  links: {ground: {O: [0, 0]}, crank: [O, A, a]}
+  drives: [crank]
+  sketch: {A: [30, 0]}
+kinematics: {sweep: {crank: {from: -60, to: 60, step: 40}}, loads: [{at: A, force: [0, 10]}]}
+optimize: {minimize: GOAL, variables: {a: {from: 10, to: 50, step: 10}}}
+"""
+
 
 def four_bar(outputs: str = "[rocker.angle]", measures: str = "") -> str:
     return FOUR_BAR.replace("OUTPUTS", outputs).replace("MEASURES", measures)
@@ -156,37 +166,17 @@ def test_a_verdict_on_a_motion_says_nothing_of_poses() -> None:
 
 
 def test_a_goal_of_magnitudes_does_not_take_the_least_signed() -> None:
-    # The load presses down on P: the moment of the drive is -10 N P.x up to its sign, least in magnitude for the short.
-    text = """\
-mechanism:
-  parameters: {a: 30}
-  links: {ground: {O: [0, 0]}, crank: [O, A, a]}
-  drives: [crank]
-  sketch: {A: [30, 0]}
-kinematics: {sweep: {crank: {from: -60, to: 60, step: 40}}, loads: [{at: A, force: [0, 10]}]}
-optimize:
-  minimize: {result: kinematics.crank_effort, abs: true}
-  variables: {a: {from: 10, to: 50, step: 10}}
-"""
-    study = study_of(text)
+    # The drive's moment is -10 N P.x: of the shortest crank the least in magnitude, of the longest the lowest.
+    study = study_of(LOADED.replace("GOAL", "{result: kinematics.crank_effort, abs: true}"))
     assert (kinematics(study).tables["motion"]["crank_effort"] < 0).all()
-    table = mechdesign.optimize(study).tables["optimum"]
-    assert table["a"][0] == 10
-    signed = mechdesign.optimize(study_of(text.replace(", abs: true", "")))
-    assert signed.tables["optimum"]["a"][0] == 50
+    signed = study_of(LOADED.replace("GOAL", "kinematics.crank_effort"))
+    assert [mechdesign.optimize(each).tables["optimum"]["a"][0] for each in (study, signed)] == [10, 50]
 
 
 def test_designs_that_tie_are_no_optimum_without_a_word() -> None:
-    text = """\
-mechanism:
-  parameters: {a: 30}
-  links: {ground: {O: [0, 0]}, crank: [O, A, a]}
-  drives: [crank]
-  sketch: {A: [30, 0]}
-kinematics: {sweep: {crank: {from: -90, to: 90, step: 30}}, loads: [{at: A, force: [0, 10]}]}
-optimize: {minimize: kinematics.crank_effort, variables: {a: {from: 10, to: 50, step: 10}}}
-"""
-    (warning,) = mechdesign.optimize(study_of(text)).warnings
+    # Where the load stands along the crank, its moment is zero for every length.
+    text = LOADED.replace("GOAL", "kinematics.crank_effort")
+    (warning,) = mechdesign.optimize(study_of(text, "kinematics.sweep.crank={from: -90, to: 90, step: 30}")).warnings
     assert warning.startswith("all 5 feasible designs tie: kinematics.crank_effort is")
 
 
