@@ -165,5 +165,6 @@ def test_a_limit_of_the_smallest_number_there_is(method):
     )
     found = mechdesign.reliability(mechdesign.load(text=text))
     failure = found.tables["reliability"]["failure"]
-    # Whoever finds no design point says so.
-    assert failure[0] == 1 or (np.isnan(failure[0]) and "no design point" in found.warnings[0])
+    # A design point is known to a thousandth of sigma; whoever finds none says so.
+    near = 1e-3 if method == "form" else 0.0
+    assert failure[0] >= 1 - near or (np.isnan(failure[0]) and "no design point" in found.warnings[0])

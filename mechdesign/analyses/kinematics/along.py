@@ -15,7 +15,7 @@ from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve, End
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.derivatives import Jacobian, conditionings
+from mechdesign.mechanism.derivatives import Jacobian, Linearization, conditionings
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -122,7 +122,7 @@ class Along:
             row[:] = arrays.get(name, 1.0)
         return table, motion.arrays["conditioning"]
 
-    def _inverse(self, linear, configuration: Configuration) -> Value:  # type: ignore[no-untyped-def]
+    def _inverse(self, linear: Linearization, configuration: Configuration) -> Value:
         """Determinant of the derivatives of what the poses give by the drives, without units."""
         mechanism = self.question.study.mechanism
         given = [mechanism.coordinate(name) for name in self.question.poses.groups[0].names]

@@ -222,7 +222,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
         path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
         reference = section.from_ or GROUND if section is not None else GROUND
         if item == GROUND:
-            builder.report(path, "the ground never moves; name what is driven")
+            builder.report(path, "there is no moving link 'ground': the ground never moves; name what is driven")
             right = False
         elif section is None:
             right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
