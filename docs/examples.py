@@ -44,6 +44,7 @@ RUN = ROOT / "_run"
 ANY = "..."
 # Two numbers are the same to six digits.
 DIGITS = 1e-6
+ROUNDING = 1e-10
 _FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=fence)[ ]*$")
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
 # Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
@@ -136,11 +137,18 @@ def _split(told: Iterable[str]) -> Iterator[list[str]]:
 
 
 def _same(told: Sequence[str], shown: Sequence[str]) -> bool:
-    """Whether lines are the same: words to the letter, numbers to six digits, as machines differ in the last ones."""
-    if len(told) != len(shown) or [_NUMBER.sub("", line) for line in told] != [_NUMBER.sub("", line) for line in shown]:
+    """Whether lines are the same: words to the letter, numbers to six digits, as machines differ in the last ones.
+
+    Numbers below `ROUNDING` are what rounding leaves, another on every machine. Columns are as wide as their numbers.
+    """
+    words = [[_NUMBER.sub("", line).split() for line in lines] for lines in (told, shown)]
+    if words[0] != words[1]:
         return False
-    pairs = zip(_NUMBER.findall("\n".join(told)), _NUMBER.findall("\n".join(shown)), strict=True)
-    return all(math.isclose(float(a), float(b), rel_tol=DIGITS) for a, b in pairs)
+    numbers = [_NUMBER.findall("\n".join(lines)) for lines in (told, shown)]
+    if len(numbers[0]) != len(numbers[1]):
+        return False
+    pairs = zip(*numbers, strict=True)
+    return all(math.isclose(float(a), float(b), rel_tol=DIGITS, abs_tol=ROUNDING) for a, b in pairs)
 
 
 def _commands(body: str) -> Iterator[tuple[str, str]]:
