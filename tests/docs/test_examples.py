@@ -13,6 +13,7 @@ import pytest
         ("...\nb 2\n...\nd\n", "a\nb 2\nc\nd\n", True),
         ("a\n...\n", "a\n", True),
         ("", "", True),
+        ("error  -1.3e-12\n", "error 2e-13\n", True),
         ("a 1.001\n", "a 1.0\n", False),
         ("a 1\n", "b 1\n", False),
         ("a\n", "a\nb\n", False),
