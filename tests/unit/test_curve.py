@@ -8,6 +8,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.errors import StudyError
 from mechdesign.report.requirements import Verdict
 from mechdesign.results import Result
 
@@ -171,6 +172,12 @@ def test_a_goal_of_magnitudes_does_not_take_the_least_signed() -> None:
     assert (kinematics(study).tables["motion"]["crank_effort"] < 0).all()
     signed = study_of(LOADED.replace("GOAL", "kinematics.crank_effort"))
     assert [mechdesign.optimize(each).tables["optimum"]["a"][0] for each in (study, signed)] == [10, 50]
+
+
+def test_numbers_without_poses_take_no_word_for_poses_that_are_missing() -> None:
+    text = LOADED.replace("GOAL", "{result: a, unassembled: allowed}")
+    with pytest.raises(StudyError, match="'a' is of no poses that could be missing"):
+        study_of(text)
 
 
 def test_designs_that_tie_are_no_optimum_without_a_word() -> None:

@@ -13,7 +13,7 @@ from pydantic_core import PydanticCustomError
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.optimize import Judged, check_result, read_result
+from mechdesign.study.schema.optimize import Chosen, check_result, read_result
 from mechdesign.study.schema.paths import read_cells
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import read
@@ -134,7 +134,7 @@ def _named(raw: Any, context: Context) -> str:
     return found
 
 
-class Named(Judged):
+class Named(Chosen):
     """A result of every case, and the rows of it that count."""
 
     result: Annotated[str, fields.Read(_named, {**fields.NAME_FORM, "title": "result"})]

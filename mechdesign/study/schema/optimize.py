@@ -95,7 +95,7 @@ def _amount(value: str | float, info: ValidationInfo) -> str | float:
     return value
 
 
-class Judged(fields.Model):
+class Chosen(fields.Model):
     """A result, and the rows of it that count; or an expression over parameters."""
 
     bare = "result"
@@ -111,12 +111,6 @@ class Judged(fields.Model):
     """Rows that count: those whose columns have these values, in the column's unit or with one of its kind. Left out:
     all rows. Example: {method: monte_carlo}
     """
-    abs: bool = False
-    """Whether the absolute value is judged."""
-    unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
-    """What becomes of a motion with poses that cannot be assembled or lie outside the limits. Left out: it is not met,
-    and a design is infeasible, where one pose is not valid or the motion ends between two. Example: allowed
-    """
 
     @property
     def name(self) -> str:
@@ -129,6 +123,23 @@ class Judged(fields.Model):
     def _of_rows(self) -> Self:
         if self.where and isinstance(self.result, Expression):
             raise failure(f"{self.result.text!r} is one number for each design: it has no rows, so leave out 'where'")
+        return self
+
+
+class Judged(Chosen):
+    """A result that is judged, and the rows of it that count; or an expression over parameters."""
+
+    abs: bool = False
+    """Whether the absolute value is judged."""
+    unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
+    """What becomes of a motion with poses that cannot be assembled or lie outside the limits. Left out: it is not met,
+    and a design is infeasible, where one pose is not valid or the motion ends between two. Example: allowed
+    """
+
+    @model_validator(mode="after")
+    def _of_poses(self) -> Self:
+        if self.unassembled and not self.name.startswith(("kinematics.", "reliability.", "stiffness.")):
+            raise failure(f"{self.name!r} is of no poses that could be missing: leave out 'unassembled'")
         return self
 
 
