@@ -41,23 +41,23 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     # By curve and design; of both ends the value and its place.
     table = np.stack([values for _, values in curves.values()]).reshape(len(curves), poses.designs, -1)
     places = at.reshape(poses.designs, -1)
-    known = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
-    row = np.stack([np.where(known, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
-    low, high = (np.take_along_axis(table, each[..., None], axis=2)[..., 0] for each in row)
-    finite = np.where(known & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
+    counted = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
+    row = np.stack([np.where(counted, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
+    low, high = (np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row)
+    finite = np.where(counted & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
     size = np.array([sizes.get(quantity, 0.0) for quantity, _ in curves.values()])[:, None]
     still = STILL * np.maximum(finite, size)
     with np.errstate(invalid="ignore"):
         moving = high - low > still
     # A curve that stands still has both extremes at its first pose.
-    row = np.where(moving, row, known.argmax(axis=2))
-    values = np.stack([np.take_along_axis(table, each[..., None], axis=2)[..., 0] for each in row])
-    found = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
-    found = np.where(known.any(axis=2), found, np.nan)
+    row = np.where(moving, row, counted.argmax(axis=2))
+    values = np.stack([np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row])
+    ends = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
+    ends = np.where(counted.any(axis=2), ends, np.nan)
     if along is not None:
         mine = [k for k, name in enumerate(curves) if name in along.columns and (names is None or name in names)]
-        _between(along, [list(curves)[k] for k in mine], mine, found, still, moving)
-    (low, low_at), (high, high_at) = found
+        _between(along, [list(curves)[k] for k in mine], mine, ends, still, moving)
+    (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
     if along is not None and swept is not None and mechanism.quantity(swept) == "angle":
         timed = (np.ptp(places, axis=1) >= turn * (1 - 1e-9)) & along.whole
@@ -90,23 +90,23 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
 
 
 def _between(
-    along: Along, names: Sequence[str], rows: Sequence[int], found: Floats, still: Floats, moving: Flags
+    along: Along, names: Sequence[str], rows: Sequence[int], ends: Floats, still: Floats, moving: Flags
 ) -> None:
-    """Put the extremes of motions between their poses into `found`, shape (2, 2, curves, designs): value and place.
+    """Put the extremes of motions between their poses into `ends`, shape (2, 2, curves, designs): value and place.
 
     `moving`, shape (curves, designs), says which curves do not stand still.
     """
-    line = np.broadcast_to(np.arange(found.shape[3]), (len(names), found.shape[3]))
+    line = np.broadcast_to(np.arange(ends.shape[3]), (len(names), ends.shape[3]))
     peaks = {sign: along.functions.extremes(names, sign, still[rows]) for sign in (-1, 1)}
     with np.errstate(invalid="ignore"):
         moves = peaks[1].value + peaks[-1].value > still[rows]
     moving[rows] |= moves
-    for end, sign in enumerate((-1, 1)):
+    for side, sign in enumerate((-1, 1)):
         peak = peaks[sign]
-        known = np.isfinite(peak.place) & moves
+        finite = np.isfinite(peak.place) & moves
         places = along.shown(line.ravel(), peak.place.ravel()).reshape(line.shape)
         for part, new in enumerate((sign * peak.value, places)):
-            found[end, part, rows] = np.where(known, new, found[end, part, rows])
+            ends[side, part, rows] = np.where(finite, new, ends[side, part, rows])
 
 
 def targets_table(motion: Motion, along: Along | None, sums: Floats | None = None) -> Table:
@@ -115,18 +115,18 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
     `along` is the motion between the poses, None of listed poses and grids; `sums` are the `targets.totals` of all
     poses, where the motion has only some of them.
     """
-    study, poses, found, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
-    sums = totals(found, poses.designs, valid) if sums is None else sums
+    study, poses, errors, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
+    sums = totals(errors, poses.designs, valid) if sums is None else sums
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
     at = poses.values[swept] if swept is not None else poses.numbers
-    found_at = np.full((4, poses.designs, len(found)), np.nan)
-    for k, error in enumerate(found):
-        known = (valid & np.isfinite(error.values)).reshape(shape)
-        some = known.any(axis=1)
-        values = np.where(known, error.values.reshape(shape), 0.0)[some]
-        worst = np.where(known[some], np.abs(values), -1.0).argmax(axis=1)
+    numbers = np.full((4, poses.designs, len(errors)), np.nan)
+    for k, error in enumerate(errors):
+        counted = (valid & np.isfinite(error.values)).reshape(shape)
+        some = counted.any(axis=1)
+        values = np.where(counted, error.values.reshape(shape), 0.0)[some]
+        worst = np.where(counted[some], np.abs(values), -1.0).argmax(axis=1)
         lane, (count, total, squares) = np.arange(len(worst)), sums[:, some, k]
-        found_at[:, some, k] = (
+        numbers[:, some, k] = (
             np.sqrt(squares / count),
             total / count,
             np.abs(values[lane, worst]),
@@ -140,11 +140,11 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
                 np.sqrt(along.mean(error.name, 2)), along.mean(error.name), value,
                 along.shown(np.arange(len(place)), place),
             ])  # fmt: skip
-            found_at[:, :, k] = np.where(along.curve.spent, found_at[:, :, k], between)
-    rms, mean, largest, where = found_at.reshape(4, -1)
+            numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
+    rms, mean, largest, where = numbers.reshape(4, -1)
     unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
-    units = np.tile(np.array([study.units.label(error.quantity) for error in found], dtype=str), poses.designs)
-    outputs = np.tile(np.array([error.output for error in found], dtype=str), poses.designs)
+    units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
+    outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
     return Table(
         "targets",
         (
@@ -155,5 +155,5 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
             Column("at", where, unit, f"{swept or 'row (from 0)'} at the largest error"),
             Column("unit", units, "", "unit of its errors"),
         ),
-        over("errors of the outputs against their targets", along, [error.name for error in found]),
+        over("errors of the outputs against their targets", along, [error.name for error in errors]),
     )
