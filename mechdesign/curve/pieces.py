@@ -16,10 +16,14 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 MOST_HALVINGS = 40
 # Series of margins that leave less than this part of the margin's size are resolved.
 RESOLVED = 1e-12
+# What these leave at any place is at most this part of it.
+UNRESOLVED = 2 * chebyshev.COUNT * RESOLVED
 # A margin that falls below zero by less than this part of its size, which is rounding, touches it.
 ROUNDING = 1e-13
 # A zero so near to an end of a piece is that end: where the piece is straight, and at a dead centre.
 AT_END, AT_FOLD = 1e-12, 1e-6
+# Zeros that a series alone has beside a dead centre are no farther from it in a piece.
+NEAR_FOLD = 1e-2
 # Zeros of a margin that touches zero, by rounding, lie so near to where it does in a piece.
 BESIDE = 1e-5
 # A closure without this part of its size as slope, over a piece, touches zero.
@@ -215,6 +219,10 @@ class Search:
                 dead = np.concatenate([dead, np.zeros(np.count_nonzero(inner), dtype=bool)])
         rims = np.where(np.stack([some.fold == -1, some.fold == 1]), AT_FOLD, AT_END)
         inside = (marks > -1.0 + rims[0, owner]) & (marks < 1.0 - rims[1, owner])
+        # Beside a dead centre a closure is smaller than what its series leaves: what lies between is no gap.
+        fold = some.fold[owner]
+        between = np.abs(chebyshev.value(coefficients[owner], (marks + fold) / 2))
+        inside &= (fold == 0) | (np.abs(marks - fold) > NEAR_FOLD) | (between > UNRESOLVED * scale[owner])
         owner, marks, dead = owner[inside], marks[inside], dead[inside]
         marks = np.where(dead, self._polished(some.take(owner), marks, coefficients[owner], number), marks)
         if role == "closure":

@@ -215,14 +215,25 @@ class Along:
         first = np.full(self.curve.lines, np.nan)
         order = np.argsort(-zeros.place, kind="stable")
         first[zeros.line[order]] = zeros.place[order]
-        value = np.where(low > 0, low, -high)
+        value, place = np.where(low > 0, low, -high), np.where(low > 0, places[-1], places[1])
         zero = np.isfinite(first)
+        # It jumps over zero at a corner or a gap: the square has no sign.
+        jumps = ~zero & (low <= 0) & (high >= 0)
+        if jumps.any():
+            squared = Functions(self.curve, [name], lambda *at: self._squared(name, *at), [0.0], extremes=[name])
+            least = squared.extremes([name], -1, rounding**2)
+            value = np.where(jumps, np.sqrt(np.maximum(-least.value[0], 0.0)), value)
+            place = np.where(jumps, least.place[0], place)
         # A zero that is only touched is known to the root of rounding: at a pose beside it that is one, it is there.
         lines = np.flatnonzero(zero & (np.abs(first - np.round(first)) <= NEAR_ROW))
         at_row = self.functions.at(lines, np.round(first[lines]))[self._names.index(name)]
         lines = lines[np.abs(at_row) <= still]
         first[lines] = np.round(first[lines])
-        return np.where(zero, 0.0, value), np.where(zero, first, np.where(low > 0, places[-1], places[1]))
+        return np.where(zero, 0.0, value), np.where(zero, first, place)
+
+    def _squared(self, name: str, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        table, conditioning = self._evaluated(line, s)
+        return table[[self._names.index(name)]] ** 2, conditioning
 
     def mean(self, name: str, power: int = 1) -> Floats:
         """Mean of a power of a column over each motion, by the way along it, shape (lines,)."""

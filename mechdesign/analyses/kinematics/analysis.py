@@ -58,6 +58,8 @@ _CENTRELESS = {
 }
 # How far a step of a motion may deviate from the direction of its rates, as a part of it.
 ASTRAY = 1e-3
+# A path has a corner where its direction (of length one) differs by more from that so many rows before.
+TURNED, BEFORE_CORNER = 1e-6, 1e-9
 
 
 @one_thread()
@@ -347,6 +349,11 @@ def _corners(question: MotionQuestion) -> list[str]:
     if question.section.speed is None or not poses.motion:
         return []
     rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
+    turned = np.zeros(len(rows), dtype=bool)
+    for path in poses.paths.values():
+        behind, before = (path.course(at)[0] for at in (rows, rows - BEFORE_CORNER))
+        turned |= np.abs(behind - before) > TURNED
+    rows = rows[turned]
     if not len(rows):
         return []
     return [
