@@ -26,10 +26,14 @@ MEAN_ERROR = 1e-10
 POLE = 1e-9
 # Where its divisor is this part of its size or less, at the end of a piece, it is zero.
 ZERO = 1e-8
+# At a dead centre, whose place is known to the root of rounding, links lie in line.
+ZERO_AT_FOLD = 1e-4
 # An extreme so near to a pose (in rows) may be that pose.
 BESIDE_ROW = 1e-4
 # A value of a series that is farther than this part of the function's size from the function is not one of it.
 TRUE = 1e-7
+# Nodes of a piece at which a quotient may have no value.
+MOST_LOST = 4
 # A function without a divisor that grows by this factor over its halvings, and goes on to, is infinite.
 ENDLESS = 1e4
 
@@ -117,6 +121,11 @@ class Functions:
                 divisors[k] *= values[by] ** power
         with np.errstate(invalid="ignore", over="ignore"):
             products = np.where(self._poled[:, None, None], values * divisors, values)
+        # At a pole itself a quotient has no value: its product goes on through the other nodes.
+        lost = ~np.isfinite(products) & self._poled[:, None, None]
+        number = np.count_nonzero(lost, axis=2)
+        for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
+            products[k, piece] = chebyshev.filled(products[k, piece], ~lost[k, piece])
         least = np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape).min(axis=1, initial=1.0)
         return products, divisors, EXACT / np.clip(least, 1e-6, 1.0)
 
@@ -338,9 +347,11 @@ class Functions:
             product, divisor = (chebyshev.series(table[rows[k]]) for table in (self._table, self._divisor))
             sizes = self._scale[rows[k], self.pieces.line], self._divisor_scale[rows[k], self.pieces.line]
             piece, x = chebyshev.zeros(divisor)
-            turned, place, least = chebyshev.turning_points(divisor)
-            flat = np.abs(least) <= ZERO * sizes[1][turned]
-            end = np.abs(chebyshev.at_places(divisor)[:, [0, -1]]) <= ZERO * sizes[1][:, None]
+            turned, place, level = chebyshev.turning_points(divisor)
+            flat = np.abs(level) <= ZERO * sizes[1][turned]
+            dead = np.stack([self.pieces.fold < 0, self.pieces.fold > 0], axis=1)
+            least = np.where(dead, ZERO_AT_FOLD, ZERO) * sizes[1][:, None]
+            end = np.abs(chebyshev.at_places(divisor)[:, [0, -1]]) <= least
             rim, side = np.nonzero(end)
             piece = np.concatenate([piece, turned[flat], rim])
             x = np.concatenate([x, place[flat], 2.0 * side - 1.0])

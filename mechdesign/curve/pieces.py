@@ -201,19 +201,21 @@ class Search:
         coefficients, scale, some = coefficients[suspect], scale[suspect], pieces.take(suspect)
         which, x = chebyshev.zeros(coefficients)
         owner, marks, dead = which, x, np.full(len(x), role == "closure")
-        if role == "closure":
+        if role != "across":
             touched, place, value = chebyshev.turning_points(coefficients)
             steep = np.abs(chebyshev.slopes_at_places(coefficients)[:, [0, -1]].T) > STEEP * scale
             flat, level = np.nonzero(~steep)
             touched, place = np.concatenate([touched, level]), np.concatenate([place, 2.0 * flat - 1.0])
             value = np.concatenate([value, table[suspect][level, -flat]])
-            near = (value >= -ROUNDING * scale[touched]) & (value <= TOUCHING * scale[touched])
+            # A limit that is passed by no more than what is forgiven is touched.
+            below, reach = (ROUNDING, BESIDE) if role == "closure" else (TOUCHING, NEAR_FOLD)
+            near = (value >= -below * scale[touched]) & (value <= TOUCHING * scale[touched])
             touched, place = touched[near], place[near]
+            # Zeros that rounding alone makes where a margin touches zero.
+            apart = ~((which[:, None] == touched) & (np.abs(x[:, None] - place) < reach)).any(axis=1)
+            owner, marks, dead = which[apart], x[apart], dead[apart]
+        if role == "closure":
             inner = np.abs(place) < 1.0 - BESIDE
-            # Zeros of a closure that rounding alone takes below zero.
-            beside = (which[:, None] == touched) & (np.abs(x[:, None] - place) < BESIDE)
-            owner, marks = which[~beside.any(axis=1)], x[~beside.any(axis=1)]
-            dead = np.ones(len(owner), dtype=bool)
             if self.crossing:
                 owner, marks = np.concatenate([owner, touched[inner]]), np.concatenate([marks, place[inner]])
                 dead = np.concatenate([dead, np.zeros(np.count_nonzero(inner), dtype=bool)])

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Nodes of an interval: the zeros of T_16, none of which is an end, where a function may be singular.
 COUNT = 16
@@ -157,3 +157,9 @@ def root(
 def slope_series(coefficients: Floats) -> Floats:
     """Series of the slopes of series, shape (..., COUNT)."""
     return np.asarray(coefficients @ _DERIVATIVE)
+
+
+def filled(values: Floats, good: Flags) -> Floats:
+    """Values at the nodes, shape (nodes,), those that are not good by the polynomial through the others."""
+    basis = np.polynomial.chebyshev.chebvander(NODES, np.count_nonzero(good) - 1)
+    return np.where(good, values, basis @ np.linalg.solve(basis[good], values[good]))

@@ -87,8 +87,13 @@ def kinematics(
         limits, toggles = limits_of(along), toggles_of(loops, along)
         tables["limits"] = limits_table(limits, along)
         warnings += hidden(limits, along, np.equal(passage.reason, 0)) + passed(limits, along) + change_points(along)
-    if poses.followed and (along is None or along.functions.unresolved.any()):
+    if poses.followed and along is None:
         warnings.append(_unfollowed(poses))
+    elif along is not None and along.functions.unresolved.any():
+        warnings.append(
+            "the motion between the poses is too long, or too rough, to be followed closely: its limits are known, but "
+            "extremes may lie between the places that were looked at; sweep less of it"
+        )
     if loops:
         tables["loops"] = loops_table(question, loops, along)
         if along is not None:
@@ -144,7 +149,8 @@ def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.
         moving = [question.poses.swept] if question.poses.swept is not None else given
         return float(value[0]), ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
 
-    whole = Scope(along is None, " and ".join(filter(None, missing)))
+    closely = along is not None and not along.functions.unresolved.any()
+    whole = Scope(not closely, " and ".join(filter(None, missing)))
     return whole, dataclasses.replace(whole, worst=worst)
 
 
