@@ -284,12 +284,27 @@ def _others(
 
     radii, values = _turn_by_turn(look, radii, SAME_ROOT * reach[owner])
     noise = designs.field.rounding[rows]
-    radii, values = _with_dips(margins_at, radii, _without_rounding(values, noise), noise)
-    positive = values > 0
-    lanes = np.flatnonzero(~positive.all(axis=(0, 1)) & (width > thin[owner]))
+    radii, values = with_dips(margins_at, radii, _without_rounding(values, noise), noise)
+    lanes = np.flatnonzero(~(values > 0).all(axis=(0, 1)) & (width > thin[owner]))
     if not lanes.size:
         return found
-    radii, values, positive = radii[:, lanes], values[:, :, lanes], positive[:, :, lanes]
+    radii, values = radii[:, lanes], values[:, :, lanes]
+    cut_of = sampled[lanes]
+    margin, lane, turn, radius, start = sign_changes(
+        lambda lane, radius: margins_at(lanes[lane], radius), radii, values, ROUNDING * found.outer[cut_of]
+    )
+    part = intervals_between(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
+    return _replace(found, cut_of, part, NARROWEST * reach)
+
+
+def sign_changes(
+    margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, tolerance: Floats
+) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+    """Margin, lane, direction and place of roots of samples (margins, samples, lanes), and how many begin negative.
+
+    `tolerance` is the wanted accuracy of the places on each lane.
+    """
+    positive = values > 0
     margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
     ends = np.stack([cell, cell + 1, np.where(cell > 0, cell - 1, np.minimum(cell + 2, len(radii) - 1))])
     x, f = radii[ends, lane], values[margin, ends, lane]
@@ -300,15 +315,11 @@ def _others(
 
     def evaluate(which: Ints, radius: Floats) -> Floats:
         which = asked[which]
-        return margins_at(lanes[lane[which]], radius)[margin[which], np.arange(len(which))]
+        return margins_at(lane[which], radius)[margin[which], np.arange(len(which))]
 
-    cut_of = sampled[lanes]
     (a, b, c), (fa, fb, fc) = x[:, asked], f[:, asked]
-    tolerance = ROUNDING * found.outer[cut_of[lane[asked]]]
-    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
-    start = (~positive[:, 0]).sum(axis=0)
-    part = intervals_between(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
-    return _replace(found, cut_of, part, NARROWEST * reach)
+    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance[lane[asked]])
+    return margin, lane, np.where(f[1] > 0, 1, -1), radius, (~positive[:, 0]).sum(axis=0)
 
 
 def _turn_by_turn(
@@ -362,7 +373,7 @@ def _without_rounding(values: Floats, noise: Floats) -> Floats:
     return values
 
 
-def _with_dips(
+def with_dips(
     margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, noise: Floats
 ) -> tuple[Floats, Floats]:
     """Samples of margins with those added at which a margin has the other sign than at the samples on both sides.
