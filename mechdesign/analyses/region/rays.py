@@ -213,7 +213,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
-        found = _others(designs, places, start_of, direction, found, quadratic, slack * reach, reach)
+        found = _others(designs, places, start_of, direction, found, quadratic, slack, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
 
@@ -251,7 +251,7 @@ def _others(
     direction: Complexes,
     found: Intervals,
     quadratic: Flags,
-    thin: Floats,
+    slack: float,
     reach: Floats,
 ) -> Intervals:
     """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
@@ -285,7 +285,7 @@ def _others(
     radii, values = _turn_by_turn(look, radii, SAME_ROOT * reach[owner])
     noise = designs.field.rounding[rows]
     radii, values = with_dips(margins_at, radii, _without_rounding(values, noise), noise)
-    lanes = np.flatnonzero(~(values > 0).all(axis=(0, 1)) & (width > thin[owner]))
+    lanes = np.flatnonzero(~(values > 0).all(axis=(0, 1)) & (width > slack * reach[owner]))
     if not lanes.size:
         return found
     radii, values = radii[:, lanes], values[:, :, lanes]
@@ -293,7 +293,7 @@ def _others(
     margin, lane, turn, radius, start = sign_changes(
         lambda lane, radius: margins_at(lanes[lane], radius), radii, values, ROUNDING * found.outer[cut_of]
     )
-    part = intervals_between(rows[margin], lane, turn, radius, start, found.outer[cut_of], 0.0)
+    part = intervals_between(rows[margin], lane, turn, radius, start, found.outer[cut_of], slack)
     return _replace(found, cut_of, part, NARROWEST * reach)
 
 

@@ -11,7 +11,7 @@ from mechdesign.analyses.poses import radians
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.panels import Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import Designs, Effort
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Effort, Intervals
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
@@ -37,9 +37,11 @@ MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
 OF_RANGE = ("SUI", "area", "box_area")
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
-# Distances that differ by this part of themselves are equal; steps towards the farthest place of a smooth curve.
-ROUNDING = 1e-12
-STEPS = 8
+# Rays beside the ends of panels, as parts of half a panel.
+BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+# Between rays a curve goes no farther than by this part of its fall to the next; the place of a tip, from the last ray
+# that meets it, is known to so many times as far.
+RISE, TIP = 0.5, 4.0
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
 
@@ -209,9 +211,10 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     missing = np.where(every, panels.seen - integral.area, 0.0)
     found = {"area": (integral.area, np.maximum(integral.area_error, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
-        box = bounding_box(panels, integral.boundary)
+        box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found |= {"box_area": (box, np.zeros(count)), "SUI": (integral.area / box, integral.area_error / box)}
+            share = integral.area / box
+            found |= {"box_area": (box, doubt), "SUI": (share, (found["area"][1] + share * doubt) / box)}
     for column in question.wanted:
         name, kind = split(column)
         if name:
@@ -284,59 +287,68 @@ def _statistic(
     return spread, error
 
 
-def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> Floats:
-    """Areas of the rectangles, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
+def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple[Floats, Floats]:
+    """Areas of the rectangles and their errors, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
 
-    The farthest point in each direction is either at the end of a panel (a corner or cusp), where a ray is traced, or
-    on a smooth curve, where parabolas through the nearest boundary points lead to it.
+    The farthest place in a direction is a corner or cusp at the end of a panel, where rays are traced at several
+    angles beside the end, or lies on a smooth curve, where parabolas through boundary points lead to it. A cusp may be
+    too thin to be met at its tip, which is then at the end of the line through the places met beside it.
     """
-    count, about = len(panels.closes), panels.designs.about
-    owner, ends = np.tile(panels.design, 2), np.concatenate([panels.low, panels.high])
-    traced = panels.trace(owner, ends, SLACK)
-    corner = np.tile(traced.ray, 2)
-    design = np.concatenate([boundary[0], owner[corner]])
-    theta = np.concatenate([boundary[1], ends[corner]])
-    radius = np.concatenate([boundary[2], traced.inner, traced.outer])
-    place = about + radius * np.exp(1j * theta)
-    at_end = np.arange(len(place)) >= len(boundary[0])
-    farthest = np.zeros((len(SIDES), count))
-    for side, turn in enumerate(SIDES):
-        best, low, middle, high = _best((place * turn).real, design, theta, count)
-        smooth = (low < middle) & (middle < high)
-        # As far at the end of a panel, but for rounding: a corner.
-        corners = at_end & ((place * turn).real >= (best - ROUNDING * np.abs(best))[design])
-        smooth[design[corners]] = False
-        if smooth.any():
-            climbed = _climb(panels, np.nonzero(smooth)[0], low, middle, high, turn)
-            best[smooth] = np.maximum(best[smooth], climbed)
-        farthest[side] = best
-    size = (farthest[0] + farthest[1]) * (farthest[2] + farthest[3])
-    return np.where(np.isfinite(size), size, 0.0)
+    count, about, (design, theta, radius) = len(panels.closes), panels.designs.about, boundary
+    width = 0.5 * (panels.high - panels.low)
+    ends = np.stack([panels.low + width * BESIDE[:, None], panels.high - width * BESIDE[:, None]], axis=1)
+    owner = np.broadcast_to(panels.design, ends.shape).ravel()
+    traced = panels.trace(owner, ends.ravel(), SLACK)
+    beside = _farthest(panels.designs, ends.ravel(), traced)
+    rays, ray = np.unique(design + 1j * theta, return_inverse=True)
+    within = np.full((len(SIDES), len(rays)), -np.inf)
+    np.maximum.at(within, (slice(None), ray), ((about + radius * np.exp(1j * theta)) * SIDES[:, None]).real)
+    rays, order = np.unique(np.concatenate([rays, owner + 1j * ends.ravel()]), return_index=True)
+    design, theta, away = rays.real.astype(np.intp), rays.imag, np.concatenate([within, beside], axis=1)[:, order]
+    at_end = np.zeros(len(rays), dtype=bool)
+    at_end[np.searchsorted(rays, owner + 1j * ends.ravel())[: 2 * len(width)]] = True
+    best = np.full((len(SIDES), count), -np.inf)
+    np.maximum.at(best, (slice(None), design), away)
+    same = (design[2:] == design[:-2]) & ~at_end[1:-1]
+    before, here, after = away[:, :-2], away[:, 1:-1], away[:, 2:]
+    with np.errstate(invalid="ignore"):
+        fall = np.maximum(*(np.where(np.isfinite(other), here - other, np.inf) for other in (before, after)))
+        top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[:, design[1:-1]])
+    side, middle = np.nonzero(top)
+    if len(side):
+        near = middle + np.arange(3)[:, None]
+        climbed = _climb(panels, side, design[near[1]], theta[near], away[side, near])
+        np.maximum.at(best, (side, design[near[1]]), climbed)
+    # Where rays nearer to the end of a panel meet less there is a tip: how far it goes on is told by a line.
+    beside = beside.reshape(len(SIDES), len(BESIDE), -1)
+    with np.errstate(invalid="ignore"):
+        nearer, here, farther = beside[:, :-2], beside[:, 1:-1], beside[:, 2:]
+        more = (here - farther) * (BESIDE[1:-1] / np.diff(BESIDE[1:]))[:, None]
+        more = np.where((here > nearer) & (here > farther) & np.isfinite(farther), more, 0.0)
+    tips = np.stack([here + more, here + (1 + TIP) * more]).max(axis=2)
+    size = []
+    for tip in tips:
+        most = best.copy()
+        np.maximum.at(most, (slice(None), owner[: 2 * len(width)]), tip)
+        area = (most[0] + most[1]) * (most[2] + most[3])
+        size.append(np.where(np.isfinite(area), area, 0.0))
+    return size[0], size[1] - size[0] + SAME_ROOT * size[0]
 
 
-def _best(distance: Floats, design: Ints, theta: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Per design the largest distance, the angle where it is, and the angles of the rays on either side of it."""
-    top, low, middle, high = (np.full(count, value) for value in (-np.inf, -np.inf, np.nan, np.inf))
-    np.maximum.at(top, design, distance)
-    here = distance == top[design]
-    middle[design[here]] = theta[here]
-    below, above = theta < middle[design], theta > middle[design]
-    np.maximum.at(low, design[below], theta[below])
-    np.minimum.at(high, design[above], theta[above])
-    return top, np.where(np.isfinite(low), low, middle), middle, np.where(np.isfinite(high), high, middle)
+def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
+    """How far rays reach in each direction of the rectangle, shape (directions, rays); -inf where they meet nothing."""
+    found = np.full((len(SIDES), len(theta)), -np.inf)
+    for radius in (traced.inner, traced.outer):
+        place = designs.about + radius * np.exp(1j * theta[traced.ray])
+        np.maximum.at(found, (slice(None), traced.ray), (place * SIDES[:, None]).real)
+    return found
 
 
-def _climb(panels: Panels, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex) -> Floats:
-    """Largest distance of designs between two rays."""
+def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats) -> Floats:
+    """Largest distances in some directions, between the outer two of three rays each, shape (3, n)."""
 
-    def depth(lane: Ints, theta: Floats) -> Floats:
-        traced = panels.trace(which[lane], theta, SLACK)
-        found = np.full(len(lane), np.inf)
-        for radius in (traced.inner, traced.outer):
-            place = panels.designs.about + radius * np.exp(1j * theta[traced.ray])
-            np.minimum.at(found, traced.ray, -(place * turn).real)
-        return found
+    def depth(lane: Ints, angle: Floats) -> Floats:
+        found = _farthest(panels.designs, angle, panels.trace(design[lane], angle, SLACK))
+        return np.asarray(-found[side[lane], np.arange(len(lane))])
 
-    rays = np.stack([low, middle, high])[:, which]
-    depths = np.stack([depth(np.arange(len(which)), theta) for theta in rays])
-    return -dips(depth, rays, depths, np.full(len(which), -np.inf), STEPS)[1]
+    return -dips(depth, theta, -away, np.full(len(side), -np.inf))[1]
