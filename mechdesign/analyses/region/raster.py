@@ -39,7 +39,7 @@ class Raster:
     A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
     lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
     the region, shape (designs, rows, columns). And places in holes, and in slivers of the region, that no centre met,
-    with their designs.
+    with their designs, and the area in which slivers may lie that are still thinner.
     """
 
     designs: Designs
@@ -48,6 +48,7 @@ class Raster:
     inside: Flags
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
+    unseen: Floats
 
     @staticmethod
     def of(designs: Designs) -> Raster:
@@ -57,7 +58,7 @@ class Raster:
         for _ in range(DOUBLINGS):
             none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank = np.zeros((designs.count, cells, cells), dtype=bool)
-            found, holes = Raster(designs, low, (high - low) / cells, blank, none, none), [none]
+            found, holes = Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count)), [none]
             slivers = [none]
             for some, z in found._centres(np.arange(designs.count)):
                 inside, margins = designs.look(z, some)
@@ -86,7 +87,7 @@ class Raster:
         for axis in (0, 1):
             ahead, behind = (np.roll(centre, step, axis) for step in (1, -1))
             centre = centre | ahead | behind
-        row, column, lane = np.nonzero(_open(margins.reshape(-1, *shape)) & ~centre)
+        row, column, lane = np.nonzero(_open(margins.reshape(len(margins), *shape)) & ~centre)
         design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
         owners, places = [design[:0]], [place[:0]]
         for _ in range(DIVISIONS):
@@ -98,9 +99,10 @@ class Raster:
             met = good.any(axis=0)
             owners.append(design[met])
             places.append(z[good.argmax(axis=0), np.arange(len(design))][met])
-            left = _open(margins.reshape(-1, PARTS, PARTS, len(design))) & ~met
-            part, lane = np.nonzero(left.reshape(-1, len(design)))
+            left = _open(margins.reshape(len(margins), PARTS, PARTS, len(design))) & ~met
+            part, lane = np.nonzero(left.reshape(PARTS * PARTS, len(design)))
             design, place, cell = design[lane], z[part, lane], cell[lane]
+        np.add.at(self.unseen, design, cell.real * cell.imag)
         return np.concatenate(owners), np.concatenate(places)
 
     def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:

@@ -39,9 +39,10 @@ OF_RANGE = ("SUI", "area", "box_area")
 SLACK = 1e-9
 # Rays beside the ends of panels, as parts of half a panel.
 BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
-# Between rays a curve goes no farther than by this part of its fall to the next; the place of a tip, from the last ray
-# that meets it, is known to so many times as far.
-RISE, TIP = 0.5, 4.0
+# Between rays a curve goes no farther than by this part of its fall to the next. The place of a tip is known to this
+# part of the way there from the last ray that meets it; beyond that ray the distance falls so much more than before it,
+# at so small a part of the angle that is left.
+RISE, TIP, SHARP, TOWARDS = 0.5, 2.0, 4.0, 0.5
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
 
@@ -189,7 +190,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
             panels = pieces.only(0)
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
-        errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
+        errors = {name: np.maximum(panels.seen, panels.unseen) * (name == "area") for name in question.wanted}
         return Evaluation(nothing, errors, panels, pieces)
     gauss = question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
@@ -209,12 +210,12 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
-    found = {"area": (integral.area, np.maximum(integral.area_error, missing))}
+    found = {"area": (integral.area, np.maximum(integral.area_error + panels.unseen, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
         box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = integral.area / box
-            found |= {"box_area": (box, doubt), "SUI": (share, (found["area"][1] + share * doubt) / box)}
+            found |= {"box_area": (box, doubt), "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0))}
     for column in question.wanted:
         name, kind = split(column)
         if name:
@@ -307,32 +308,28 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
     design, theta, away = rays.real.astype(np.intp), rays.imag, np.concatenate([within, beside], axis=1)[:, order]
     at_end = np.zeros(len(rays), dtype=bool)
     at_end[np.searchsorted(rays, owner + 1j * ends.ravel())[: 2 * len(width)]] = True
-    best = np.full((len(SIDES), count), -np.inf)
-    np.maximum.at(best, (slice(None), design), away)
+    best = np.full((2, len(SIDES), count), -np.inf)
+    np.maximum.at(best, (slice(None), slice(None), design), away)
     same = (design[2:] == design[:-2]) & ~at_end[1:-1]
     before, here, after = away[:, :-2], away[:, 1:-1], away[:, 2:]
     with np.errstate(invalid="ignore"):
-        fall = np.maximum(*(np.where(np.isfinite(other), here - other, np.inf) for other in (before, after)))
-        top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[:, design[1:-1]])
+        fall = np.maximum(*(np.where(np.isfinite(other), here - other, 0.0) for other in (before, after)))
+        top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[0][:, design[1:-1]])
     side, middle = np.nonzero(top)
     if len(side):
         near = middle + np.arange(3)[:, None]
-        climbed = _climb(panels, side, design[near[1]], theta[near], away[side, near])
-        np.maximum.at(best, (side, design[near[1]]), climbed)
-    # Where rays nearer to the end of a panel meet less there is a tip: how far it goes on is told by a line.
+        lane = design[near[1]]
+        np.maximum.at(best, (slice(None), side, lane), _climb(panels, side, lane, theta[near], away[side, near]))
+    # A tip that was not climbed to may lie as far as the line through rays beside it says.
     beside = beside.reshape(len(SIDES), len(BESIDE), -1)
+    nearer, here, farther = beside[:, :-2], beside[:, 1:-1], beside[:, 2:]
+    lost = (here > nearer) & (here > farther) & np.isfinite(farther)
     with np.errstate(invalid="ignore"):
-        nearer, here, farther = beside[:, :-2], beside[:, 1:-1], beside[:, 2:]
-        more = (here - farther) * (BESIDE[1:-1] / np.diff(BESIDE[1:]))[:, None]
-        more = np.where((here > nearer) & (here > farther) & np.isfinite(farther), more, 0.0)
-    tips = np.stack([here + more, here + (1 + TIP) * more]).max(axis=2)
-    size = []
-    for tip in tips:
-        most = best.copy()
-        np.maximum.at(most, (slice(None), owner[: 2 * len(width)]), tip)
-        area = (most[0] + most[1]) * (most[2] + most[3])
-        size.append(np.where(np.isfinite(area), area, 0.0))
-    return size[0], size[1] - size[0] + SAME_ROOT * size[0]
+        more = np.where(lost, (here - farther) * (BESIDE[1:-1] / np.diff(BESIDE[1:]))[:, None], 0.0)
+    np.maximum.at(best[1], (slice(None), owner[: 2 * len(width)]), (here + more).max(axis=1))
+    size = (best[:, 0] + best[:, 1]) * (best[:, 2] + best[:, 3])
+    area, most = np.where(np.isfinite(size), size, 0.0)
+    return area, most - area + SAME_ROOT * area
 
 
 def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
@@ -345,10 +342,24 @@ def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
 
 
 def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats) -> Floats:
-    """Largest distances in some directions, between the outer two of three rays each, shape (3, n)."""
+    """Largest distances in some directions, between the outer two of three rays each, shape (3, n), and their bounds.
+
+    Of shape (2, n). Where rays nearer to the end of a panel meet less there is a tip: the line through rays beyond
+    tells its place.
+    """
 
     def depth(lane: Ints, angle: Floats) -> Floats:
         found = _farthest(panels.designs, angle, panels.trace(design[lane], angle, SLACK))
         return np.asarray(-found[side[lane], np.arange(len(lane))])
 
-    return -dips(depth, theta, -away, np.full(len(side), -np.inf))[1]
+    every = np.arange(len(side))
+    place, low = dips(depth, theta, -away, np.full(len(side), -np.inf))
+    ends = np.sort(np.concatenate([panels.design + 1j * panels.low, panels.design + 1j * panels.high]))
+    after = np.clip(np.searchsorted(ends, design + 1j * place), 1, len(ends) - 1)
+    gaps = np.stack([ends[after - 1].imag, ends[after].imag]) - place
+    gap = np.take_along_axis(gaps, np.abs(gaps).argmin(axis=0)[None], axis=0)[0]
+    nearer, beside, farther = (-depth(every, place + part * gap) for part in (TOWARDS, -TOWARDS, -1.0))
+    with np.errstate(invalid="ignore"):
+        tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
+        more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
+    return np.stack([-low + more, -low + (1 + TIP) * more])
