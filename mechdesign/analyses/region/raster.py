@@ -214,7 +214,7 @@ def _open(margins: Floats) -> Flags:
     change = np.zeros_like(margins)
     with np.errstate(invalid="ignore"):
         for axis in (1, 2):
-            step = np.nan_to_num(np.abs(np.diff(margins, axis=axis)), nan=np.inf)
+            step = np.nan_to_num(np.abs(np.diff(margins, axis=axis)))
             last = [(0, 0)] * 4
             for pad in ((1, 0), (0, 1)):
                 last[axis] = pad
