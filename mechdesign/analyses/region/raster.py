@@ -219,7 +219,11 @@ def _open(margins: Floats) -> Flags:
             for pad in ((1, 0), (0, 1)):
                 last[axis] = pad
                 change = np.maximum(change, np.pad(step, last))
-        return np.asarray(~(margins + change <= 0).any(axis=0))
+        most = margins + change
+        around = [np.roll(most, step, axis) for axis in (1, 2) for step in (1, -1)]
+        # What is unknown beside where a leg is stretched is as it is at the next cell.
+        most = np.where(np.isnan(most), np.fmax.reduce(around), most)
+        return np.asarray(~(most <= 0).any(axis=0))
 
 
 def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:
