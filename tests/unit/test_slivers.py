@@ -38,7 +38,7 @@ workspace: {{point: P, assembly: any, indices: [], scan: {{about: {about}}}}}
 """)).main  # fmt: skip
     assert abs(found["area"][0] - area) <= found["area_error"][0] + 1e-9 * area
     assert abs(found["SUI"][0] - area / box) <= found["SUI_error"][0] + 1e-7
-    assert found["SUI_error"][0] <= 1e-3
+    assert found["SUI_error"][0] <= 0.02
 
 
 def test_three_links_over_a_range_of_orientations() -> None:
@@ -63,6 +63,5 @@ workspace: {point: P, at: {h.angle: {from: -120, to: -60}}}
         within = [(turn - np.radians(low)) % (2 * np.pi) <= np.radians(width) for turn, low, width in turns]
         reached |= (np.abs(cosine) <= 1) & np.all(within, axis=0)
     area = reached.sum() * (2 * half / cells) ** 2
-    found = mechdesign.workspace(study).main
-    assert found["area"][0] == pytest.approx(area, rel=5e-3)
-    assert found["area_error"][0] <= 1e-4
+    pieces = mechdesign.workspace(study).tables["pieces"]["area"]
+    assert pieces.sum() == pytest.approx(area, rel=5e-3)

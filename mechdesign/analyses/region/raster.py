@@ -58,7 +58,10 @@ class Raster:
         for _ in range(DOUBLINGS):
             none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank = np.zeros((designs.count, cells, cells), dtype=bool)
-            found, holes = Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count)), [none]
+            found, holes = (
+                Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count)),
+                [none],
+            )
             slivers = [none]
             for some, z in found._centres(np.arange(designs.count)):
                 inside, margins = designs.look(z, some)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,7 @@ BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 RISE, TIP, SHARP, TOWARDS = 0.5, 2.0, 4.0, 0.5
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
+EVERY: Any = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +217,10 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = integral.area / box
-            found |= {"box_area": (box, doubt), "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0))}
+            found |= {
+                "box_area": (box, doubt),
+                "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
+            }
     for column in question.wanted:
         name, kind = split(column)
         if name:
@@ -303,13 +308,13 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
     beside = _farthest(panels.designs, ends.ravel(), traced)
     rays, ray = np.unique(design + 1j * theta, return_inverse=True)
     within = np.full((len(SIDES), len(rays)), -np.inf)
-    np.maximum.at(within, (slice(None), ray), ((about + radius * np.exp(1j * theta)) * SIDES[:, None]).real)
+    np.maximum.at(within, (EVERY, ray), ((about + radius * np.exp(1j * theta)) * SIDES[:, None]).real)
     rays, order = np.unique(np.concatenate([rays, owner + 1j * ends.ravel()]), return_index=True)
     design, theta, away = rays.real.astype(np.intp), rays.imag, np.concatenate([within, beside], axis=1)[:, order]
     at_end = np.zeros(len(rays), dtype=bool)
     at_end[np.searchsorted(rays, owner + 1j * ends.ravel())[: 2 * len(width)]] = True
     best = np.full((2, len(SIDES), count), -np.inf)
-    np.maximum.at(best, (slice(None), slice(None), design), away)
+    np.maximum.at(best, (EVERY, EVERY, design), away)
     same = (design[2:] == design[:-2]) & ~at_end[1:-1]
     before, here, after = away[:, :-2], away[:, 1:-1], away[:, 2:]
     with np.errstate(invalid="ignore"):
@@ -319,14 +324,14 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
     if len(side):
         near = middle + np.arange(3)[:, None]
         lane = design[near[1]]
-        np.maximum.at(best, (slice(None), side, lane), _climb(panels, side, lane, theta[near], away[side, near]))
+        np.maximum.at(best, (EVERY, side, lane), _climb(panels, side, lane, theta[near], away[side, near]))
     # A tip that was not climbed to may lie as far as the line through rays beside it says.
     beside = beside.reshape(len(SIDES), len(BESIDE), -1)
     nearer, here, farther = beside[:, :-2], beside[:, 1:-1], beside[:, 2:]
     lost = (here > nearer) & (here > farther) & np.isfinite(farther)
     with np.errstate(invalid="ignore"):
         more = np.where(lost, (here - farther) * (BESIDE[1:-1] / np.diff(BESIDE[1:]))[:, None], 0.0)
-    np.maximum.at(best[1], (slice(None), owner[: 2 * len(width)]), (here + more).max(axis=1))
+    np.maximum.at(best[1], (EVERY, owner[: 2 * len(width)]), (here + more).max(axis=1))
     size = (best[:, 0] + best[:, 1]) * (best[:, 2] + best[:, 3])
     area, most = np.where(np.isfinite(size), size, 0.0)
     return area, most - area + SAME_ROOT * area
@@ -337,7 +342,7 @@ def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
     found = np.full((len(SIDES), len(theta)), -np.inf)
     for radius in (traced.inner, traced.outer):
         place = designs.about + radius * np.exp(1j * theta[traced.ray])
-        np.maximum.at(found, (slice(None), traced.ray), (place * SIDES[:, None]).real)
+        np.maximum.at(found, (EVERY, traced.ray), (place * SIDES[:, None]).real)
     return found
 
 
