@@ -189,7 +189,7 @@ class _Samples:
         """Value of the range at the number of a sample of each stretch, or between two of them."""
         (low, high), (begin, end), part = self.ends, self.angles, sample / (SAMPLES - 1)
         share = (np.sin(begin + part * (end - begin)) - np.sin(begin)) / (np.sin(end) - np.sin(begin))
-        return np.where(part == 1, high, low + share * (high - low))
+        return np.asarray(np.where(part == 1, high, low + share * (high - low)))
 
 
 class Every(Ranged):
@@ -249,14 +249,11 @@ class Some(Ranged):
         ended = np.stack([found.enters, found.leaves]) >= 0
         low, high = np.stack([found.inner, found.outer]) + ended * AT_END * (found.outer - found.inner) * [[1], [-1]]
         left = np.flatnonzero(found.counts == 0)
-        stretches = (
-            found.ray,
-            np.where(ended[0], self.low + low * width, self.low),
-            np.where(ended[1], self.low + high * width, self.high),
-            ended,
-        )
-        return tuple(
-            np.concatenate([own, rest[..., left]], axis=-1) for own, rest in zip(stretches, whole, strict=True)
+        return (
+            np.append(found.ray, whole[0][left]),
+            np.append(np.where(ended[0], self.low + low * width, self.low), whole[1][left]),
+            np.append(np.where(ended[1], self.low + high * width, self.high), whole[2][left]),
+            np.concatenate([ended, whole[3][:, left]], axis=1),
         )
 
 
