@@ -25,7 +25,8 @@ EXIT_CODES = {
     0: "done, every requirement met",
     1: "done, a requirement not met",
     2: "the command or the study file is wrong; nothing was computed",
-    3: "the study is right, but the mechanism cannot do it: a pose that cannot be assembled, no feasible design",
+    3: "the study is right, but the mechanism cannot do it: a pose that cannot be assembled, no feasible design, "
+    "a reliability that no tolerances reach",
     4: "a numerical failure, or results that could not be written",
     130: "interrupted (143 by SIGTERM, 129 by SIGHUP); what was finished is whole",
 }

@@ -174,7 +174,7 @@ class Expression:
         return found <= 1
 
     def is_angle(self, quantities: Mapping[str, str]) -> bool:
-        """Whether the value is an angle, by the quantities of variables: one itself, or a sum of whole multiples of some.
+        """Whether the value is an angle, by the quantities of variables: one, or a sum of whole multiples of some.
 
         Other variables are numbers. A bare number beside an angle is one in the same unit. Any other multiple may be
         an arc as well.

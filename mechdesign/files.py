@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import os
 import platform
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TextIO
 
@@ -24,6 +26,7 @@ FORMATS = ("png", "svg", "pdf")
 # In a folder of results: who writes there, and the names of what is just changing.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
+_MOST_BYTES = 10_000_000  # in which the mark of a file is looked for
 
 
 def formats_of(listed: str | None, option: str) -> str:
@@ -86,15 +89,20 @@ class Transaction:
                 digest.update(block)
         return digest.hexdigest()
 
-    def commit(self, stale: Iterable[str] = (), *, voucher: str | None = None) -> None:
-        """Put the files in place and remove the stale ones; while it goes on there is no voucher.
+    def commit(self, own: Collection[str] = (), kept: Collection[str] = (), *, voucher: str | None = None) -> None:
+        """Put the files in place, and remove of the folder's `own` ones all but those `kept`.
 
-        Where it is cut off, the names of what was to change stay in a file of the folder: `unsettled`.
+        While it goes on there is no voucher. Where it is cut off, the names of all stay in a file: `unsettled`.
+
+        Raises
+        ------
+        StudyError
+            If a file has to be replaced that is none of the folder's own; then nothing has changed.
         """
         if voucher is not None:
-            stale = set(stale) - self._staged.keys()
-            replace(self.directory / _UNSETTLED, [json.dumps(sorted({*stale, *self._staged})).encode()])
-            for name in (voucher, *stale):
+            check_own(self.directory, self._staged, own)
+            replace(self.directory / _UNSETTLED, [json.dumps(sorted({*own, *self._staged})).encode()])
+            for name in (voucher, *(set(own) - self._staged.keys() - set(kept))):
                 if not (self.directory / name).is_dir():
                     (self.directory / name).unlink(missing_ok=True)
         for name in sorted(self._staged, key=lambda name: name == voucher):
@@ -120,6 +128,67 @@ def settle(directory: Path) -> None:
 def proper(name: object) -> bool:
     """Whether a text is the name of a file in a folder, and leads nowhere else."""
     return isinstance(name, str) and name not in {"", ".", ".."} and not {"/", os.sep, "\0"}.intersection(name)
+
+
+def check_own(directory: Path, names: Iterable[str], own: Collection[str], read: Iterable[Path] = ()) -> None:
+    """Find out that results would take the place of files in a folder that are none of its own, or that are `read`.
+
+    `names` are patterns. A link is nobody's, and is not followed.
+
+    Raises
+    ------
+    StudyError
+        If there is such a file; it is named.
+    """
+    patterns = [*names, *map(glob.escape, own)]
+    try:
+        there = sorted(path for path in directory.iterdir() if any(fnmatchcase(path.name, each) for each in patterns))
+    except OSError:
+        # There is no folder, as a rule; else who writes there says why not.
+        return
+    kept = [file for file in read if os.path.exists(file)]
+    for path in there:
+        if os.path.exists(path) and any(path.samefile(file) for file in kept):
+            raise StudyError(f"{path}: is read here, and a result would take its place; choose another --out")
+        if path.name not in own or path.is_symlink():
+            raise _foreign(path)
+
+
+def check_marked(path: Path, mark: bytes) -> None:
+    """Find out that a file stands in the place of another that is known by a mark; one without content is in no way.
+
+    Devices and pipes take what is written. A link to a file is not followed.
+
+    Raises
+    ------
+    StudyError
+        If there is one without the mark.
+    """
+    if not os.path.lexists(path) or flowing(path) or marked(path, mark):
+        return
+    if path.is_symlink() or path.is_dir() or path.stat().st_size:
+        raise _foreign(path)
+
+
+def flowing(path: Path) -> bool:
+    """Whether a device or a pipe stands there, or a link to one."""
+    return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
+
+
+def marked(path: Path, mark: bytes) -> bool:
+    """Whether a file, no link, holds a mark."""
+    try:
+        if path.is_symlink() or not path.is_file():
+            return False
+        with path.open("rb") as stream:
+            return mark in stream.read(_MOST_BYTES)
+    except OSError:
+        return False
+
+
+def _foreign(path: Path) -> StudyError:
+    what = "a link" if path.is_symlink() else "no result of mechdesign's"
+    return StudyError(f"{path}: is {what}, and would be replaced; move it away, or write the results elsewhere")
 
 
 def check_writable(directory: Path) -> None:
@@ -177,7 +246,7 @@ def owned(directory: Path) -> Iterator[None]:
 def _locked(path: Path) -> TextIO:
     """The file of a lock, which no other process holds."""
     while True:
-        stream = path.open("a+", encoding="utf-8")
+        stream = open(path, "a+", encoding="utf-8", opener=_unlinked)  # noqa: SIM115
         try:
             if fcntl is not None:
                 fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -194,6 +263,10 @@ def _locked(path: Path) -> TextIO:
             if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
                 return stream
         stream.close()
+
+
+def _unlinked(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from mechdesign.files import replace
 from mechdesign.numerics.arrays import Floats
 
 NAME = "unfinished.npz"
+MARK = b"origin.npy"  # by which it is known
 # Seconds between two versions of the file, and how many times as long as its writing took they are at least.
 _INTERVAL = 30.0
 _MIN_RATIO = 20.0

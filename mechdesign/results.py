@@ -263,6 +263,7 @@ class Result:
     drawn: Mapping[str, Any] = field(default_factory=dict)  #: what pictures show besides, by name
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
     pictured: Result | None = None  #: of a long sweep the result at those of its poses that pictures show
+    reached: bool = True  #: else `failed` says why a reliability is not reached, where all poses assemble
 
     def __repr__(self) -> str:
         tables = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())

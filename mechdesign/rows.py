@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,29 @@ class Chosen:
     counts: Flags  # which rows count
     missing: str = ""  # where none counts because the table never has what was asked for: what it has instead
 
+    @property
+    def unit(self) -> str:
+        """Unit of the rows that count."""
+        return unit_of(self.table, self.column, self.counts)
+
+    def bound(self, value: float) -> float:
+        """A bound in the unit of the rows that count.
+
+        Raises
+        ------
+        UnknownColumnError
+            If it is a quantity of another kind.
+        """
+        return in_unit(value, self.table, self.column, self.counts)
+
+
+@runtime_checkable
+class Measured(Protocol):
+    """A number with a unit of its own, such as `mechdesign.study.text.units.Amount`."""
+
+    def within(self, unit: str) -> float:
+        """The number in a unit of a table; raises ValueError where it is of another kind."""
+
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
     """Find a column and the rows in which others have the values of `where`.
@@ -48,7 +71,8 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
     Raises
     ------
     UnknownColumnError
-        If there is no such column (why, where the result says so), it holds words, or its rows have several units.
+        If there is no such column (why, where the result says so), it holds words, its rows have several units, or a
+        value of `where` is a quantity of another kind than its column.
     """
     table, column, rows = located(result, path)
     counts = rows
@@ -59,14 +83,42 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         raise UnknownColumnError(
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
         )
+    where = dict(where)
     for name, wanted in where.items():
         if name not in table:
             raise UnknownColumnError(_unknown("where", name, table.names))
-        counts = counts & _equal(table[name], wanted)
+        if table.column(name).numeric and isinstance(wanted, Measured):
+            where[name] = in_unit(wanted, table, name, counts)
+        counts = counts & _equal(table[name], where[name])
     _one_unit(table, column, counts)
     numbers = values.astype(float)
     missing = "" if counts.any() else _missing(table, rows, where)
     return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts, missing)
+
+
+def unit_of(table: Table, name: str, rows: Flags) -> str:
+    """Unit of a column in some rows, which have one: their own, where the column's meaning says so."""
+    column = table.column(name)
+    own = IN_UNIT in column.meaning and "unit" in table and rows.any()
+    return str(table["unit"][rows.argmax()]) if own else column.unit
+
+
+def in_unit(value: Any, table: Table, name: str, rows: Flags | None = None) -> float:
+    """A number in the unit of a column in some rows, or all; a bare one is in it already.
+
+    Raises
+    ------
+    UnknownColumnError
+        If it is a quantity of another kind, or the rows have several units.
+    """
+    if not isinstance(value, Measured):
+        return float(value)
+    rows = np.ones(len(table), dtype=bool) if rows is None else rows
+    _one_unit(table, name, rows)
+    try:
+        return value.within(unit_of(table, name, rows))
+    except ValueError as error:
+        raise UnknownColumnError(f"{table.name}.{name}: {error}") from None
 
 
 def _one_unit(table: Table, column: str, counts: Flags) -> None:

@@ -26,6 +26,7 @@ from mechdesign.parallel import Divided
 Compute = Callable[[Iterable[Any]], Iterator[Any]]
 
 FILE = "chunks"  # in a folder of its own
+MARK = b'"shard": ['  # by which it is known
 _SHARD = re.compile(r"([1-9]\d{0,5})/([1-9]\d{0,5})")
 # What values are made of, besides dataclasses and named tuples of this package.
 _ARRAYS = {

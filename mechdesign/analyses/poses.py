@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -21,7 +21,7 @@ from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints, evenly
 from mechdesign.parallel import map_chunks, worker_count
-from mechdesign.results import Column
+from mechdesign.results import Column, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, default, expand
 from mechdesign.study.schema.poses import PoseSection
@@ -227,14 +227,26 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tupl
     bad = np.flatnonzero(reason)
     if not len(bad):
         return [], ""
-    counts = [f"{np.count_nonzero(reason == kind)} {kind.text}" for kind in Reason if kind and (reason == kind).any()]
-    told = f"{len(bad)} of {poses.count} poses are not valid ({', '.join(counts)})"
+    invalid = invalid_in_words(reason)
     named = [f"{pose_in_words(study, poses, int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
     if len(bad) == poses.count:
         raise AssemblyError(f"no pose is valid; {'; '.join(named)}" + ("; ..." if len(bad) > len(named) else ""))
     if poses.listed:
-        return [told], f"pose {'; pose '.join(named)}"
-    return [f"{told}; the first: {named[0]}"], ""
+        return [invalid], f"pose {'; pose '.join(named)}"
+    return [f"{invalid}; the first: {named[0]}"], ""
+
+
+def invalid_in_words(reason: NDArray[np.int8]) -> str:
+    """How many poses are not valid, and why; empty where all are."""
+    counts = [f"{np.count_nonzero(reason == kind)} {kind.text}" for kind in Reason if kind and (reason == kind).any()]
+    bad = np.count_nonzero(reason)
+    return f"{bad} of {len(reason)} poses are not valid ({', '.join(counts)})" if bad else ""
+
+
+def of_poses(tables: Iterable[Table], reason: NDArray[np.int8]) -> dict[str, Table]:
+    """Tables by their names, whose rows speak of the poses alone and not of the motion between them."""
+    scope = Scope(poses_only=True, missing=invalid_in_words(reason))
+    return {table.name: replace(table, scope=scope) for table in tables}
 
 
 def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:

@@ -15,29 +15,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign import shards
-from mechdesign.cli import terminal
+from mechdesign.cli import places, terminal
 from mechdesign.cli.board import Board, Far, Reported
 from mechdesign.cli.crew import Alone, Crew, Tell
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
-    OUTCOMES,
     Outcome,
     Source,
     answer,
-    claim,
-    folder,
     interrupted,
     load_source,
-    place,
     source,
     tell,
     write_report,
 )  # fmt: skip
 from mechdesign.cli.ledger import End, Ledger, Said, Task, failure, name_of
 from mechdesign.cli.options import Options
+from mechdesign.cli.places import PAGE, claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import StudyError
-from mechdesign.files import owned
+from mechdesign.files import check_marked, owned
 from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
@@ -129,7 +126,12 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
             own = _as_in_shards(label, root, options) if options.command == MERGE else options
             if own != options:
                 study = load_source(origin, own)
-            tasks.append(Task(number, origin, label, root, _places(only or questions(study), root, own), own))
+            asked = _places(only or questions(study), root, own)
+            if own.report:
+                check_marked(root / pages.REPORT, PAGE)
+            for command, directory in asked:
+                places.check(study, command, directory, own)
+            tasks.append(Task(number, origin, label, root, asked, own))
         except Exception as error:
             ledger.missing(number, failure(label, "check", Path(), error, study))
             if ledger.stopped:
@@ -281,7 +283,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -
     return Entry(
         study.name,
         study.label,
-        [(given.command, OUTCOMES[given.exit_code], given.exit_code) for given in told],
+        [(given.command, given.word, given.exit_code) for given in told],
         met=sum(verdict.met for verdict in verdicts),
         required=sum(len(judged_by(study, command)) for command, _ in task.questions),
         warnings=len({warning for given in told for warning in given.warnings}),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
 from mechdesign.cli.crew import Tell
-from mechdesign.cli.execution import OUTCOMES, Outcome
+from mechdesign.cli.execution import Outcome
 from mechdesign.progress import Progress
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class Board:
         failed = self._failed[-room:]
         last = [*self._last][len(failed) - room :] if room > len(failed) else []
         for given in (*failed, *last):
-            word = Text(OUTCOMES[given.exit_code], style="red" if given.exit_code else "green")
+            word = Text(given.word, style="red" if given.exit_code else "green")
             grid.add_row(Text(given.study), given.command, word, f"{given.seconds:.1f}")
         for index, (since, how) in sorted(self._under_way.items()):
             bar = Grid.grid(padding=(0, 1))

@@ -10,8 +10,9 @@ from mechdesign.cli import terminal
 from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.batch import found_studies, source_of
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import claim, extras, folder, load_source
+from mechdesign.cli.execution import load_source
 from mechdesign.cli.options import Options
+from mechdesign.cli.places import claim, extras, folder
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep

@@ -13,9 +13,9 @@ from typing import Any
 import mechdesign
 from mechdesign.cli import terminal
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit_text
+from mechdesign.cli.summary import junit_text, mark
 from mechdesign.errors import StudyError, counted
-from mechdesign.files import check_writable
+from mechdesign.files import FORMATS, check_marked, check_writable, marked
 from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
@@ -28,6 +28,7 @@ from mechdesign.study.text.inputs import Folder
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
+_HEADER = to_csv(Comparison().table).encode()
 # Of `Difference.change`: a file whose bytes are others.
 _BYTES = "bytes"
 # Differences that are told beside the table.
@@ -61,8 +62,12 @@ def compare(
         raise StudyError("--rtol and --atol take numbers from 0 on")
     default = Tolerance(rtol, atol)
     chosen = Tolerances(default) if tolerances is None else folders.tolerances_from(tolerances, default)
+    if junit is not None:
+        check_marked(junit, mark(junit))
     if out is not None:
         check_writable(out)
+        check_marked(out / _TABLE, _HEADER)
+        check_marked(out / _PICTURE, writer.CREATOR.encode())
     found = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, found)
@@ -88,6 +93,8 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
             "--verify repeats what a manifest says; beside it stand no studies, and no options but --jobs, --junit, "
             "--json, --quiet and --allow-files"
         )
+    if options.junit is not None:
+        check_marked(options.junit, mark(options.junit))
     root = path.parent if path.name == manifest.NAME else path
     recorded = folders.results(path)
     if not recorded:
@@ -114,7 +121,8 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
         raise StudyError(f"{where}: its run was interrupted, which cannot be repeated; run it again with --resume")
     try:
         inputs = Folder(manifest.inputs_folder(where.parent, content), options.allow_files)
-        study = load_data(content["study"]["resolved"], (), content["seed"], inputs)
+        about = content["study"]
+        study = load_data(about["resolved"], (), content["seed"], inputs, about.get("drawn"))
     except (KeyError, TypeError):
         raise StudyError(f"{where}: is not a manifest that mechdesign wrote; run the study again") from None
     except StudyError as error:
@@ -132,12 +140,14 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
     before, after = content | {"overrides": []}, folders.results(there)["."]
     found = Comparison(notes=[f"{folder}: {note}" for note in folders.notes(before, after)])
     folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
-    again = manifest.recorded_files(after)
+    again, listed = after["files"], content["files"]
     told = {each.table for each in found.differences}
-    for name, digest in manifest.recorded_files(content).items():
-        table = name.removesuffix(".csv")
+    drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
+    for name in dict.fromkeys((*listed, *again)):
+        table, digest = name.removesuffix(".csv"), listed.get(name, "")
         # Other texts and pictures follow from the tables and the text of the study, which the manifest has not.
-        wanted = again[name] if name in after["tables"] else digest
+        here_alone = (name in again) != (name in listed) and not name.endswith(drawn)
+        wanted = again.get(name, "") if name in after["tables"] or here_alone else digest
         known = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
         wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in known.items() if other != wanted]
         if wrong and table not in told:
@@ -146,16 +156,20 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
 
 
 def _write(out: Path, found: Comparison) -> None:
-    writer.write_file(out / _TABLE, to_csv(found.table).encode())
+    creator = writer.CREATOR.encode()
+    writer.write_file(out / _TABLE, to_csv(found.table).encode(), _HEADER)
     if not found.moved:
         # None of an older comparison stays.
-        (out / _PICTURE).unlink(missing_ok=True)
+        if marked(out / _PICTURE, creator):
+            (out / _PICTURE).unlink()
         return
     from mechdesign.report.figures import style
     from mechdesign.report.figures.differences import differences_figure
 
     with style.context():
-        writer.write_file(out / _PICTURE, style.encoded(differences_figure(found.moved), "png"))
+        writer.write_file(
+            out / _PICTURE, style.encoded(differences_figure(found.moved), "png", writer.CREATOR), creator
+        )
 
 
 def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
@@ -173,7 +187,7 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
     else:
         terminal.show_lines([str(each) for each in found.differences if each.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(found, command).encode())
+        writer.write_file(junit, _junit(found, command).encode(), mark(junit))
     return 1 if found.differences else 0
 
 

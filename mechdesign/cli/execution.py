@@ -16,10 +16,11 @@ from typing import Any
 import mechdesign
 from mechdesign import shards
 from mechdesign.analyses.look import LONG
-from mechdesign.cli import terminal
+from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
-from mechdesign.cli.options import STYLES, Options
-from mechdesign.commands import DIVIDED, MERGE, SWEEP
+from mechdesign.cli.options import Options
+from mechdesign.cli.places import RESUMED, extras, folder, place
+from mechdesign.commands import DIVIDED, MERGE
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
@@ -40,7 +41,6 @@ from mechdesign.study.text.inputs import Folder
 
 STANDARD_INPUT = Path("-")
 _ROWS_AT_ONCE = 20_000  # of a table that is read from its file
-RESULTS = Path("results")  # where no other folder is asked for
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -58,10 +58,6 @@ class Source:
     text: bytes
     path: Path | None
     folder: Folder
-
-
-# Commands that an interrupted run need not begin anew.
-_RESUMED = ("optimize", SWEEP.name)
 
 
 @dataclass(frozen=True)
@@ -82,6 +78,12 @@ class Outcome:
     table: Table | None = None  # the main one
     shard: str = ""  # what became of a part of it, where no more was asked
     left: bool = False  # whether the run ended before it
+    reached: bool = True  # whether what was to be reached by changes was, where all poses assemble
+
+    @property
+    def word(self) -> str:
+        """What came of it, in a word or two."""
+        return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
 def source(path: Path | None, options: Options) -> Source:
@@ -118,31 +120,6 @@ def load_study(path: Path | None, options: Options) -> Study:
     return load_source(source(path, options), options)
 
 
-def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
-    """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
-    if options.out is None:
-        return RESULTS / study.label / name
-    return options.out / study.label if several else options.out
-
-
-def place(directory: Path, options: Options) -> Path:
-    """The folder that a command writes in: of a shard its own, for others write at the same time."""
-    return directory if options.part is None else directory / options.part.folder
-
-
-def claim(owners: dict[str, Path | None], study: Study) -> None:
-    """Take the folder of a study's name; `owners` says which file each folder belongs to.
-
-    Raises
-    ------
-    StudyError
-        If another file of that name has it.
-    """
-    owner = owners.setdefault(study.label, study.path)
-    if owner != study.path:
-        raise StudyError(f"{study.path}: its results would overwrite those of {owner}; rename one of the files")
-
-
 def answer(study: Study, command: str, directory: Path, options: Options, progress: Progress) -> Outcome:
     """Compute one command's result, judge it by the study's requirements and write it, unless it is there.
 
@@ -151,6 +128,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     MechdesignError
         Whatever the analysis, the requirements or the files run into.
     """
+    places.check(study, command, directory, options)
     if options.part is not None:
         return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
@@ -158,6 +136,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     before = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
+        manifest.check_folder(directory, study, command, asked, before)
         asked = dataclasses.replace(asked, before=manifest.shown_before(before))
     share, merging = None, options.command == MERGE and command in DIVIDED
     if merging and shards.found(directory):
@@ -171,7 +150,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if command in LONG:
         requirements.foresee(study, [command])
     more: dict[str, Any] = {"all_modes": True} if options.all_modes else {}
-    journal = _journal(study, command, directory, options) if command in _RESUMED else None
+    journal = _journal(study, command, directory, options) if command in RESUMED else None
     if journal is not None:
         more["journal"] = journal
     try:
@@ -199,7 +178,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
-        written=True, table=result.main,
+        written=True, table=result.main, reached=result.reached,
     )  # fmt: skip
 
 
@@ -241,13 +220,6 @@ def _earlier(before: Study, command: str, options: Options) -> Result:
     return result
 
 
-def extras(command: str, options: Options) -> Extras:
-    """What else than tables the options want of a command."""
-    animate = options.animate and command == "kinematics"
-    look = options.style or STYLES[0]
-    return Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report, look)
-
-
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
     """The answer that an earlier run left whole in the directory, if this run would give the same."""
     content = manifest.is_current(directory, study, command, asked)
@@ -261,7 +233,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
         ]
         table = _main_table(directory, content)
         warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
-    except (KeyError, TypeError, ValueError, AttributeError, StopIteration, OSError):
+    except (ValueError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
     if len(verdicts) != len(judged_by(study, command)):
@@ -350,18 +322,17 @@ def write_report(
     OutputError
         If it cannot be written.
     """
-    from mechdesign.report.page import page, section
+    from mechdesign.report.page import page
 
     told = []
     for given in answers:
-        path = given.directory / section.NAME
+        path = given.directory / pages.SECTION
         part = json.loads(path.read_text(encoding="utf-8")) if given.written and path.exists() else None
-        outcome = OUTCOMES[given.exit_code]
-        told.append(page.Answered(given.command, outcome, given.exit_code, given.failed, given.verdicts, part))
+        told.append(page.Answered(given.command, given.word, given.exit_code, given.failed, given.verdicts, part))
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(given.directory != directory for given in answers)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots))
+    writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
 
 

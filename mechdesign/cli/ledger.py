@@ -13,10 +13,12 @@ from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.board import Board, Far
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import RESULTS, Outcome, Source
+from mechdesign.cli.execution import Outcome, Source
 from mechdesign.cli.options import Options
+from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
 from mechdesign.courier import LostWorkerError
-from mechdesign.errors import Interrupted, OutputError, counted, printable
+from mechdesign.errors import Interrupted, MechdesignError, counted, printable
+from mechdesign.files import check_marked
 from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
@@ -25,6 +27,7 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
+_HEADER = to_csv(summary.summary(())).encode()  # by which a summary is known
 _LOST = "run"  # in place of the commands that a killed process did not come to
 _KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
 
@@ -68,6 +71,8 @@ class Ledger:
         self.interrupted = False
         self.stopped = False  # nothing more is begun
         self._asked = asked
+        self._root = options.out or RESULTS
+        self._check()
         self._answers: list[list[Outcome]] = [[] for _ in asked]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
@@ -76,6 +81,15 @@ class Ledger:
         self._first = 0  # task that is not ended
         self._left = len(asked)  # studies without an answer
         self._exit_code = 0
+
+    def _check(self) -> None:
+        """Find out before the first study is answered that a file about all would replace another."""
+        if self.options.junit is not None:
+            check_marked(self.options.junit, summary.mark(self.options.junit))
+        if self.several:
+            check_marked(self._root / SUMMARY, _HEADER)
+            if self.options.report:
+                check_marked(self._root / pages.INDEX, PAGE)
 
     def missing(self, number: int, given: Outcome) -> None:
         """Note a study that could not be read, or was lost."""
@@ -147,17 +161,17 @@ class Ledger:
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
-            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode())
+            self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.mark(options.junit))
         table = summary.summary(answers)
-        root = options.out or RESULTS
         if self.several and any(given.written for given in answers):
-            self._file(root / summary.NAME, to_csv(table).encode())
+            self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)
         terminal.show(table, as_json=options.json)
         if any(entry.link for entry in self._entries.values()):
             from mechdesign.report.page.page import index
 
-            if self._file(root / pages.INDEX, index([entry for _, entry in sorted(self._entries.items())])):
-                terminal.say(f"index of the reports in {root / pages.INDEX}", quiet=options.quiet)
+            path = self._root / pages.INDEX
+            if self._file(path, index([entry for _, entry in sorted(self._entries.items())]), PAGE):
+                terminal.say(f"index of the reports in {path}", quiet=options.quiet)
         told = [summary.in_brief(given) for given in answers if given.command and given.exit_code]
         if len(table) > 1 and told:
             terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
@@ -176,11 +190,11 @@ class Ledger:
             label = name_of(path) if task is None else task.label
             yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
 
-    def _file(self, path: Path, data: bytes) -> bool:
+    def _file(self, path: Path, data: bytes, mark: bytes) -> bool:
         """Write a file about all studies; whether it is there, for the run goes on without it."""
         try:
-            write_file(path, data)
-        except OutputError as error:
+            write_file(path, data, mark)
+        except MechdesignError as error:
             terminal.say(str(error))
             self._exit_code = max(self._exit_code, explained(error)[0])
             return False

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Any, TextIO
 
 # Of interrupts, on systems that have them.
@@ -42,7 +42,7 @@ def run(command: Callable[[], Any]) -> None:
         code = _BY_SIGNAL + signal.SIGINT
     except SystemExit as end:
         code = end.code
-    if code and signals.number is not None:
+    if signals.number is not None and (code or signals.number != signal.SIGINT):
         code = _BY_SIGNAL + signals.number
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
@@ -70,6 +70,7 @@ class Signals:
         if hasattr(signal, "SIGALRM"):
             signal.signal(signal.SIGALRM, self._interrupt)
             sys.unraisablehook = self._lost
+            sys.excepthook = _printed
 
     def hear(self) -> None:
         """Let through what has waited since the process began."""
@@ -99,6 +100,12 @@ class Signals:
             signal.setitimer(signal.ITIMER_REAL, _RETRY)
         else:
             raise KeyboardInterrupt
+
+
+def _printed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Print an error that nobody caught; Cython prints so what it drops, and an interrupt is tried again."""
+    if not issubclass(kind, KeyboardInterrupt):
+        sys.__excepthook__(kind, error, trace)
 
 
 def _blocked() -> bool:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechdesign.cli.execution import OUTCOMES, Outcome
+from mechdesign.cli.execution import Outcome
 from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
 
@@ -17,14 +18,19 @@ if TYPE_CHECKING:
     from junitparser import JUnitXml
 
 _SKIPPED = re.compile(r'(?<=") skipped="\d+"')
-NAME = "summary.csv"  # of several studies, beside their folders
+_MARK = b'<testsuites name="mechdesign"'  # of a JUnit file
+
+
+def mark(path: Path) -> bytes:
+    """By what a file is known whose place a JUnit file may take: that of an older one, none where its name is XML's."""
+    return b"" if path.suffix == ".xml" else _MARK
 
 
 def in_brief(given: Outcome) -> str:
     """What a question failed by, in a line of the list of failures."""
     why = [given.failed.splitlines()[0]] if given.failed else []
     why += [str(verdict) for verdict in given.verdicts if not verdict.met]
-    return f"  {given.study}: {given.command}: {OUTCOMES[given.exit_code]}: {'; '.join(why)}"
+    return f"  {given.study}: {given.command}: {given.word}: {'; '.join(why)}"
 
 
 def summary(answers: Sequence[Outcome]) -> Table:
@@ -36,7 +42,7 @@ def summary(answers: Sequence[Outcome]) -> Table:
     found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
         "study": (str, lambda given: given.study),
         "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: given.shard or OUTCOMES[given.exit_code] + " (kept)" * given.kept),
+        "outcome": (str, lambda given: given.shard or given.word + " (kept)" * given.kept),
         "exit_code": (int, lambda given: given.exit_code),
         "requirements": (str, met),
         "rows": (int, lambda given: given.rows),

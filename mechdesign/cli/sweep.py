@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -13,11 +12,12 @@ from typing import Any
 from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.ledger import failure, name_of
 from mechdesign.cli.options import Options
-from mechdesign.cli.summary import junit
+from mechdesign.cli.summary import junit, mark
 from mechdesign.errors import Interrupted, Problem, StudyError
+from mechdesign.files import check_marked
 from mechdesign.report.writer import write_file
 from mechdesign.study.schema.matrix import RANGE
-from mechdesign.study.text.document import read
+from mechdesign.study.text.document import in_yaml, read
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,17 @@ class Matrix:
             for name in names:
                 if names.count(name) > 1:
                     raise StudyError(f"--vary {name} is given twice; list its values with commas between them")
-            yield f"matrix.vary={json.dumps(dict(varied))}"
+            yield f"matrix.vary={in_yaml(dict(varied))}"
         if self.cases is not None:
             beside = study.parent if study is not None else Path()
-            yield f"matrix.cases={json.dumps(os.path.relpath(self.cases, beside))}"
+            yield f"matrix.cases={in_yaml(os.path.relpath(self.cases, beside))}"
         if self.method is not None:
-            yield f"matrix.method={json.dumps(self.method)}"
+            yield f"matrix.method={in_yaml(self.method)}"
         if self.samples is not None:
             yield f"matrix.samples={self.samples}"
         if self.results:
             names = [name.strip() for each in self.results for name in each.split(",")]
-            yield f"matrix.results={json.dumps(names)}"
+            yield f"matrix.results={in_yaml(names)}"
 
 
 def _varied(text: str) -> tuple[str, Any]:
@@ -85,6 +85,8 @@ def _as_typed(error: StudyError) -> StudyError:
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
     given, label = None, name_of(path)
+    if options.junit is not None:
+        check_marked(options.junit, mark(options.junit))
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
         given = ask("sweep", path, replace(options, overrides=changes))
@@ -99,4 +101,4 @@ def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
         return given.exit_code
     finally:
         if options.junit is not None and given is not None:
-            write_file(options.junit, junit([given]).encode())
+            write_file(options.junit, junit([given]).encode(), mark(options.junit))

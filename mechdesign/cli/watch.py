@@ -22,7 +22,8 @@ _NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\
 def watch(path: Path, commands: Sequence[str], options: Options) -> int:
     """Answer a study's questions, or only some of them, now and after every change, until an interrupt.
 
-    Mistakes are told, and end nothing. Returns 0, or 130 if it was computing when it was interrupted.
+    Mistakes are told, and end nothing. Returns 0, or 130 if it was computing when it was interrupted; a
+    termination ends the process with 143 all the same.
 
     Raises
     ------

@@ -262,7 +262,7 @@ class Curve:
         numbers = np.arange(valid.shape[1])
         away = np.where(valid[:, None, :], np.abs(numbers[:, None] - numbers), len(numbers))
         nearest = away.argmin(axis=2) + len(numbers) * np.arange(self.lines)[:, None]
-        lost = np.broadcast_to(~valid.any(axis=1)[:, None], nearest.shape)
+        lost = np.broadcast_to(~valid.any(axis=1, keepdims=True), nearest.shape)
         nearest = np.where(lost, len(line) + np.arange(self.lines)[:, None], nearest)
         self._anchor_rows, self._nearest = rows, nearest
         return anchors

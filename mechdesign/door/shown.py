@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import MechdesignError, StudyError, counted, explain, suggestion
-from mechdesign.files import check_writable, formats_of, owned
+from mechdesign.files import formats_of, owned
 from mechdesign.report import writer
-from mechdesign.report.manifest import Extras
+from mechdesign.report.manifest import Extras, check_folder
+from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import Verdict, requirements
 from mechdesign.results import Result
 from mechdesign.study import Study
@@ -57,7 +58,7 @@ class ShownStudy(Study):
         try:
             return writer.sketch(self)
         except Exception as error:
-            _undrawn(writer.MECHANISM, explain(error)[1])
+            _undrawn(MECHANISM, explain(error)[1])
             return None
 
 
@@ -137,7 +138,8 @@ class Answer(Result):
         Raises
         ------
         StudyError
-            If a requirement names what the result has not, or formats or the animation are asked amiss.
+            If a requirement names what the result has not, formats or the animation are asked amiss, or a file would be
+            replaced that no manifest there lists, or that the study reads.
         OutputError
             If the files cannot be written.
         """
@@ -147,7 +149,7 @@ class Answer(Result):
             raise StudyError("plots=False and animate=True or formats contradict each other")
         asked = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
         folder = Path(directory)
-        check_writable(folder)
+        check_folder(folder, self.study, self.command, asked)
         with owned(folder):
             undrawn = writer.write(folder, self.study, self, self.verdicts, asked)
         for warning in undrawn:
@@ -208,7 +210,7 @@ class Answer(Result):
             return Gallery()
         with style.context():
             drawn = writer.figures(self.study, self)
-            drawn.add(writer.MECHANISM, mechanism_figure, self.study, self.seen)
+            drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -20,10 +19,10 @@ from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError, choose, located
 from mechdesign.study import Study
-from mechdesign.study.loading import load_document
+from mechdesign.study.loading import load_document, same_sketch
 from mechdesign.study.schema.matrix import Named
 from mechdesign.study.schema.study_file import override
-from mechdesign.study.text.document import Document, KeyPath, Mark
+from mechdesign.study.text.document import Document, KeyPath, Mark, in_yaml
 
 # What is told of the rows of a result, by the word after its name.
 STATISTICS: Mapping[str, Callable[[Floats], Any]] = {"min": np.min, "max": np.max, "mean": np.mean, "range": np.ptp}
@@ -47,7 +46,7 @@ class Case:
     @property
     def overrides(self) -> tuple[str, ...]:
         """The changes as ``a.b.c=value``."""
-        return tuple(f"{name}={json.dumps(value)}" for name, value in self.changes)
+        return tuple(f"{name}={in_yaml(value)}" for name, value in self.changes)
 
 
 @dataclass(frozen=True)
@@ -102,9 +101,9 @@ class Wanted:
         if chosen.missing:
             raise UnknownColumnError(chosen.missing)
         values = chosen.values[chosen.counts]
+        unit = chosen.unit
         if not values.size:
-            return Number(float("nan"), chosen.table.column(chosen.column).unit)
-        unit = requirements.unit_of(chosen.table, chosen.column, int(np.flatnonzero(chosen.counts)[0]))
+            return Number(float("nan"), unit)
         if statistic:
             return Number(float(STATISTICS[statistic](values)), unit)
         if values.size > 1:
@@ -226,10 +225,9 @@ def variant(study: Study, case: Case) -> Study:
     data = copy.deepcopy({key: value for key, value in study.resolved.items() if key not in _OF_CASES})
     document = Document("", data, values={(): Mark("")})
     override(document, case.overrides)
-    drawn = data["mechanism"].get("sketch") == study.resolved["mechanism"].get("sketch")
     return load_document(
         document, study.path, study.folder, study.text, study.text_sha256, (*study.overrides, *case.overrides),
-        original=study.mechanism if drawn else None,
+        original=study.mechanism if same_sketch(data, study.resolved) else None,
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -15,7 +14,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.matrix import GRID, Values
 from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import dotted
+from mechdesign.study.text.document import dotted, in_yaml
 from mechdesign.study.text.units import QUANTITY
 
 
@@ -85,11 +84,11 @@ def _try(study: Study, name: str, values: Sequence[Any]) -> None:
     place = dotted(entry(study.resolved, name))
     problems: list[Problem] = []
     # Of quantities one of each unit.
-    tried = {(QUANTITY.fullmatch(str(value)) or {"unit": json.dumps(value)})["unit"]: value for value in values}
+    tried = {(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in values}
     for value in tried.values():
         if isinstance(value, int | float) and not isinstance(value, bool):
             continue
-        text = json.dumps(value)
+        text = in_yaml(value)
         try:
             variant(study, Case.of({name: value}))
         except StudyError as error:

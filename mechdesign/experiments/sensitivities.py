@@ -25,7 +25,7 @@ from mechdesign.study.schema.sensitivities import Changed
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted, has
 from mechdesign.study.text.fields import Context, read_number, shown
-from mechdesign.study.text.units import Units
+from mechdesign.study.text.units import Amount, QuantityError, Units
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
@@ -95,9 +95,14 @@ def _changing(study: Study, each: Changed) -> Changing:
         raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
     if each.step is None and number.nominal == 0:
         raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
-    step = _PART * abs(number.nominal) if each.step is None else each.step
     name = dotted(path)
-    return Changing(given, name, number.nominal, step, unit_of(study, name))
+    unit = unit_of(study, name)
+    try:
+        given_step = Amount.of(each.step or 0.0)
+        step = (given_step.within(unit) if unit else given_step) or _PART * abs(number.nominal)
+    except QuantityError as error:
+        raise StudyError(f"{given}: {error}") from None
+    return Changing(given, name, number.nominal, step, unit)
 
 
 @one_thread()

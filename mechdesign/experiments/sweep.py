@@ -31,6 +31,7 @@ from mechdesign.report.requirements import Verdict, in_words
 from mechdesign.results import VARIED, Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.study_file import entry, kinds_of
+from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY, Units
 
 _SECTION = "matrix"
@@ -205,7 +206,7 @@ def _text(value: Any) -> str:
     """A value in words."""
     if isinstance(value, float):
         return f"{value:.6g}"
-    return value if isinstance(value, str) else json.dumps(value)
+    return value if isinstance(value, str) else in_yaml(value)
 
 
 def requirement_names(study: Study) -> list[str]:

@@ -199,6 +199,27 @@ class Linearization(State):
             rest[k] = self.turned(here, edge.frame)
         return velocity_z, self._solve(none, rest)
 
+    @quiet
+    def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Value]]:
+        """Derivatives of `loop_columns` with respect to dimensions; `position` from `sensitivity`."""
+        _, explicit, _ = self._explicit(places)
+        s, s_z = self._along(self.slides), self._along(position.slides)
+        found = []
+        for loop in group.loops:
+            by_root, by_slide = dict.fromkeys(group.angles, 0j), dict.fromkeys(group.slides, 0j)
+            for k, sign in loop.edges:
+                edge, (w_z, d_z) = self.structure.edges[k], explicit[k]
+                turn_z, root = 1j * position.angles[edge.frame], self.structure.ties[edge.frame].root
+                if root in by_root:
+                    arm_z = w_z + s[k] * d_z + s_z[k] * self.vectors.d[k]
+                    step = self.turned(arm_z, edge.frame) + turn_z * self.edge(k)
+                    by_root[root] = by_root[root] + sign * 1j * step
+                if edge.slide is not None and edge.slide in by_slide:
+                    step = self.turned(d_z, edge.frame) + turn_z * self.direction(k)
+                    by_slide[edge.slide] = by_slide[edge.slide] + sign * step
+            found.append([*by_root.values(), *by_slide.values()])
+        return found
+
     def direction(self, k: int) -> Value:
         """World direction of an edge's slide; zero of an edge that has none."""
         return self.turned(self.vectors.d[k], self.structure.edges[k].frame)

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, quiet
+from mechdesign.mechanism.algebra import Value, cross, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
+from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.solve import equations, run, set_unknowns
-from mechdesign.mechanism.state import State, Unknowns, start_state
+from mechdesign.mechanism.solve import equations, run, set_unknowns, solve_linear
+from mechdesign.mechanism.state import State, Unknowns, scalars, start_state
 from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
@@ -129,6 +130,60 @@ class Margins:
             if structure.edges[k].slide in group.slides
         )
         return cross(np.asarray(one), np.asarray(two))
+
+
+@quiet
+def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floats]:
+    """Margins of assembly with the drives held, and their derivatives by dimensions; a margin of 0 is a dead centre.
+
+    Two links have the triangle inequalities of their lengths and of the distance that they span; a link with a slide
+    its length less its reach across the slide, to either side; links that are solved together the square of what
+    `conditionings` has of them, over its value, which is linear in the dimensions near a fold; a telescopic leg its
+    length.
+
+    Returns
+    -------
+    margins, slopes
+        Shape (margins, ...) and (margins, places, ...), at the configurations of `linear`.
+    """
+    position = linear.sensitivity(places)
+    shape = linear.configuration.shape
+    found: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
+    for index, group in enumerate(linear.structure.groups):
+        if group.form in ("place", "two slides"):
+            continue
+        lines, changes = linear.loop_columns(index, group), linear.column_sensitivity(group, places, position)
+        if group.form == "newton":
+            rows = [row for line in lines for row in scalars(line)]
+            changed = [row for line in changes for row in scalars(line)]
+            logarithmic: Value = 0.0
+            for k in range(len(rows)):
+                column, column_z = [row[k] for row in rows], [row[k] for row in changed]
+                size = sum(value * value for value in column)
+                logarithmic = logarithmic + solve_linear(rows, column_z)[0][k]
+                logarithmic = logarithmic - sum(v * v_z for v, v_z in zip(column, column_z, strict=True)) / size
+            found.append((1.0, 2.0 * logarithmic))
+            continue
+        ((a, b),), ((a_z, b_z),) = lines, changes
+        if group.form == "two angles":
+            sides = [_length(a, a_z), _length(b, b_z), _length(a + b, a_z + b_z)]
+            total, total_z = (sum(part) for part in zip(*sides, strict=True))
+            found += [(total - 2.0 * side, total_z - 2.0 * side_z) for side, side_z in sides]
+            continue
+        (size, size_z), (unit, unit_z) = _length(a, a_z), _length(b, b_z)
+        reach = dot(a, b) / unit
+        reach_z = (dot(a_z, b) + dot(a, b_z) - reach * unit_z) / unit
+        found += [(size - way * reach, size_z - way * reach_z) for way in (1.0, -1.0)]
+    margins, slopes = np.empty((len(found), *shape)), np.empty((len(found), len(places), *shape))
+    for k, (margin, slope) in enumerate(found):
+        margins[k], slopes[k] = margin, slope
+    return margins, slopes
+
+
+def _length(a: Value, a_z: Value) -> tuple[Value, Value]:
+    """Length of a vector, and its derivatives."""
+    length = np.sqrt(norm2(a))
+    return length, dot(a, a_z) / length
 
 
 def turning_point(

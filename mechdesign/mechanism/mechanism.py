@@ -239,6 +239,16 @@ class Variant(Mechanism):
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
 
+    @property
+    def closes(self) -> bool:
+        """Whether it can be assembled at the values of the drives at which the original is drawn."""
+        return bool(drawn(self.original, self._changed).valid.all())
+
+    @property
+    def _changed(self) -> dict[str, float]:
+        before = self.original.nominal
+        return {name: value for name, value in self.nominal.items() if value != before[name]}
+
     def plan(self, given: Sequence[str]) -> Plan:
         """Plan for given coordinates, in the assembly of the original's; see `Mechanism.plan`."""
         key = tuple(given)
@@ -248,8 +258,7 @@ class Variant(Mechanism):
         return self._plans[key]
 
     def _assemble_sketch(self) -> Configuration:
-        before = self.original.nominal
-        changed = {name: value for name, value in self.nominal.items() if value != before[name]}
+        before, changed = self.original.nominal, self._changed
         if self.forward.iterative:
             found = begun(self.original, changed)
             return replace(found, places={name: v for name, v in found.places.items() if v == before[name]})

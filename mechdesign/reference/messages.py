@@ -84,8 +84,12 @@ class Message(NamedTuple):
         """Whether these words stand in it, or it in these words."""
         if words.casefold() in self.text.casefold():
             return True
-        parts = _PLACE.split(self.source)
-        return sum(map(len, parts)) >= _LETTERS and re.search(".*".join(map(re.escape, parts)), words) is not None
+        parts, end = _PLACE.split(self.source), 0
+        for part in parts:
+            if (start := words.find(part, end)) < 0:
+                return False
+            end = start + len(part)
+        return sum(map(len, parts)) >= _LETTERS
 
 
 @cache
@@ -258,6 +262,8 @@ class _Reader(ast.NodeVisitor):
         if name in _GIVEN or told or name.endswith("Error"):
             if name not in ("KeyError", "TypeError", "AttributeError", "ImportError", "ValueError"):
                 self._add(node.args, getattr(getattr(errors, name, None), "exit_code", 2))
+        elif name == "doubt":
+            self._add(node.args, None)
         elif name in ("append", "extend") and (owner in _LISTS or self.texts):
             # What is kept as several values together is no text yet.
             given = [each for each in node.args if not isinstance(each, ast.Tuple)]

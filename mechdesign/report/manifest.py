@@ -11,15 +11,21 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from mechdesign.files import proper
+from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+
+from mechdesign.errors import StudyError
+from mechdesign.files import check_own, check_writable, proper, unsettled
+from mechdesign.report.names import names
+from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
 
 NAME = "manifest.json"
+_TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"
 _MOST_BYTES = 100_000_000  # of a manifest; of a larger one the memory might not hold what it says
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
@@ -38,11 +44,98 @@ class Extras:
     before: Mapping[str, Any] | None = None  # the study before a change, which pictures show as well
 
 
+def _named(name: str) -> str:
+    if not proper(name):
+        raise ValueError(f"{name!r} is no name of a file")
+    return name
+
+
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+_Name = Annotated[str, AfterValidator(_named)]
+
+
+class _Column(BaseModel):
+    name: str
+    unit: str
+    meaning: str
+
+
+class _Table(BaseModel):
+    meaning: str
+    rows: int = Field(ge=0)
+    columns: list[_Column]
+
+
+class _Study(BaseModel):
+    name: str
+    sha256: _Sha256
+    resolved: dict[str, Any]
+
+
+class _Verdict(BaseModel):
+    requirement: str
+    met: bool
+    worst: float | None
+    place: str
+    margin: float | None
+    unit: str
+    note: str
+
+
+class _Manifest(BaseModel):
+    tool: dict[str, str]
+    libraries: dict[str, str]
+    command: str
+    study: _Study
+    inputs: dict[str, _Sha256] = {}
+    inputs_in: str = "."
+    overrides: list[str]
+    seed: int = Field(ge=0)
+    plots: bool
+    formats: str
+    animate: bool
+    all_modes: bool
+    report: bool
+    style: str
+    before: dict[str, Any] | None
+    counts: dict[str, Any]
+    warnings: list[str]
+    failed: str
+    interrupted: str = ""
+    requirements: list[_Verdict]
+    tables: dict[_Name, _Table]
+    files: dict[_Name, _Sha256]
+
+    @model_validator(mode="after")
+    def _lists_tables(self) -> _Manifest:
+        if not self.tables.keys() <= self.files.keys():
+            raise ValueError("a table is none of the files")
+        return self
+
+
+def whole(directory: Path) -> dict[str, Any]:
+    """The manifest in a folder.
+
+    Raises
+    ------
+    StudyError
+        If what stands there is none, as it has other fields than mechdesign writes.
+    """
+    content = read(directory)
+    try:
+        _Manifest.model_validate(content, strict=True)
+    except ValidationError:
+        message = f"{directory / NAME}: is not a manifest that mechdesign wrote; run the study again"
+        raise StudyError(message) from None
+    assert content is not None
+    return content
+
+
 @cache
 def _versions() -> dict[str, dict[str, str]]:
     libraries = {name: version(name) for name in _LIBRARIES}
     return {
-        "tool": {"name": "mechdesign", "version": version("mechdesign")},
+        "tool": {"name": _TOOL, "version": version(_TOOL)},
         "libraries": {"python": platform.python_version(), **libraries},
     }
 
@@ -56,7 +149,12 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
     return {
         **_versions(),
         "command": command,
-        "study": {"name": study.name, "sha256": study.text_sha256, "resolved": plain(study.resolved)},
+        "study": {
+            "name": study.name,
+            "sha256": study.text_sha256,
+            "resolved": plain(study.resolved),
+            **({"drawn": plain(study.drawn)} if study.drawn else {}),
+        },
         **({"inputs": files} if files else {}),
         "overrides": list(study.overrides),
         "seed": study.seed,
@@ -132,26 +230,50 @@ def read(directory: Path) -> dict[str, Any] | None:
 
 
 def recorded_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """Names and hashes of the files a manifest lists; names that would lead out of its folder are left out."""
-    files = content.get("files")
-    if not isinstance(files, dict):
+    """Names and hashes of the files that a manifest of mechdesign's lists, without names of other folders."""
+    tool, files = content.get("tool"), content.get("files")
+    if not (isinstance(tool, dict) and tool.get("name") == _TOOL and isinstance(files, dict)):
         return {}
     return {name: str(digest) for name, digest in files.items() if proper(name)}
 
 
+def own(directory: Path) -> set[str]:
+    """Names of the files in a folder that mechdesign wrote: those of its manifest, and of a run that was cut off."""
+    listed = recorded_files(read(directory) or {}).keys()
+    return unsettled(directory).union(listed, [NAME] if listed else [])
+
+
+def check_folder(directory: Path, study: Study, command: str, asked: Extras, before: Study | None = None) -> None:
+    """Find out before a long computation that its results could not be written into a folder; creates nothing.
+
+    Raises
+    ------
+    StudyError
+        If they would replace a file that no manifest there lists, or that a study reads.
+    OutputError
+        If the folder takes no files.
+    """
+    check_writable(directory)
+    written = [NAME, *names(command, asked.formats if asked.plots else "", animate=asked.animate)]
+    studies = [study] if before is None else [study, before]
+    read = [file for each in studies for _, file, _ in each.inputs()]
+    read += [each.path for each in studies if each.path is not None]
+    check_own(directory, [*written, pages.SECTION] if asked.report else written, own(directory), read)
+
+
 def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:
     """The manifest of a folder if it holds, whole, what this study would give again or more pictures; else None."""
-    content = read(directory)
-    if content is None:
+    try:
+        content = whole(directory)
+    except StudyError:
         return None
     expected = computed_from(study, command) | asdict(asked)
     without = [name for name in ("plots", "animate", "report") if not expected[name]]
     for name in (*without, *(("formats", "style") if not asked.plots else ())):
         expected[name] = content.get(name)
-    files = recorded_files(content)
-    if not files or "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
+    if "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None
-    return content if all(digest(directory / name) == known for name, known in files.items()) else None
+    return content if all(digest(directory / name) == known for name, known in content["files"].items()) else None
 
 
 def digest(path: Path) -> str:

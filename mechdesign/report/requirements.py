@@ -11,9 +11,13 @@ import numpy as np
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import POSES_ONLY, Result, Table
-from mechdesign.rows import IN_UNIT, Chosen, UnknownColumnError, choose, located
+from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
+from mechdesign.study.text.units import written
+
+Bounds = tuple[float | None, float | None]
+"""Lowest and highest value, in the unit of what is judged."""
 
 
 @dataclass(frozen=True)
@@ -151,11 +155,12 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
             replace(result, tables={**result.tables, table.name: part}), path, requirement.where,
             absolute=requirement.abs,
         )  # fmt: skip
-        row = _worst_row(chosen, requirement)
+        bounds = _bounds(chosen, requirement)
+        row = _worst_row(chosen, requirement, bounds)
         if row is not None:
             value = float(chosen.values[row])
             place = "" if len(table) == 1 else place_of(part, row, column, freedom, begin)
-            verdict = _verdict(requirement, value, place, unit_of(part, column, row))
+            verdict = _verdict(requirement, bounds, value, place, chosen.unit)
             if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
                 found = verdict
         begin += len(part)
@@ -163,15 +168,20 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
         raise UnknownColumnError(missing)
     if found is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return _over_motion(found, requirement, table, column)
+    return _over_motion(found, requirement, bounds, table, column)
 
 
-def _verdict(requirement: Requirement, value: float, place: str, unit: str) -> Verdict:
-    margin = margin_of(requirement, value)
+def _bounds(chosen: Chosen, requirement: Requirement) -> Bounds:
+    low, high = (None if each is None else chosen.bound(each) for each in (requirement.at_least, requirement.at_most))
+    return low, high
+
+
+def _verdict(requirement: Requirement, bounds: Bounds, value: float, place: str, unit: str) -> Verdict:
+    margin = _margin(bounds, value)
     return Verdict(in_words(requirement), margin >= 0, value, place, margin, unit)
 
 
-def _over_motion(verdict: Verdict, requirement: Requirement, table: Table, column: str) -> Verdict:
+def _over_motion(verdict: Verdict, requirement: Requirement, bounds: Bounds, table: Table, column: str) -> Verdict:
     """The verdict of the worst row, or of a worse place of the motion between the rows; what it does not speak of."""
     scope = table.scope
     if scope is None:
@@ -181,7 +191,7 @@ def _over_motion(verdict: Verdict, requirement: Requirement, table: Table, colum
         for sign in signs:
             between = scope.worst(column, sign, requirement.abs)
             if between is not None:
-                one = _verdict(requirement, between[0], between[1], verdict.unit)
+                one = _verdict(requirement, bounds, between[0], between[1], verdict.unit)
                 verdict = one if one.margin < verdict.margin else verdict
     notes = [POSES_ONLY] if scope.poses_only else []
     if scope.missing:
@@ -190,7 +200,7 @@ def _over_motion(verdict: Verdict, requirement: Requirement, table: Table, colum
     return replace(verdict, note="; ".join(notes))
 
 
-def _worst_row(chosen: Chosen, requirement: Requirement) -> int | None:
+def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
     """The row that is worst: one without a value, or else the farthest beyond a limit; None where none counts."""
     counts = chosen.counts
     if requirement.unassembled and "valid" in chosen.table:
@@ -202,7 +212,7 @@ def _worst_row(chosen: Chosen, requirement: Requirement) -> int | None:
     if undefined.size:
         return int(undefined[0])
     ends = rows[np.argmin(values[rows])], rows[np.argmax(values[rows])]
-    return int(min(ends, key=lambda row: margin_of(requirement, float(values[row]))))
+    return int(min(ends, key=lambda row: _margin(bounds, float(values[row]))))
 
 
 def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
@@ -219,16 +229,10 @@ def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
         yield replace(worst, met=not unmet, place=place)
 
 
-def margin_of(requirement: Requirement, value: float) -> float:
+def _margin(bounds: Bounds, value: float) -> float:
     """How far a value is from the nearer limit, negative beyond it."""
-    room = [value - requirement.at_least] if requirement.at_least is not None else []
-    return min([*room, *([requirement.at_most - value] if requirement.at_most is not None else [])])
-
-
-def unit_of(table: Table, name: str, row: int) -> str:
-    """Unit of a column in a row: the row's own, where the column's meaning says so."""
-    column = table.column(name)
-    return str(table["unit"][row]) if IN_UNIT in column.meaning and "unit" in table else column.unit
+    low, high = bounds
+    return min([*([value - low] if low is not None else []), *([high - value] if high is not None else [])])
 
 
 def in_words(requirement: Requirement) -> str:
@@ -236,7 +240,7 @@ def in_words(requirement: Requirement) -> str:
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))
-    bounds = [f"{words} {bound:.12g}" for words, bound in given if bound is not None]
+    bounds = [f"{words} {written(bound)}" for words, bound in given if bound is not None]
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
@@ -12,10 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.errors import OutputError, explain
-from mechdesign.files import Transaction, check_writable, replace, unsettled
+from mechdesign.files import Transaction, check_marked, check_writable, flowing, replace
 from mechdesign.progress import NULL, Progress
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
+from mechdesign.report.names import ANIMATION, MECHANISM
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
 from mechdesign.report.tables import csv_blocks
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
     from mechdesign.report.figures.rendering import Gallery
 
-MECHANISM = "mechanism"
 DIMENSIONS = "dimensions"  # of `check`
-ANIMATION = "motion.gif"
+CREATOR = "mechdesign"  # by which a drawing is known that no manifest lists
 FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
+_UNDRAWN = "the run ended before its pictures were written"
 # Ends the names under which pictures stand as HTML.
 INLINE = ".html"
 
@@ -60,17 +60,18 @@ def write(
         f"{table.name}.csv": _encoded(table, progress) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
-    stale = manifest.recorded_files(manifest.read(directory) or {}).keys() | unsettled(directory)
+    own, more = manifest.own(directory), (asked.plots or asked.report) and not result.interrupted
     pages.remove(directory / pages.REPORT)
     warnings: tuple[str, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         _check_room(directory, result)
         tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
+        begun = dataclasses.replace(result, warnings=(*result.warnings, _UNDRAWN)) if more else result
         with Transaction(directory) as written:
             digests = {name: written.stage(name, blocks) for name, blocks in files.items()}
-            written.stage(manifest.NAME, [manifest.compose(directory, study, result, verdicts, digests, tables)])
-            written.commit(stale, voucher=manifest.NAME)
+            written.stage(manifest.NAME, [manifest.compose(directory, study, begun, verdicts, digests, tables)])
+            written.commit(own, voucher=manifest.NAME)
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
@@ -81,13 +82,14 @@ def write(
             inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
             mechanism = inline.pop(MECHANISM, "")
             part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
-            drawn[section.NAME] = section.encoded(part)
-        if drawn or plots:
+            drawn[pages.SECTION] = section.encoded(part)
+        if drawn or more:
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+            own = {*digests, manifest.NAME}
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
                 written.stage(manifest.NAME, [manifest.compose(directory, study, told, verdicts, digests, asked)])
-                written.commit(voucher=manifest.NAME)
+                written.commit(own, own, voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
     return warnings
@@ -117,20 +119,23 @@ def _check_room(directory: Path, result: Result) -> None:
         )
 
 
-def write_file(path: Path, data: bytes) -> None:
-    """Write one file whole or not at all; a device or a pipe gets the bytes, and a link stays one.
+def write_file(path: Path, data: bytes, mark: bytes = b"") -> None:
+    """Write one file whole or not at all, in place of none or one with a mark; a device or a pipe gets the bytes.
 
     Raises
     ------
+    StudyError
+        If another file stands there, or a link to one.
     OutputError
         If it cannot be written.
     """
     try:
+        check_marked(path, mark)
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and not path.is_file():
+        if flowing(path):
             path.write_bytes(data)
         else:
-            replace(Path(os.path.realpath(path)), [data])
+            replace(path, [data])
     except OSError as error:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
@@ -149,6 +154,9 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     from mechdesign.report.figures.mechanism import sketch_figure
 
     kinds, told = asked.formats.split(","), []
+    for name in (MECHANISM, DIMENSIONS):
+        for kind in kinds:
+            check_marked(directory / f"{name}.{kind}", CREATOR.encode())
     drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
                 (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
     for name, what, make in drawings:
@@ -156,12 +164,12 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
         try:
             with style.context(asked.style):
                 figure = make(study)
-                drawn = {path: style.encoded(figure, path.suffix[1:]) for path in paths}
+                drawn = {path: style.encoded(figure, path.suffix[1:], CREATOR) for path in paths}
         except Exception as error:
             told.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
             continue
         for path, data in drawn.items():
-            write_file(path, data)
+            write_file(path, data, CREATOR.encode())
         told.append(f"{what} in {', '.join(map(str, paths))}")
     return "; ".join(told)
 

@@ -29,7 +29,7 @@ from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema import targets
+from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
@@ -40,11 +40,11 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, entry, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
-from mechdesign.study.text.units import Units
+from mechdesign.study.text.units import Units, text_of
 
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")
@@ -87,6 +87,7 @@ class Study:
     targets: Mapping[str, Target]  # by the coordinate or point
     kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
+    drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
@@ -113,17 +114,15 @@ class Study:
     def unit_of(self, name: str) -> str | None:
         """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
 
-        That of a parameter is known where numbers of the geometry, all of one quantity, change as much as it does.
+        See `Parameters.kind` for that of a parameter.
         """
         parameters, places = self.parameters, self.mechanism.description.places
         if name in places:
             return self.units.label(places[name].quantity)
         if name not in parameters.nominal:
             return self.units.label(self.mechanism.quantity(name)) if name in self.mechanism.drives else None
-        slopes = parameters.derivatives(name).items()
-        alike = [places[place].quantity for place, slope in slopes if abs(slope) == parameters.factors[place]]
-        found = set(alike) - {"none"}
-        return self.units.label(*found) if len(found) == 1 else None
+        kind = parameters.kind(name, places)
+        return None if kind is None else self.units.label(kind)
 
     def problem(self, message: str, *keys: str | int) -> Problem:
         """A mistake at a path of the data, with its place in the text."""
@@ -183,14 +182,18 @@ def read_file(file: pathlib.Path) -> bytes:
 
 
 def load_data(
-    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder
-) -> Study:
-    """Load a study from a mapping; files that it names lie in a folder. See `load`."""
+    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
+    drawn: Mapping[str, Any] | None = None,
+) -> Study:  # fmt: skip
+    """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
+    folder. See `load`.
+    """
     data = _plain_data(source, "the study")
     document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
+    drawn = drawn or _drawing(document)
     override(document, changes)
     sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-    return load_document(document, None, folder, b"", sha256, changes, seed)
+    return _load_changed(document, None, folder, b"", sha256, changes, seed, drawn)
 
 
 @one_thread()
@@ -203,17 +206,55 @@ def load_bytes(
 ) -> Study:
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
     document, changes = read(content, str(path or _TEXT)), _texts(overrides)
+    drawn = _drawing(document)
     override(document, changes)
     sha256 = hashlib.sha256(content).hexdigest()
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
-    return load_document(document, path, folder, content, sha256, changes, seed)
+    return _load_changed(document, path, folder, content, sha256, changes, seed, drawn)
+
+
+def _drawing(document: Document) -> dict[str, Any]:
+    """What a sketch is assembled from: a study's units and mechanism."""
+    data = document.data if isinstance(document.data, dict) else {}
+    return {key: plain(data[key]) for key in ("units", "mechanism") if data.get(key) is not None}
+
+
+def _load_changed(
+    document: Document, path: pathlib.Path | None, folder: Folder, text: bytes, sha256: str, changes: tuple[str, ...],
+    seed: int | None, drawn: Mapping[str, Any],
+) -> Study:  # fmt: skip
+    """Load a study whose overrides are applied; its assembly is that of the study before, `drawn`, if that has one."""
+    if drawn == _drawing(document) or not same_sketch(drawn, document.data):
+        return load_document(document, path, folder, text, sha256, changes, seed)
+    original = None
+    with contextlib.suppress(StudyError):
+        own = Document("", plain(drawn), values={(): Mark("")})
+        original = load_document(own, path, folder, b"", "").mechanism
+    study = load_document(document, path, folder, text, sha256, changes, seed, original)
+    if not isinstance(study.mechanism, Variant):
+        return study
+    warnings = [*study.warnings]
+    if not study.mechanism.closes:
+        warnings.append(study.problem(
+            "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that "
+            "it shows without the change", "mechanism", "sketch",
+        ))  # fmt: skip
+    # The units in full, as the data of the study has them.
+    drawn = {**drawn, "units": study.resolved["units"]}
+    return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
+
+
+def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether the data of two studies have the same sketch, in the same units."""
+    mechanisms = [each["mechanism"] if isinstance(each.get("mechanism"), dict) else {} for each in (one, other)]
+    return one.get("units") == other.get("units") and mechanisms[0].get("sketch") == mechanisms[1].get("sketch")
 
 
 def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
     """Overrides as ``a.b.c=value``; a value of a mapping is written in JSON, which YAML reads."""
     if isinstance(overrides, Mapping):
         return tuple(
-            f"{name}={json.dumps(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
+            f"{name}={in_yaml(_plain_data(value, f'the override {name!r}'))}" for name, value in overrides.items()
         )
     return (overrides,) if isinstance(overrides, str) else tuple(overrides)
 
@@ -262,15 +303,17 @@ def load_document(
     if section is None:
         reporter.done()
     assert section is not None
-    builder = Builder(section, context.units, context.parameters, reporter)
+    builder = Builder(section, context, reporter)
     description = build(builder)
     # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    parts = _checked(Checker(builder, parameters, parts, folder))
+    checker = Checker(builder, parameters, parts, folder)
+    parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
+    doubts.note(checker, parts, description)
     assert mechanism is not None
     _check_poses(parts, mechanism, reporter, folder)
     reporter.done()
@@ -318,6 +361,7 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
     raw = mechanism.get("parameters") if isinstance(mechanism, dict) else None
     raw = raw if isinstance(raw, dict) else {}
     nominal: dict[str, float] = {}
+    quantities: dict[str, str] = {}
     formulas: dict[str, Expression] = {}
     for name, value in raw.items():
         path = ("mechanism", "parameters", name)
@@ -328,14 +372,18 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
             message = f"{name!r} is a word of the expression language; choose another name"
             reporter.report(path, message, at_key=True)
         try:
-            number = read_number(value, Context(units, nominal, [other for other in raw if other not in nominal]))
+            number = read_number(
+                value, Context(units, nominal, [other for other in raw if other not in nominal], quantities)
+            )
         except PydanticCustomError as error:
             reporter.report(path, error.message())
             number = LOST
-        nominal[name] = number.nominal
+        nominal[name] = float(number.nominal)
+        if text := text_of(number.nominal):
+            quantities[name] = text
         if number.expression is not None:
             formulas[name] = number.expression
-    return Context(units, nominal), formulas
+    return Context(units, nominal, quantities=quantities), formulas
 
 
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
@@ -367,6 +415,9 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
 def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
     found = dict(checker.parts)
+    for name in checker.parameters.kinds:
+        for kind in checker.parameters.needed(name, checker.places):
+            checker.kind(("mechanism", "parameters", name), kind)
     found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
     for index, requirement in enumerate(found["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
@@ -429,7 +480,7 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                 assumed = found or poses.default(mechanism.description)
             except StudyError:
                 continue
-            targets.check_poses(parts["targets"], mechanism.drives, assumed, reporter)
+            targets.check_poses(parts["targets"], mechanism, assumed, reporter)
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import json
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
@@ -25,7 +24,7 @@ from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.schema.iso_tolerances import is_class
-from mechdesign.study.text.document import Document, KeyPath, Mark, leaves, plain, read
+from mechdesign.study.text.document import Document, KeyPath, Mark, in_yaml, leaves, plain, read
 
 # Sections whose numbers are read once, when the study is loaded.
 SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")
@@ -251,7 +250,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
     now = dict(leaves(written))
     for keys, new in leaves(wanted):
         if keys in now and new != now[keys]:
-            edits.append((document.values[keys].start, document.values[keys].end, json.dumps(new, ensure_ascii=False)))
+            edits.append((document.values[keys].start, document.values[keys].end, in_yaml(new)))
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
     if "seed" not in written and data["seed"]:

@@ -1,6 +1,7 @@
 """Baselines: `compare` of two folders of results, and `run --verify` of what a manifest says."""
 
 import csv
+import hashlib
 import io
 import json
 from pathlib import Path
@@ -111,6 +112,27 @@ def test_tolerances(folder, results, compared, options, code):
     (folder / "narrow.yaml").write_text("'*.B.x': {rtol: 1e-7}\n")
     done, _ = compared(*options)
     assert done.exit_code == code
+
+
+@pytest.mark.parametrize(
+    ("allowed", "code", "message"),
+    [
+        ("B.x: {atol: 1 um}", 0, ""),
+        ("B.x: {atol: 0.0008 um}", 1, ""),
+        ("B.x: {atol: 1e-4 cm, rtol: 0}", 0, ""),
+        ("B.x: {atol: 1 deg}", 2, "is an angle, where a length is expected"),
+        ("*: {atol: 1 mm}", 2, "is a length, where an angle is expected"),
+        ("B.x: {atol: -1 mm}", 2, "from 0 on"),
+        ("B.x: {atol: 1 foo}", 2, "unknown unit"),
+        ("B.x: {rtol: 1 mm}", 2, "is a length, where a pure number is expected"),
+    ],
+)
+def test_an_absolute_tolerance_has_a_unit(folder, results, compared, allowed, code, message):
+    results("old", motion())
+    results("new", motion(x=(1 / 3 + 0.9e-6, np.nan, 3.0)))
+    (folder / "allowed.yaml").write_text(f"kinematics.motion.{allowed}\n")
+    done, _ = compared("--tolerances", "allowed.yaml")
+    assert (done.exit_code, message in done.stderr) == (code, True)
 
 
 @pytest.mark.parametrize(("allowed", "code"), [(1e9, 2), (0, 1)])
@@ -245,16 +267,39 @@ def test_nothing_to_compare(folder, results, compared):
         ("tool", ["mechdesign"]),
         ("requirements", [{"requirement": "x at most 1"}]),
         ("tables", {"motion.csv": {"columns": [{"name": ["theta"], "unit": "", "meaning": ""}]}}),
+        ("command", []),
+        ("seed", "1"),
+        ("files", {}),
+        ("files", ["motion.csv"]),
+        ("files", {"motion.csv": "no hash"}),
+        ("files", {"motion.csv": 64 * "0", "../slider.yaml": 64 * "0"}),
+        ("overrides", {}),
+        ("all_modes", 1),
     ],
 )
-def test_a_manifest_of_another_hand_is_none(folder, results, compared, key, value):
+def test_a_manifest_of_another_hand_is_none(folder, results, compared, invoke, key, value):
     for side in ("old", "new"):
         results(f"{side}/kinematics", motion())
     path = folder / "new/kinematics/manifest.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {key: value}))
-    done, _ = compared()
-    assert done.exit_code == 2
-    assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+    for done in (compared()[0], invoke("run", "--verify", "new")):
+        assert done.exit_code == 2
+        assert "manifest.json: is not a manifest that mechdesign wrote" in done.stderr
+
+
+def test_verify_compares_which_files_there_are(folder, analysis, invoke):
+    """Another in the manifest, or one less, is told, though every hash is that of its file."""
+    analysis(lambda study, **ignored: answer(files={"notes.txt": "words"}))
+    invoke("kinematics", "slider.yaml", "--no-plots", "--out", "old")
+    path = folder / "old/manifest.json"
+    content = json.loads(path.read_text())
+    (folder / "old/more.txt").write_text("more")
+    more = content["files"] | {"more.txt": hashlib.sha256(b"more").hexdigest()}
+    for files, name in ((more, "more.txt"), ({"motion.csv": content["files"]["motion.csv"]}, "notes.txt")):
+        path.write_text(json.dumps(content | {"files": files}))
+        done = invoke("run", "--verify", "old")
+        assert done.exit_code == 1
+        assert short(csv.DictReader(io.StringIO(done.stdout))) == {(name, "", "bytes")}
 
 
 def test_jobs_give_no_difference_and_a_manifest_is_repeated(tmp_path, monkeypatch, invoke):

@@ -1,6 +1,7 @@
 """`mechdesign docs`: words in the terminal, and where a wrong study leads to."""
 
 import re
+import time
 
 import pytest
 import typer.main
@@ -89,3 +90,15 @@ def test_a_wrong_study_names_the_words_to_look_up_once(folder, invoke):
     assert done.exit_code == 2
     assert done.stderr.splitlines()[-1] == "(mechdesign docs mechanism.joints kinematics kinematics.rates)"
     assert done.stderr.count("mechdesign docs") == 1
+
+
+def test_a_long_word_takes_no_longer_than_a_short_one(invoke):
+    """Looking for the parts of messages in it takes a time in proportion."""
+    from mechdesign.reference import find_messages
+
+    find_messages("crank")
+    begun = time.process_time()
+    assert find_messages("crank" * 4000) == []
+    assert time.process_time() - begun < 2
+    said = "the reference has no 'abc'; 'mechdesign docs' lists what there is"
+    assert find_messages(f"once {said} twice")

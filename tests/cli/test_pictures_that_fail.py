@@ -79,6 +79,7 @@ def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, m
         assert invoke("run", STUDY).exit_code == 130
     out = folder / "results/slider/kinematics"
     assert {path.name for path in out.iterdir()} >= TABLES
+    assert "the run ended before its pictures were written" in (out / "manifest.json").read_text()
     before = os.stat(out / "motion.csv").st_ino
     # They are whole for who wants tables alone, and computed again for who wants pictures too.
     assert "not computed again" in invoke("run", STUDY, "--resume", "--no-plots").stderr

@@ -271,3 +271,23 @@ def test_new_prints_a_study_that_passes_the_check(studies, invoke):
 
 def test_schema_is_json(invoke):
     assert "properties" in json.loads(invoke("schema").stdout)
+
+
+def test_an_allocation_that_is_not_reached_is_no_assembly_that_fails(folder, invoke):
+    # A pin's clearance that is held moves P by up to 0.5 mm, and 0.05 mm are allowed.
+    (folder / "arm.yaml").write_text("""\
+mechanism:
+  links: {ground: {O: [0, 0]}, arm: [O, P, 100]}
+  drives: [arm]
+  sketch: {P: [100, 0]}
+reliability:
+  poses: [{arm: 0}]
+  dimensions: {arm.length: 0.1}
+  clearances: {O: {radial: 0.5}}
+  limits: {P.x: 0.05}
+  methods: analytic
+  allocate: {reliability: 0.99, cost: {arm.length: 1}}
+""")
+    done = invoke("run", "arm.yaml", "--no-plots")
+    assert summary(done) == [("arm", "reliability", "not reached", "3")]
+    assert "name O in 'cost' to have it allocated too" in done.stderr

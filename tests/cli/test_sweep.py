@@ -144,3 +144,13 @@ def test_pictures_and_report(study, invoke):
     assert {path.name for path in (study / "results/press/sweep").iterdir()} == {
         "main_effects.png", "manifest.json", "mechanism.png", "report.html", "report.json", "scatter.png", "sweep.csv",
     }  # fmt: skip
+
+
+def test_words_of_cases_have_letters_beyond_the_first_plane(study, invoke):
+    faces = ["\N{GRINNING FACE}", "\U0001d4b3"]
+    (study / "cases.csv").write_text("\n".join(["name", *faces]))
+    matrix = f"matrix.vary={{name: [{', '.join(faces)}]}}"
+    for given in (["--vary", f"name={','.join(faces)}"], ["--cases", "cases.csv"], ["--set", matrix]):
+        done = invoke("sweep", "press.yaml", *given, "--no-plots")
+        assert done.exit_code == 0, done.stderr
+        assert [row["name"] for row in rows(done.stdout)] == faces

@@ -66,6 +66,14 @@ def test_it_answers_again_after_a_save_and_goes_on_after_a_mistake(folder, watch
     assert process.wait(30) == 0
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_termination_is_no_success(folder, watched, number):
+    process, until = watched("slider.yaml", "kinematics")
+    until("again when")
+    process.send_signal(number)
+    assert process.wait(30) == 128 + number
+
+
 def test_an_input_without_an_end_is_not_read(folder, watched):
     (folder / "path.yaml").write_text(PATH)
     (folder / "angles.csv").symlink_to("/dev/zero")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import comb, factorial
 
 import numpy as np
-from scipy.special import gammaincc, ndtr
+from scipy.special import gammaincc, ndtr, ndtri
 
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
 from mechdesign.analyses.reliability.methods import quasi_monte_carlo as quasi
@@ -69,6 +69,24 @@ def parabola(b: float = 5.0, k: float = 0.5, e: float = 0.1) -> Case:
 def ring(radius: float, dimension: int = 2) -> Case:
     """Outside a circle of the first two variables: every point of it is a design point."""
     return Case(dimension, lambda u: (radius - np.hypot(u[0], u[1]))[None], float(gammaincc(1.0, radius**2 / 2)))
+
+
+def largest(count: int, beta: float) -> Case:
+    """The largest of so many deviations beyond `beta`, to either side: one limit of twice as many design points."""
+    exact = -np.expm1(count * np.log1p(-2 * ndtr(-beta)))
+    return Case(count, lambda u: (beta - np.abs(u).max(axis=0))[None], float(exact))
+
+
+def outliers(count: int, share: float, beta: float) -> Case:
+    """Two of so many parts are outliers of this share, where nothing has a slope; or one more variable is far out."""
+    edge = -ndtri(share)
+
+    def margins(u: Floats) -> Floats:
+        two = 1.5 - (u[:count] > edge).sum(axis=0)
+        return np.stack([two, beta - u[count]])
+
+    within = (1 - share) ** count + count * share * (1 - share) ** (count - 1)
+    return Case(count + 1, margins, float(1 - within * ndtr(beta)))
 
 
 def ends(beta: float) -> Case:

@@ -116,7 +116,8 @@ class FiveBar:
             self.drawn = complex(*rng.uniform([-60, 60], [60, 200]))
             at = np.array([self.drawn])
             with np.errstate(all="ignore"):
-                turns = [(p - o) / (at - p) for p, o in zip(self.pins(at), (self.o1, self.o2), strict=True)]
+                a, b = self.pins(at)
+                turns = [(a - self.o1) / (at - a), (b - self.o2) / (at - b), (at - a) / (at - b)]
                 sines = np.abs(np.sin(np.angle(turns)))
             if np.all(sines > 0.2):
                 return

@@ -150,6 +150,58 @@ def test_where_the_model_is_careless_simulation_makes_it_tighter() -> None:
     assert allocated(result)["lever.length"] == pytest.approx(100 * np.sqrt(np.expm1(s * s)), rel=0.02)
 
 
+UNIFORM = "{{a: {{tolerance: 0.1, distribution: uniform}}, b: {{tolerance: {b}, distribution: uniform}}}}"
+
+
+@pytest.mark.parametrize("asked", [0.9, 0.99, 0.999])
+@pytest.mark.parametrize("price", [1.0, 5.0])
+def test_two_uniform_tolerances_are_as_cheap_as_can_be(asked: float, price: float) -> None:
+    """Sum of two uniform errors of half widths s and t: beyond L with (s + t - L)^2/(4 s t), where s + L > t > s."""
+    dimensions = f"reliability.dimensions={UNIFORM.format(b=0.2)}"
+    cost = f"reliability.allocate={{reliability: {asked}, cost: {{b: {price}}}}}"
+    result = ask(CHAIN, dimensions, cost)
+    ratio = np.linspace(1.0, 4.0, 3001)
+    first = 0.3 / (1 + ratio - 2 * np.sqrt((1 - asked) * ratio))
+    inside = first * ratio - first < 0.3
+    cheapest = (1 / first + price / (first * ratio))[inside].min()
+    found = result.tables["allocation"]["cost_allocated"].sum()
+    assert cheapest * 0.995 < found < cheapest * 1.02
+    confirmation = result.tables["confirmation"]
+    assert confirmation["met"].all()
+    assert confirmation["low"] < asked < confirmation["high"]
+
+
+def test_one_uniform_tolerance_reaches_just_beyond_its_limit() -> None:
+    """Beyond L of the half width t with 1 - L/t."""
+    result = ask(CHAIN, "reliability.dimensions={a: {tolerance: 0.1, distribution: uniform}}",
+                 "reliability.allocate={reliability: 0.98}")  # fmt: skip
+    assert allocated(result)["a"] == pytest.approx(0.3 / 0.98, rel=3e-3)
+
+
+def test_what_is_held_and_cannot_break_the_limits_is_no_reason_to_refuse() -> None:
+    """A pin on the rim of its hole leaves 0.01 of the limit; by normal errors of its variance it would break it."""
+    text = LEVER.replace("P.x: 0.3", "P.x: 0.31") + (
+        "  dimensions: {lever.length: {tolerance: 0.2, distribution: uniform}}\n"
+        "  clearances: {O: {radial: 0.3, pin: contact, link: lever}}\n"
+    )
+    result = ask(text)
+    assert not result.failed
+    assert 0.01 < allocated(result)["lever.length"] < 0.05
+    assert result.tables["confirmation"]["low"] < 0.99 < result.tables["confirmation"]["high"]
+
+
+def test_the_advice_where_it_cannot_be_reached_works() -> None:
+    text = LEVER.replace("theta: 0}", "theta: 90}").replace("P.x: 0.3", "P.x: 0.005") + (
+        "  dimensions: {lever.length: 0.2}\n  clearances: {O: {fit: 20 H7/g6, link: lever}}\n"
+    )
+    why = ask(text).failed
+    assert "O (100%); name O in 'cost' to have it allocated too, with 'radial' in place of the fit of O" in why
+    with pytest.raises(StudyError, match="a fit is not allocated"):
+        ask(text, "reliability.allocate={reliability: 0.99, cost: {O: 1}}")
+    radial = "reliability.clearances={O: {radial: 0.02, link: lever}}"
+    assert not ask(text, "reliability.allocate={reliability: 0.99, cost: {O: 1}}", radial).failed
+
+
 def test_every_pose_reaches_it() -> None:
     sweep = "reliability.sweep={theta: {from: 0, to: 90, step: 5}}"
     result = ask(LEVER + "  dimensions: {lever.length: 0.2, theta: 0.2}\n", "reliability.poses=", sweep)

@@ -207,3 +207,11 @@ def test_design_points_leave_no_wide_gap_on_a_circle() -> None:
         points = find(limit_states.ring(4.8, 6).problem, np.random.default_rng(seed)).u
         turns = np.sort(np.arctan2(points[:, 1], points[:, 0]))
         assert np.diff([*turns, turns[0] + 2 * np.pi]).max() < np.radians(85)
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 16])
+def test_dozens_of_equal_design_points_of_one_limit_are_all_found(count: int) -> None:
+    points = find(limit_states.largest(count, 5.5).problem, np.random.default_rng(count))
+    signs = np.round(points.u / 5.5)
+    assert np.abs(points.u / 5.5 - signs).max() < 0.02
+    assert len(np.unique(signs, axis=0)) == len(signs) == 2 * count

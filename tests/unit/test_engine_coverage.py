@@ -28,6 +28,8 @@ CASES = {
     "four_branches_in_one": limit_states.four_branches(7, together=True),
     "parabola": limit_states.parabola(),
     "ring": limit_states.ring(4.0),
+    "largest_of_eight": limit_states.largest(8, 5.55),
+    "two_outliers_of_three": limit_states.outliers(3, 0.002, 4.5),
     "ends": limit_states.ends(4.0),
     "two_uniforms": limit_states.uniforms(2, 1.95),
 }

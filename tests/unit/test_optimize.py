@@ -175,11 +175,13 @@ PLATFORM = (
 
 def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
     with pytest.raises(StudyError, match="the sketch cannot be assembled"):
-        study_of(FOUR_BAR, "mechanism.parameters.r=60")
+        study_of(FOUR_BAR.replace("r: 30", "r: 60"))
     designs = mechdesign.optimize(study_of(FOUR_BAR)).tables["designs"]
+    alone = mechdesign.kinematics(study_of(FOUR_BAR, "mechanism.parameters.r=60"))
     poses = mechdesign.kinematics(study_of(FOUR_BAR, "mechanism.parameters.r=60", "mechanism.sketch.A=[40, 45]"))
     assert designs["feasible"].all()
     assert designs["kinematics.P.y"][1] == pytest.approx(poses.tables["motion"]["P.y"].min())
+    assert alone.tables["motion"]["P.y"] == pytest.approx(poses.tables["motion"]["P.y"])
 
 
 def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:

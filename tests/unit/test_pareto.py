@@ -140,3 +140,26 @@ def test_same_seed_same_bits():
     one, two, other = (mechdesign.optimize(study, seed=seed, jobs=jobs).main for seed, jobs in ((4, 1), (4, 2), (5, 1)))
     assert one["kinematics.P.x"].tobytes() == two["kinematics.P.x"].tobytes()
     assert one["kinematics.P.x"].tobytes() != other["kinematics.P.x"].tobytes()
+
+
+def test_a_front_that_still_grows_says_so_and_one_at_its_end_does_not():
+    text = """\
+mechanism:
+  parameters: {x1: 0.5, x2: 0.5, x3: 0.5, x4: 0.5, g: 1 + 3*(x2 + x3 + x4), f2: g*(1 - sqrt(x1/g))}
+  links: {ground: {O: [0, 0]}, arm: [O, P, 10]}
+  drives: [arm]
+  sketch: {P: [10, 0]}
+optimize:
+  method: pareto
+  minimize: [x1, f2]
+  evaluations: 400
+  variables: {x1: &part {from: 0, to: 1}, x2: *part, x3: *part, x4: *part}
+"""
+    for evaluations, grows in ((300, True), (6000, False)):
+        result = mechdesign.optimize(study_of(text, f"optimize.evaluations={evaluations}"))
+        assert any("the front still grows" in words for words in result.warnings) is grows
+        values = np.column_stack([result.tables["pareto"][name] for name in ("x1", "f2")])
+        x, y = values[np.argsort(values[:, 0])].T
+        # Between the front f2 = 1 - sqrt(f1) and the corner (1, 1) lies an area of 2/3.
+        area = np.sum(np.diff(np.append(x, 1.0)) * (1 - np.minimum(y, 1)))
+        assert (area < 0.995 * 2 / 3) == grows

@@ -151,3 +151,19 @@ def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
     assert np.isfinite(table["failure"][table["method"] == "analytic"]).all()
     assert np.isfinite(table["failure"][table["method"] == method]).tolist() == [True, True, True, False]
     assert result.interrupted.endswith(f"analytic, {method}")
+
+
+@pytest.mark.parametrize("method", ["form", "importance_sampling", "monte_carlo", "analytic"])
+def test_a_limit_of_the_smallest_number_there_is(method):
+    """Every sample breaks it; numbers beyond all bounds on the way are no warnings."""
+    text = (
+        "mechanism: {links: {ground: {O: [0, 0]}, upper: [O, A, 120], lower: [A, P, 90]},"
+        " drives: {q1: {angle: upper}, q2: {angle: lower}}}\n"
+        "kinematics: {poses: [{q1: 30, q2: 60}]}\n"
+        "reliability: {dimensions: {upper.length: {tolerance: 0.1}}, limits: {P.x: 5.0e-324}, samples: 2000,"
+        f" methods: [{method}]}}\n"
+    )
+    found = mechdesign.reliability(mechdesign.load(text=text))
+    failure = found.tables["reliability"]["failure"]
+    # Whoever finds no design point says so.
+    assert failure[0] == 1 or (np.isnan(failure[0]) and "no design point" in found.warnings[0])

@@ -151,3 +151,15 @@ def test_odd_overrides(override, load):
     with pytest.raises(StudyError) as caught:
         load(override)
     assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize(
+    "word", ["a\N{GRINNING FACE}b", "\U0001d4b3", "\u2028x", "\x7f\x85", "\U000e0041", "\\ud83d\\ude00"]
+)
+def test_a_mapping_has_the_letters_that_it_has(tmp_path, word):
+    """Also those that JSON writes as pairs of surrogates, and breaks of lines, alone and in lists and keys."""
+    (tmp_path / "study.yaml").write_text(STUDY)
+    study = mechdesign.load(tmp_path / "study.yaml", {"name": word, "mechanism.parameters": {"r": 30, "𝒳": 2}})
+    assert study.name == word
+    assert study.parameters.nominal == {"r": 30, "𝒳": 2}
+    assert mechdesign.load(tmp_path / "study.yaml", study.overrides).name == word

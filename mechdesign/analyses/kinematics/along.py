@@ -24,8 +24,10 @@ from mechdesign.results import POSES_ONLY, Column
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
 FORWARD, INVERSE, _PACE = "forward singularity", "inverse singularity", "pace"
-# Places this near to a pose (in rows) or to zero (as a part of the range of what is swept) are at it.
+# Places this near to a pose (in rows) or to zero (as a part of the range of what is swept) are at it; so near to a pose
+# a zero that is only touched may be at it.
 AT_ROW, AT_GIVEN_PLACE = 1e-9, 1e-12
+NEAR_ROW = 1e-5
 # A gap shorter than this part of the motion is rounding.
 GAP = 1e-11
 
@@ -215,6 +217,11 @@ class Along:
         first[zeros.line[order]] = zeros.place[order]
         value = np.where(low > 0, low, -high)
         zero = np.isfinite(first)
+        # A zero that is only touched is known to the root of rounding: at a pose beside it that is one, it is there.
+        lines = np.flatnonzero(zero & (np.abs(first - np.round(first)) <= NEAR_ROW))
+        at_row = self.functions.at(lines, np.round(first[lines]))[self._names.index(name)]
+        lines = lines[np.abs(at_row) <= still]
+        first[lines] = np.round(first[lines])
         return np.where(zero, 0.0, value), np.where(zero, first, np.where(low > 0, places[-1], places[1]))
 
     def mean(self, name: str, power: int = 1) -> Floats:

@@ -22,15 +22,14 @@ from mechdesign.analyses.kinematics.limits import (
     hidden,
     limits_of,
     limits_table,
-    place_in_words,
+    passed,
 )
 from mechdesign.analyses.kinematics.loops import Toggle, loops_table, toggles_of, toggles_table
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, entry, motion_question
 from mechdesign.analyses.kinematics.passage import Mark, Passage, pass_over
 from mechdesign.analyses.kinematics.special_poses import special_poses
-from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, judge_failures, pose_in_words
-from mechdesign.errors import Problem, StudyError
-from mechdesign.mechanism import Reason
+from mechdesign.analyses.poses import POSES_AT_ONCE, Shown, invalid_in_words, judge_failures, pose_in_words
+from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
@@ -75,7 +74,7 @@ def kinematics(
     passage = pass_over(question, _marks, progress, jobs)
     motion, marks = passage.motion, passage.marks
     warnings, failed = judge_failures(study, poses, passage.reason)
-    warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question)
+    warnings += _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
     warnings += _untargeted(question, marks)
     loops = four_bars(study.mechanism)
     along = along_of(question, loops=loops, toggles=True, passages=True)
@@ -85,7 +84,7 @@ def kinematics(
     if along is not None:
         limits, toggles = limits_of(along), toggles_of(loops, along)
         tables["limits"] = limits_table(limits, along)
-        warnings += hidden(limits, along, np.equal(passage.reason, 0)) + change_points(along)
+        warnings += hidden(limits, along, np.equal(passage.reason, 0)) + passed(limits, along) + change_points(along)
     if poses.followed and (along is None or along.functions.unresolved.any()):
         warnings.append(_unfollowed(poses))
     if loops:
@@ -130,11 +129,7 @@ def along_of(
 
 def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.int8]) -> tuple[Scope, Scope]:
     """What tables say of the motion as a whole, and those with a row a pose."""
-    bad, missing = int(np.count_nonzero(reason)), []
-    if bad:
-        counts = {kind.text: int(np.count_nonzero(reason == kind)) for kind in Reason if kind}
-        kinds = ", ".join(f"{count} {text}" for text, count in counts.items() if count)
-        missing.append(f"{bad} of {len(reason)} poses are not valid ({kinds})")
+    missing = [invalid_in_words(reason)]
     if along is not None and not along.whole[0]:
         missing.append(f"{100 * (1 - along.present[0]):.3g} % of the motion is missing")
 
@@ -143,9 +138,11 @@ def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.
         if own is None or own.curve.spent[0] or not own.follows(name):
             return None
         value, place = own.worst(name, sign, absolute=absolute)
-        return float(value[0]), place_in_words(own, float(place[0]))
+        given = question.poses.along(np.array([0]), place).values
+        moving = [question.poses.swept] if question.poses.swept is not None else given
+        return float(value[0]), ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
 
-    whole = Scope(along is None, " and ".join(missing))
+    whole = Scope(along is None, " and ".join(filter(None, missing)))
     return whole, dataclasses.replace(whole, worst=worst)
 
 
@@ -341,6 +338,21 @@ def _astray(question: MotionQuestion) -> list[str]:
         f"{off} of {poses.count - 1} steps of the motion do not go where the rates of "
         f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
         "drawn; 'speed' gives those of a point along its path"
+    ]
+
+
+def _corners(question: MotionQuestion) -> list[str]:
+    """A warning where a path that is passed with a speed has corners: its rates there are those behind them."""
+    poses = question.poses
+    if question.section.speed is None or not poses.motion:
+        return []
+    rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
+    if not len(rows):
+        return []
+    return [
+        f"the path has corners at {counted(len(rows), 'pose')}, the first: "
+        f"{pose_in_words(question.study, poses, int(rows[0]))}; velocities there are those of the segment that begins, "
+        "and the acceleration that a corner takes is in no row; a spline has no corners"
     ]
 
 

@@ -83,10 +83,24 @@ def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[str]:
     ]
     if not places:
         return []
-    more = f" and {len(places) - MOST_NAMED} more" if len(places) > MOST_NAMED else ""
+    return [f"the motion ends between poses that are both valid, at {_first(places)}: see the limits"]
+
+
+def passed(limits: Sequence[Limit], along: Along) -> list[str]:
+    """A warning where the motion passes a forward singularity."""
+    places = [place_in_words(along, limit.place) for limit in limits if limit.end is None]
+    if not places:
+        return []
     return [
-        f"the motion ends between poses that are both valid, at {'; '.join(places[:MOST_NAMED])}{more}: see the limits"
+        f"the motion passes a singularity at {_first(places)}: the drives hold nothing there, and a made mechanism may "
+        "go on in another assembly; see the limits"
     ]
+
+
+def _first(places: Sequence[str]) -> str:
+    """The first of some places, and how many more there are."""
+    more = f" and {len(places) - MOST_NAMED} more" if len(places) > MOST_NAMED else ""
+    return "; ".join(places[:MOST_NAMED]) + more
 
 
 def change_points(along: Along) -> list[str]:

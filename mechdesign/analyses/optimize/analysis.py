@@ -11,9 +11,10 @@ import numpy as np
 import yaml
 
 from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.look import ask
 from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
-from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.optimize.evaluation import Evaluator, missing
 from mechdesign.analyses.optimize.explorer import Explorer
 from mechdesign.analyses.optimize.goals import goals_of
 from mechdesign.analyses.optimize.judge import Designs, Judge
@@ -49,6 +50,8 @@ from mechdesign.study.variants import changed_data, rewritten, variant
 MAX_KEPT_ROWS = 10_000_000
 # Reasons of infeasible designs that are reported one by one.
 MAX_REASONS = 10
+# Designs tie in a goal where it differs by no more, in its unit or as a part of its size.
+TIE = 1e-12
 # Poses between two listed ones at which it is looked whether an optimum can go from one to the other.
 BETWEEN = 100
 
@@ -98,6 +101,7 @@ def optimize(
     if section.method == "pareto":
         table, marked["knee"] = pareto.pareto_table(designs)
         tables.insert(0, table)
+        doubts += tuple(pareto.doubts(designs, budget))
     files, wrong = optimum_files(study, designs, marked)
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubts, *_warnings(evaluator, designs), *wrong)
@@ -184,6 +188,14 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[str]:
         yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
     if len(reasons) > MAX_REASONS:
         yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
+    for goal, values in zip(designs.goals, designs.values[designs.feasible].T, strict=True):
+        if len(values) > 1 and np.ptp(values) <= TIE * max(1.0, np.abs(values).max()):
+            yield (f"all {len(values)} feasible designs tie: {goal.name} is {values[0]:.6g} in each of them; a goal of "
+                   "magnitudes says abs: true")  # fmt: skip
+    for goal in [each for each in designs.goals if each.unassembled]:
+        optimum = ask(variant(evaluator.study, designs.numbers(designs.best)), goal.command)
+        if part := missing(goal, optimum):
+            yield f"{goal.name} of the optimum is that of a part of the motion: {part}"
     if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
     for each, error in designs.errors.items():

@@ -16,9 +16,10 @@ from mechdesign.analyses.kinematics.along import Along
 from mechdesign.analyses.kinematics.analysis import A_ROW_A_POSE
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of
+from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, unit_of
 from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
 from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.analysis import index_meanings
 from mechdesign.analyses.workspace.contained import fitting_scale
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
 from mechdesign.analyses.workspace.ranged import Ranged
@@ -29,6 +30,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import Result
 from mechdesign.rows import Chosen, UnknownColumnError, choose
 from mechdesign.study import Study
+from mechdesign.study.text.units import Amount, QuantityError
 from mechdesign.study.variants import faults, follows, variant
 
 NO_REGION = "nothing of the workspace can be reached"
@@ -97,6 +99,8 @@ class Evaluator:
         # Outputs whose extremes are asked, and columns whose worst value counts between the poses, too.
         self._outputs: set[str] = set()
         self._columns_between: set[str] = set()
+        # Goals with their bounds in the unit of their column.
+        self._bounded: dict[Goal, Goal] = {}
         self._regional = [each for each in self.goals if each.regional]
         whole = [each for each in self._regional if each.shape is None]
         self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
@@ -109,10 +113,11 @@ class Evaluator:
             one_by_one |= isinstance(self.questions[0].field, Ranged)
             self._regions_together = not one_by_one and all(batched(each.column) for each in whole)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
-        problems = [problem for command in commands for problem in self._look(command)]
+        problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
         if problems:
             # A condition of two bounds would be named twice.
             raise StudyError([*dict.fromkeys(problems)])
+        self.goals = tuple(self._bounded.get(each, each) for each in self.goals)
         self._poses = {command: stacked.poses_of(study, command) for command in self._together}
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
@@ -145,6 +150,17 @@ class Evaluator:
             self.squares.clear()
             self.layout = Layout(self.goals, {}, {})
 
+    def _misfits(self) -> Iterator[Problem]:
+        """Bounds that are of another kind than the number of the workspace, or the expression, that they bound."""
+        meanings = index_meanings(self.study, self.questions[0]) if self.questions else {}
+        units = {each: meanings[each.column][0] for each in self._regional if each.column in meanings}
+        units |= {each: unit for each in self.goals if each.expression and (unit := unit_of(self.study, each.column))}
+        for each, unit in units.items():
+            try:
+                Amount.of(each.bound).within(unit)
+            except QuantityError as error:
+                yield self.study.problem(str(error), *self._keys.get(each, ()))
+
     def _look(self, command: str) -> Iterator[Problem]:
         """Find the tables of a command's goals, before anything is computed but the study's own design."""
         goals = [each for each in self.goals if each.command == command and not each.regional]
@@ -161,39 +177,43 @@ class Evaluator:
             stack = stacked.tables(self.study, command, stacked.TABLES[command], poses, columns=columns)
             for each in list(goals):
                 with suppress(UnknownColumnError):
-                    chosen = self._count(each, stack.result, stack.along)
+                    goal, chosen = self._count(each, stack.result, stack.along)
                     goals.remove(each)
                     if chosen.table.name == "extremes":
                         self._outputs.update(chosen.table["output"][chosen.counts].tolist())
                     elif chosen.table.name in A_ROW_A_POSE and each.gate and not each.where:
                         self._columns_between.add(chosen.column)
                     if together:
-                        self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(each)
+                        self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(goal)
                     else:
-                        self._alone.setdefault(command, []).append(each)
+                        self._alone.setdefault(command, []).append(goal)
         if not goals:
             return
-        self._alone.setdefault(command, []).extend(goals)
         # Where the study's own design has no such result, other designs may.
         with suppress(AssemblyError):
             result = look(self.study, command)
-            for each in goals:
+            for k, each in enumerate(goals):
                 try:
-                    self._count(each, result)
+                    goals[k], _ = self._count(each, result)
                 except UnknownColumnError as error:
                     yield self.study.problem(str(error), *self._keys.get(each, ()))
+        self._alone.setdefault(command, []).extend(goals)
 
-    def _count(self, each: Goal, result: Result, along: Along | None = None) -> Chosen:
-        """Note how many rows a goal is the worst of, or the root mean square, by the study's own design."""
+    def _count(self, each: Goal, result: Result, along: Along | None = None) -> tuple[Goal, Chosen]:
+        """A goal with its bound in the unit of its column.
+
+        How many rows it is the worst of, or the root mean square, by the study's own design, is noted.
+        """
         chosen = choose(result, each.column, dict(each.where))
         if chosen.missing:
             raise UnknownColumnError(chosen.missing)
+        self._bounded[each] = each = replace(each, bound=chosen.bound(each.bound))
         judgement = each.judge(result, 1, along)
         if judgement.squares:
             self.squares.add(each)
         if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
             self._rows[each] = judgement.rows.size
-        return chosen
+        return each, chosen
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -292,7 +312,7 @@ class Evaluator:
             other = self._needed(other)
             for command, goals in self._alone.items():
                 result = ask(other, command)
-                partly = [not each.unassembled and _missing(each, result) for each in goals]
+                partly = [not each.unassembled and missing(each, result) for each in goals]
                 values = [batch.judge(each, result, row) for each in goals]
                 if result.failed or any(partly) or np.isnan(values).any():
                     return self._pose_reason(batch, k, other, command) or (BETWEEN if any(partly) else "")
@@ -352,10 +372,10 @@ class _Batch:
         self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
 
 
-def _missing(each: Goal, result: Result) -> bool:
-    """Whether a part of the motion that a goal is of is not valid."""
-    scope = choose(result, each.column, dict(each.where)).table.scope
-    return scope is not None and bool(scope.missing)
+def missing(goal: Goal, result: Result) -> str:
+    """Which poses or parts of the motion that a goal is of are not valid, in words; empty where all are."""
+    scope = choose(result, goal.column, dict(goal.where)).table.scope
+    return scope.missing if scope is not None else ""
 
 
 def _first(reason: NDArray[np.int8]) -> Ints:

@@ -20,6 +20,7 @@ from mechdesign.rows import Chosen, choose, worst
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Condition, Containment, OptimizeSection
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.units import text_of
 
 # A shape that fits but for this part of its size is contained.
 ROUNDING = 1e-9
@@ -129,9 +130,9 @@ class Judgement(NamedTuple):
     values : ndarray, shape (designs,)
         The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
-        The signed rows that count, then of a condition the worst between them; None where these are not as many in each design. Of a
-        root mean square over targets, where the result has the motion, errors whose squares have about its square as
-        their sum.
+        The signed rows that count, then of a condition the worst between them; None where these are not as many in each
+        design. Of a root mean square over targets, where the result has the motion, errors whose squares have about its
+        square as their sum.
     squares : bool
         Whether the rows are such errors.
     """
@@ -199,7 +200,7 @@ def bounds_of(condition: Condition | Containment) -> Iterator[Goal]:
     _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
         if bound is not None:
-            name = f"{condition.name} {'at most' if upper else 'at least'} {bound:g}"
+            name = f"{condition.name} {'at most' if upper else 'at least'} {text_of(bound) or f'{bound:g}'}"
             where = tuple(condition.where.items())
             allowed = condition.unassembled is not None
             yield Goal(name, command, column, upper, condition.abs, where, bound, allowed, expression, gate=True)

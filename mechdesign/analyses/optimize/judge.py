@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
-from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, unit_of
+from mechdesign.analyses.optimize.goals import Goal, goals_of, unit_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube
 from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
@@ -198,7 +198,8 @@ class Judge:
     ) -> None:  # fmt: skip
         assert study.optimize is not None
         self.study, self.progress, self.layout = study, progress, evaluator.layout
-        self.goals, self.conditions = tuple(goals_of(study.optimize)), tuple(conditions_of(study.optimize))
+        count = len(goals_of(study.optimize))
+        self.goals, self.conditions = evaluator.goals[:count], evaluator.goals[count:]
         self._names = tuple(study.optimize.variables)
         self._squares, self._compute, self._journal = evaluator.squares, compute, journal
         self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mechdesign.analyses.optimize.explorer import Explorer, Spent
@@ -18,6 +20,9 @@ SMALLEST_FRONT_POPULATION = 8
 LARGEST_FRONT_POPULATION = 200
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
 DESIGN_DISTANCE = 1e-4
+# A front whose hypervolume grows by more than this part in the last tenth of the evaluations is not at its end; of so
+# many goals the volume is computed at most.
+STILL_GROWING, MAX_VOLUME_GOALS = 2e-3, 4
 
 
 def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
@@ -124,6 +129,28 @@ def crowding(values: Floats) -> Floats:
     from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
 
     return np.asarray(calc_crowding_distance(values) * values.shape[1])
+
+
+def doubts(designs: Designs, evaluations: int) -> Iterator[str]:
+    """A warning of a front whose hypervolume still grows in the last tenth of its evaluations.
+
+    The volume is that between the front and its worst corner, each goal in parts of the front's extent.
+    """
+    from pymoo.indicators.hv import HV
+
+    if len(designs.goals) > MAX_VOLUME_GOALS:
+        return
+    rows = np.flatnonzero(designs.feasible)
+    values = designs.values[rows] * [1 if goal.smallest else -1 for goal in designs.goals]
+    last = values[front(values)]
+    low, span = last.min(axis=0), np.ptp(last, axis=0)
+    shares = (values - low) / np.where(span > 0, span, 1.0)
+    volume = HV(ref_point=np.ones(len(designs.goals)))
+    before, whole = (volume(part) if len(part) else 0.0 for part in (shares[rows < 0.9 * len(designs)], shares))
+    growth = 1 - before / whole if whole > 0 else 0.0
+    if growth > STILL_GROWING:
+        yield (f"the front still grows: its hypervolume by {100 * growth:.2g} % in the last tenth of the evaluations; "
+               f"allow more, e.g. optimize.evaluations: {4 * evaluations}")  # fmt: skip
 
 
 def pareto_table(designs: Designs) -> tuple[Table, int]:

@@ -23,6 +23,7 @@ from mechdesign.analyses.reliability.cheapest import (
     Tolerance,
     ToleranceModel,
     cheapest,
+    distance,
     tolerances,
 )
 from mechdesign.analyses.reliability.engine.problem import Estimate
@@ -36,14 +37,19 @@ from mechdesign.study.schema.variation import Clearance, Dimension
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import rewritten
 
-# How often the model's target is corrected.
-_MAX_ROUNDS = 5
+# How often the model's target is corrected, and the part of a bracket that each correction leaves out at least.
+_MAX_ROUNDS = 14
+_BRACKET_PART = 0.1
 # Expected failures from which on the study's own samples confirm them.
 _ENOUGH_FAILURES = 100
 # Relative precision by which `auto` confirms failures, where the study does not say.
 _PRECISION = 0.1
+# Share of the failures asked that a simulation which sees none is counted for at most.
+_UNSEEN = 0.01
 # A pose holds the tolerances back from this share of the failures allowed on.
 _ACTIVE = 0.99
+# Share of the variance from which on what is held is to blame.
+_HELD_SHARE = 0.005
 # Largest share of the variance that counts as none.
 _NO_SHARE = 1e-12
 # A limit of 0 weighs as much as this one.
@@ -65,14 +71,17 @@ class _Round:
         """Poses that fail more often than asked, beyond what chance explains."""
         return np.array([estimate.low > asked for estimate in self.simulated])
 
-    def corrected(self, asked: float) -> Floats:
-        """Failures that the model may have so that simulation has those asked."""
-        low, found, most = (np.array([getattr(e, name) for e in self.simulated]) for name in ("low", "failure", "high"))
-        idle = (most < asked) & (self.analytic > _ACTIVE * self.allowed)
+    def idle(self, asked: float) -> Flags:
+        """Poses that fail less often than asked, beyond what chance explains, though the model holds them back."""
+        often = np.array([estimate.high >= asked and estimate.failure > 0 for estimate in self.simulated])
+        return np.asarray(~often & (self.analytic > _ACTIVE * self.allowed))
+
+    def distances(self, asked: float) -> tuple[Floats, Floats]:
+        """Of the limits by the model, and by simulation less the one asked, see `cheapest.distance`, by pose."""
         # Where few failures are seen, or none, the interval's end keeps the correction on the safe side.
-        found = np.where(idle & (most > 2.0 * low), most, found)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(self.missed(asked) | idle, self.analytic * asked / found, self.allowed))
+        seen = [min(e.high, _UNSEEN * asked) if not e.failure else e.high if 2.0 * e.low < e.high < asked else e.failure
+                for e in self.simulated]  # fmt: skip
+        return distance(self.analytic), distance(np.array(seen)) - float(distance(np.array(asked)))
 
     def worst(self) -> tuple[str, str, str]:
         """In words: the pose that fails most often, its reliability by the model, and by simulation."""
@@ -100,28 +109,30 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     failed = ""
     while len(rounds) < _MAX_ROUNDS:
         scales = cheapest(model, allowed)
-        if scales is None:
-            failed = _unreachable(model, allowed, asked)
-            break
         scales[free] = [found[k].rounded(float(scales[k])) for k in free.tolist()]
         analytic = model.failures(scales, range(len(task.settings)))
-        rounds.append(_Round(model, scales, allowed, analytic, _simulated(model, scales, method), method))
-        # What has no influence to the first order may have one that only simulation sees.
-        idle = _idle(model, scales) & (scales[free] > 1.0)
-        if idle.any() and rounds[-1].missed(asked).any():
-            model = replace(model, widest=np.where(idle, 1.0, model.widest))
-            continue
-        allowed = rounds[-1].corrected(asked)
-        if (allowed == rounds[-1].allowed).all():
+        last = _Round(model, scales, allowed, analytic, _simulated(model, scales, method), method)
+        rounds.append(last)
+        missed = last.missed(asked)
+        if missed.any() and (scales[free] < TIGHTEST * 1.001).all():
+            failed = _unreachable(last, asked)
             break
-    if not rounds:
-        return Result("allocation", {}, failed=failed)
+        # What has no influence to the first order may have one that only simulation sees.
+        without = _idle(model, scales) & (scales[free] > 1.0)
+        if without.any() and missed.any():
+            model = replace(model, widest=np.where(without, 1.0, model.widest))
+            continue
+        wrong = missed | last.idle(asked)
+        if not wrong.any():
+            break
+        allowed = np.where(wrong, _corrected(rounds, asked), allowed)
     met = [each for each in rounds if not each.missed(asked).any()]
+    if not met and failed:
+        return Result("allocation", {}, failed=failed)
     last = min(met, key=lambda each: model.cost(np.log(each.scales[free]))[0]) if met else rounds[-1]
     where, by_model, by_simulation = last.worst()
-    if met:
-        failed = ""
-    elif not failed:
+    failed = ""
+    if not met:
         failed = (
             f"allocate: the reliability asked, {reliability:.15g}, is not confirmed at {where}: with tolerances for "
             f"which the analytic model says {by_model}, {method} finds {by_simulation}"
@@ -143,6 +154,27 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last, reliability)}
     notes += _ends(replace(last, model=model))
     return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others})
+
+
+def _corrected(rounds: Sequence[_Round], asked: float) -> Floats:
+    """Failures that the model may have at each pose so that simulation has those asked.
+
+    Between the widest tolerances that keep them and the tightest that do not by the rule of the secant; before both are
+    known, simulation is taken to follow the model.
+    """
+    from scipy.special import ndtr
+
+    points = np.array([each.distances(asked) for each in rounds])
+    wanted = np.empty(points.shape[2])
+    for k, (model, excess) in enumerate(zip(points[:, 0].T, points[:, 1].T, strict=True)):
+        kept, broken = model[excess >= 0], model[excess < 0]
+        wanted[k] = model[-1] - excess[-1]
+        if len(kept) and len(broken) and kept.min() > broken.max():
+            high, low = kept.min(), broken.max()
+            above, below = excess[model == high][-1], excess[model == low][-1]
+            part = np.clip(below / (below - above), _BRACKET_PART, 1.0 - _BRACKET_PART)
+            wanted[k] = low + part * (high - low)
+    return np.asarray(2.0 * ndtr(-np.exp(wanted)))
 
 
 def _simulated(model: ToleranceModel, scales: Floats, method: str) -> list[Estimate]:
@@ -244,41 +276,48 @@ def _plain(failure: float) -> str:
     return f"{1.0 - failure:.{digits}f}".rstrip("0").rstrip(".")
 
 
-def _unreachable(model: ToleranceModel, allowed: Floats, asked: float) -> str:
-    """Why the tightest tolerances do not do, and what they reach."""
+def _unreachable(last: _Round, asked: float) -> str:
+    """Why the tightest tolerances do not do, what they reach, and what would mend it."""
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
     from mechdesign.analyses.reliability.probability import failure_probability
 
-    tightest = model.scales(model.tightest)
-    failures = model.failures(tightest, range(len(allowed)))
-    worst = int(np.argmax(failures / allowed))
-    question = model.task.settings[worst].question
-    pose, share = model.task.settings[worst].pose, _shares(model, tightest)[worst]
-    held = [
-        f"{tolerance.name} ({share[k]:.0%})"
-        for k, tolerance in sorted(enumerate(model.tolerances), key=lambda pair: -share[pair[0]])
-        if tolerance.cost is None and share[k] > 0.005
-    ]
-    target = f"{_plain(asked)}"
-    if allowed[worst] < asked:
-        target += f" (for which the analytic model, as simulation shows, has to reach {_plain(allowed[worst])})"
+    model, tightest = last.model, last.scales
+    worst = int(np.argmax([estimate.failure for estimate in last.simulated]))
+    setting = model.task.settings[worst]
+    question, pose, share = setting.question, setting.pose, _shares(model, tightest)[worst]
     linear = model.linear(tightest).take([pose])
     centred = failure_probability(linear.covariance()[0], question.bands, question.discs)
+    held = [k for k, tolerance in enumerate(model.tolerances) if tolerance.cost is None and share[k] > _HELD_SHARE]
     if not question.kept(np.zeros((len(question.channels), 1))).all():
         reason = "the nominal value lies outside its limits"
-        held = []
-    elif linear.shift().any() and centred <= allowed[worst]:
+    elif linear.shift().any() and centred <= asked:
         reason = "the mean errors, which the width of no tolerance changes, break the limits by themselves"
-        held = []
     elif held:
-        reason = f"what is held breaks the limits by itself: {', '.join(held)}"
+        held.sort(key=lambda k: -share[k])
+        named = ", ".join(f"{model.tolerances[k].name} ({share[k]:.0%})" for k in held)
+        reason = f"what is held breaks the limits by itself: {named}{_advice(model, tightest, held, worst, asked)}"
     else:
         reason = "they would have to shrink to nothing"
     return (
-        f"allocate: a reliability of {target} cannot be reached at {model.task.where(pose)}: with all tolerances at "
-        f"{TIGHTEST:g} times the given ones it is {_plain(failures[worst])}; {reason}"
-        + ("; a clearance that 'cost' names is allocated too" if held else "")
+        f"allocate: a reliability of {_plain(asked)} cannot be reached at {model.task.where(pose)}: with all "
+        f"tolerances at {TIGHTEST:g} times the given ones it is {_plain(last.simulated[worst].failure)} by "
+        f"{last.method} and by the analytic model {_plain(last.analytic[worst])}; {reason}"
     )
+
+
+def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst: int, asked: float) -> str:
+    """What to write so that clearances and loads that are held are allocated too, if that is enough."""
+    section, tolerances = model.task.study.reliability, model.tolerances
+    assert section is not None
+    free = [k for k in held if tolerances[k].kind != "measured"]
+    names = [tolerances[k].name for k in free]
+    fits = [name for name in names if name in section.clearances and section.clearances[name].fit is not None]
+    scales = tightest.copy()
+    scales[free] = TIGHTEST
+    if not free or model.failures(scales, [worst])[0] > asked:
+        return ""
+    instead = f", with 'radial' in place of the fit of {', '.join(fits)}" if fits else ""
+    return f"; name {', '.join(names)} in 'cost' to have it allocated too{instead}"
 
 
 def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.rates import DriveRates, drive_rates
-from mechdesign.analyses.poses import SolvedPoses, judge_failures, solve_poses, study_poses
+from mechdesign.analyses.poses import SolvedPoses, judge_failures, of_poses, solve_poses, study_poses
 from mechdesign.analyses.reliability import methods, sobol, tables
 from mechdesign.analyses.reliability.allocation import allocate
 from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, reached
-from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, nominal_values
+from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
 from mechdesign.analyses.reliability.methods.auto import FACTOR, disagree
 from mechdesign.analyses.reliability.question import ask, unsaid
 from mechdesign.analyses.reliability.simulation import Setting, forward_plan
@@ -35,6 +35,8 @@ from mechdesign.study.schema.methods import METHODS
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048
+# Distance of a dead centre, in standard deviations of its margin, up to which one is told: one mechanism in a million.
+_NEAR = 4.75
 # Listed poses that get a density of their own.
 _DENSITIES = 12
 # Poses that give the same coordinates, and the rates of their drives.
@@ -103,10 +105,10 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     sampled = next((each.sums for each in found if each.sums), {})
     made += tables.of_drawn(task, sampled)
     result = Result(
-        "reliability", {table.name: table for table in made} | dict(allocated.tables),
+        "reliability", of_poses(made, task.reason) | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
-        {"poses": poses, "samples": tables.drawn_samples(task, sampled)},
+        {"poses": poses, "samples": tables.drawn_samples(task, sampled)}, reached=bool(failed) or not allocated.failed,
     )  # fmt: skip
     if interrupted:
         raise Interrupted(result)
@@ -149,6 +151,7 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     nominal = np.full((len(channels), poses.count), np.nan)
     elastic = None if bent is None else Elastic(np.full((len(channels), 3, poses.count), np.nan), bent.load)
     linear = FirstOrder.unknown(sources, len(channels), poses.count)
+    closing = FirstOrder.unknown(sources, 0, poses.count)
     groups = []
     for solved in solve_poses(study, poses, [channel.coordinate for channel in channels]):
         configuration, rows = solved.configuration, solved.rows
@@ -167,13 +170,17 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
                 elastic.flexibility[:, :, rows[block]] = here.flexibility
             with np.errstate(invalid="ignore", divide="ignore"):
                 found = linear_errors(mechanism, part, channels, sources, rates.take(block), here)
+                margins = linear_margins(mechanism, part, sources)
             linear.components[:, :, rows[block]] = found.components
+            if not len(closing.components):
+                closing = FirstOrder.unknown(sources, len(margins.components), poses.count)
+            closing.components[:, :, rows[block]], closing.offset[:, rows[block]] = margins.components, margins.offset
         groups.append((solved, rates))
     if bent is not None and elastic is not None:
         doubts += cautions(study, bent, channels)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~elastic.held, np.int8(Reason.NOT_HELD), reason)
         linear = replace(linear, offset=elastic.offset)
-    task = Task(study, poses, question, sources, reason, nominal, linear, elastic)
+    task = Task(study, poses, question, sources, reason, nominal, linear, closing, elastic)
     linear.components[:, :, ~task.assembled] = np.nan
     return task, groups, doubts
 
@@ -227,7 +234,7 @@ def notes(found: Sequence[MethodResult], task: Task) -> list[str]:
     """All of it, in sentences."""
     return [
         *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
-        *_pointless(found, task), *_unassembled(found), *_of_cycles(found, task),
+        *_pointless(found, task), *_not_assembled(found, task), *_unassembled(found), *_of_cycles(found, task),
     ]  # fmt: skip
 
 
@@ -336,6 +343,23 @@ def _pointless(found: Sequence[MethodResult], task: Task) -> list[str]:
     return [
         f"form: samples break a limit at {task.where(unknown[0])}{others}, but no design point was found: it has no "
         "probability there"
+    ]
+
+
+def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[str]:
+    """Where made mechanisms cannot be assembled by the first order, for methods that draw none: the worst pose."""
+    names = ", ".join(each.method for each in found if each.normal is not None)
+    distance = task.closing.distance().min(axis=0, initial=math.inf)
+    poses = np.flatnonzero(distance < _NEAR)
+    if not names or not len(poses):
+        return []
+    pose = int(np.argmin(distance))
+    share = 50.0 * math.erfc(float(distance[pose]) / math.sqrt(2.0))
+    several = f" (the worst of {len(poses)} poses)" if len(poses) > 1 else ""
+    return [
+        f"{names}: {share:.2g} % of the made mechanisms cannot be assembled at {task.where(pose)}{several}, "
+        "by the first order of the margin to a dead centre; they count as failures, and near a dead centre errors are "
+        "not normal: compare with form or monte_carlo"
     ]
 
 

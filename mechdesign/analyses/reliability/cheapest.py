@@ -28,7 +28,7 @@ TIGHTEST = 1e-3
 WIDEST = 10.0
 # Step of difference quotients, in log T.
 _LOG_STEP = 1e-4
-# How far a constraint may be broken, in the logarithm of `_distance`.
+# How far a constraint may be broken, in the logarithm of `distance`.
 _SLACK = 1e-9
 # Poses that become constraints at once, and how often more of them may.
 _POSES_ADDED = 6
@@ -120,11 +120,12 @@ class ToleranceModel:
     def failures(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Probability of failure at some of the task's settings."""
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
-        from mechdesign.analyses.reliability.probability import failure_probability
+        from mechdesign.analyses.reliability.probability import made_failure
 
         poses = [self.task.settings[k].pose for k in which]
         linear, question = self.linear(scales).take(poses), self.task.question.at(self.task.nominal[:, poses])
-        return failure_probability(linear.covariance(), question.bands, question.discs, linear.shift().T)
+        closing = replace(self.task.closing.take(poses), sources=linear.sources)
+        return made_failure(linear, closing, question.bands, question.discs)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         """Cost of all that is allocated, and its derivatives by x."""
@@ -133,24 +134,24 @@ class ToleranceModel:
         return float(prices.sum()), -np.array([t.cost.exponent for t in each if t.cost is not None]) * prices
 
 
-def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
-    """Factors of all tolerances; None where not even the tightest keep each pose's failures, of shape (poses,)."""
+def cheapest(model: ToleranceModel, allowed: Floats) -> Floats:
+    """Factors of all tolerances; the tightest where not even these keep each pose's failures, of shape (poses,)."""
     from scipy.optimize import minimize
 
     count = len(model.free)
     lowest, highest = model.tightest, np.log(model.widest)
     every = range(len(model.task.settings))
-    wanted = _distance(allowed)
+    wanted = distance(allowed)
 
     def margins(x: Floats, which: Sequence[int]) -> Floats:
-        return _distance(model.failures(model.scales(x), which)) - wanted[list(which)]
+        return distance(model.failures(model.scales(x), which)) - wanted[list(which)]
 
     def slopes(x: Floats, which: Sequence[int]) -> Floats:
         steps = _LOG_STEP * np.eye(count)
         return np.stack([(margins(x + h, which) - margins(x - h, which)) / (2 * _LOG_STEP) for h in steps], axis=1)
 
     if margins(lowest, every).min() < 0:
-        return None
+        return model.scales(lowest)
     if margins(highest, every).min() >= 0:
         return model.scales(highest)
     alike = _shifted(margins, np.zeros(count), lowest, highest, every)
@@ -173,7 +174,7 @@ def cheapest(model: ToleranceModel, allowed: Floats) -> Floats | None:
     return model.scales(x if model.cost(x)[0] <= model.cost(alike)[0] else alike)
 
 
-def _distance(failure: Floats) -> Floats:
+def distance(failure: Floats) -> Floats:
     """Log of the distance, in standard deviations, of a limit so often broken: nearly linear in log T."""
     from scipy.special import ndtri
 

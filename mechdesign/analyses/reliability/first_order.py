@@ -17,6 +17,7 @@ from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.reliability.sources import Pin, Sources
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.margins import closures
 from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.variation import LOADS
@@ -32,18 +33,19 @@ class FirstOrder:
     ----------
     components : ndarray, shape (channels, components, poses)
         Derivative of each channel (radians, lengths) by each independent component of the sources.
-    offset : ndarray, shape (channels, poses), or None
-        Deflections under the mean load.
+    offset : ndarray, shape (channels, poses)
+        Values without any deviation: deflections under the mean load; of margins of assembly the nominal ones.
     """
 
     sources: Sources
     components: Floats
-    offset: Floats | None = None
+    offset: Floats
 
     @staticmethod
     def unknown(sources: Sources, channels: int, poses: int) -> FirstOrder:
         """Room for poses, all nan."""
-        return FirstOrder(sources, np.full((channels, sum(len(s.directions) for s in sources.all), poses), np.nan))
+        count = sum(len(source.directions) for source in sources.all)
+        return FirstOrder(sources, np.full((channels, count, poses), np.nan), np.zeros((channels, poses)))
 
     @cached_property
     def owner(self) -> Ints:
@@ -52,8 +54,7 @@ class FirstOrder:
 
     def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
         """Some of the poses."""
-        offset = None if self.offset is None else self.offset[:, poses]
-        return replace(self, components=self.components[:, :, poses], offset=offset)
+        return replace(self, components=self.components[:, :, poses], offset=self.offset[:, poses])
 
     @cached_property
     def _spread(self) -> Floats:
@@ -69,6 +70,13 @@ class FirstOrder:
         sigma = np.sqrt(variance)
         return np.asarray(correlation * np.outer(sigma, sigma) @ self.components)
 
+    def beside(self, other: FirstOrder) -> FirstOrder:
+        """The channels of both."""
+        return replace(
+            self, components=np.concatenate([self.components, other.components]),
+            offset=np.concatenate([self.offset, other.offset]),
+        )  # fmt: skip
+
     def covariance(self) -> Floats:
         """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
         return np.asarray(np.moveaxis(self.components, 2, 0) @ np.moveaxis(self._weighted, 2, 0).swapaxes(1, 2))
@@ -79,8 +87,12 @@ class FirstOrder:
 
     def shift(self) -> Floats:
         """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
-        found = np.asarray(np.einsum("czp,z->cp", self.components, self._spread[0]))
-        return found if self.offset is None else found + self.offset
+        return np.asarray(np.einsum("czp,z->cp", self.components, self._spread[0]) + self.offset)
+
+    def distance(self) -> Floats:
+        """Of each channel from zero, in standard deviations, shape (channels, poses); infinite where not known."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(self.shift() / self.deviation(), nan=np.inf, posinf=np.inf, neginf=-np.inf)
 
     @cached_property
     def sensitivity(self) -> Floats:
@@ -117,8 +129,7 @@ class FirstOrder:
         low, high = (
             self._steepest * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1)
         )
-        offset = 0.0 if self.offset is None else self.offset
-        return np.minimum(low, high).sum(axis=1) + offset, np.maximum(low, high).sum(axis=1) + offset
+        return np.minimum(low, high).sum(axis=1) + self.offset, np.maximum(low, high).sum(axis=1) + self.offset
 
 
 def correlation(covariance: Floats) -> Floats:
@@ -202,12 +213,26 @@ def linear_errors(
     elastic: Elastic | None = None,
 ) -> FirstOrder:
     """Linear error model at a flat batch of nominal configurations, the drives held; raises as `derivatives`."""
+    names, slopes = _directions(sources)
+    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
+    offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
+    return FirstOrder(sources, np.einsum("zn,cnp->czp", slopes, by_name), offset)
+
+
+def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: Sources) -> FirstOrder:
+    """Linear model of the margins of assembly at a flat batch of nominal configurations, the drives held.
+
+    A made mechanism with a negative one cannot be assembled.
+    """
+    names, slopes = _directions(sources)
+    moved = [k for k, name in enumerate(names) if name not in LOADS]
+    margins, by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
+    return FirstOrder(sources, np.einsum("zn,mnp->mzp", slopes[:, moved], by_name), margins)
+
+
+def _directions(sources: Sources) -> tuple[list[str], Floats]:
+    """Places, drives and loads, and their derivatives by the components of the sources, shape (components, names)."""
     directions = [direction for source in sources.all for direction in source.directions]
     names = list(dict.fromkeys(name for direction in directions for name in direction))
     slopes = np.array([[direction.get(name, 0.0) for name in names] for direction in directions])
-    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
-    return FirstOrder(
-        sources,
-        np.einsum("zn,cnp->czp", slopes.reshape(-1, len(names)), by_name),
-        None if elastic is None else elastic.offset,
-    )
+    return names, slopes.reshape(-1, len(names))

@@ -1,4 +1,4 @@
-"""Laws of what varies: deviations from nominal, places of pins in their holes, and correlation.
+"""Laws of what varies: deviations from nominal, and places of pins in their holes.
 
 Every law maps standard normal variables onto what varies, so that all methods share one space of independent standard
 normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
@@ -8,24 +8,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
-from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.variation import Dimension
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
 SIGMAS = 3.0
-# Nodes of the integrals over normal variables behind correlated laws.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(48)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
-# Largest correlation of the normal variables behind two laws.
-_MAX_CORRELATION = 0.999999
 
 
 def _normal_cdf(u: Floats | float) -> Floats:
@@ -34,6 +28,13 @@ def _normal_cdf(u: Floats | float) -> Floats:
     from scipy.special import ndtr
 
     return np.asarray(ndtr(u))
+
+
+def _normal_quantile(share: Floats | float) -> Floats:
+    """The standard normal variable that has this probability below it, at least one-dimensional."""
+    from scipy.special import ndtri
+
+    return np.atleast_1d(ndtri(share))
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,11 @@ class Marginal(ABC):
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """Independent deviations, shape (count,)."""
         return self.at(rng.standard_normal(count))
+
+    @property
+    def kinks(self) -> Floats:
+        """Values of the standard normal variable between which `at` is smooth."""
+        return np.zeros(0)
 
     @abstractmethod
     def at(self, u: Floats) -> Floats:
@@ -165,6 +171,10 @@ class Triangular(Marginal):
         third = (a + b - 2 * c) * (2 * a - b - c) * (a - 2 * b + c) / 270.0
         return (a + b + c) / 3.0, second, third, 2.4 * second**2
 
+    @property
+    def kinks(self) -> Floats:
+        return _normal_quantile((self.mode - self.low) / (self.high - self.low) if self.high > self.low else 0.5)
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         if self.high == self.low:
             return np.full(count, self.low)
@@ -219,6 +229,11 @@ class UniformFit(_OfFit):
     def moments(self) -> tuple[float, float, float, float]:
         hole, shaft = (0.5 * (self.high - self.low) * part / self.reach for part in (self.hole, 1.0 - self.hole))
         return self.mean, self.sigma**2, 0.0, Uniform.fourth * (hole**4 + shaft**4) + 6.0 * (hole * shaft) ** 2
+
+    @property
+    def kinks(self) -> Floats:
+        edge = 0.5 * min(self.hole, 1.0 - self.hole) / max(self.hole, 1.0 - self.hole)
+        return _normal_quantile(np.array([edge, 1.0 - edge]))
 
     def at(self, u: Floats) -> Floats:
         width, wider, narrower = self.high - self.low, max(self.hole, 1.0 - self.hole), min(self.hole, 1.0 - self.hole)
@@ -284,6 +299,10 @@ class Measured(Marginal):
         second, third, fourth = (_interpolated(self.ordered - mean, power) for power in (2, 3, 4))
         return mean, second, third, fourth
 
+    @property
+    def kinks(self) -> Floats:
+        return _normal_quantile(self._shares)
+
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
         return self._quantile(rng.random(count))
 
@@ -291,8 +310,12 @@ class Measured(Marginal):
         return self._quantile(_normal_cdf(u))
 
     def _quantile(self, share: Floats) -> Floats:
-        count = len(self.ordered)
-        return np.asarray(np.interp(share, (np.arange(count) + 0.5) / count, self.ordered))
+        return np.asarray(np.interp(share, self._shares, self.ordered))
+
+    @property
+    def _shares(self) -> Floats:
+        """Of the law that is below each value."""
+        return np.asarray((np.arange(len(self.ordered)) + 0.5) / len(self.ordered))
 
 
 def _interpolated(ordered: Floats, power: int) -> float:
@@ -443,54 +466,3 @@ SLIDE_LAWS: Mapping[str, SlideLaw] = {
     "uniform": SlideLaw(Uniform(-1.0, 1.0)),
     "contact": SlideLaw(Wall(-1.0, 1.0)),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Correlation:
-    """Coefficients of the deviations, and the root of those of the normal variables behind them, shape (laws, laws).
-
-    ``root @ u`` are correlated normal variables of independent ones.
-    [Der Kiureghian & Liu, Structural reliability under incomplete probability information, 1986.]
-    """
-
-    coefficients: Floats
-    root: Floats
-
-    @staticmethod
-    def of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], float]) -> Correlation:
-        """Correlation of these pairs of laws; a StudyError where no variables of these laws have the coefficients."""
-        wanted, behind = np.eye(len(laws)), np.eye(len(laws))
-        for (i, j), coefficient in pairs.items():
-            wanted[i, j] = wanted[j, i] = coefficient
-            behind[i, j] = behind[j, i] = _behind(laws[i], laws[j], coefficient)
-        try:
-            return Correlation(wanted, np.asarray(np.linalg.cholesky(behind), dtype=np.float64))
-        except np.linalg.LinAlgError:
-            raise StudyError(
-                "reliability.correlation: these coefficients contradict each other (their matrix is not positive "
-                "definite)"
-            ) from None
-
-
-def pair_nodes(rho: float) -> tuple[Floats, Floats, Floats]:
-    """Nodes of two standard normal variables of this correlation, and their weights, each of shape (nodes, nodes)."""
-    first = np.broadcast_to(_NODES[:, None], (len(_NODES), len(_NODES)))
-    return first, rho * first + np.sqrt(1 - rho * rho) * _NODES, np.outer(_WEIGHTS, _WEIGHTS)
-
-
-def _behind(one: Marginal, other: Marginal, coefficient: float) -> float:
-    """Correlation of the normal variables behind two laws."""
-    from scipy.optimize import brentq
-
-    (m, v, *_), (n, w, *_) = one.moments, other.moments
-    if v == 0 or w == 0 or (isinstance(one, Normal) and isinstance(other, Normal)):
-        return coefficient
-
-    def excess(rho: float) -> float:
-        x, y, weight = pair_nodes(rho)
-        return float((weight * (one.at(x) - m) * (other.at(y) - n)).sum() / math.sqrt(v * w)) - coefficient
-
-    most = _MAX_CORRELATION
-    if excess(-most) > 0 or excess(most) < 0:
-        raise StudyError(f"reliability.correlation: two dimensions of these distributions cannot have {coefficient:g}")
-    return float(brentq(excess, -most, most, xtol=1e-12))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.first_order import correlation
+from mechdesign.analyses.reliability.first_order import FirstOrder, correlation
 from mechdesign.analyses.reliability.question import Band, Disc
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
@@ -24,8 +24,41 @@ _LATTICE_SHIFTS = 8
 # Below this sum of the limits' probabilities a lattice sees too few failures: so many points are drawn beyond them.
 _RARE = 0.05
 _RARE_POINTS = 20_000
+# Less than this part of the probability of failure, or this probability, of not being assembled counts as none.
+_NO_PART = 1e-6
+_LEAST_PART = 1e-15
 # Sides of the polygon in a circle, beyond which points are drawn.
 _POLYGON_SIDES = 64
+
+
+def made_failure(
+    linear: FirstOrder, closing: FirstOrder, bands: Sequence[Band], discs: Sequence[Disc],
+    mean: Floats | None = None, covariance: Floats | None = None,
+) -> Floats:  # fmt: skip
+    """Probability that a made mechanism breaks a limit or cannot be assembled, by normal errors, shape (poses,).
+
+    Parameters
+    ----------
+    linear, closing : FirstOrder
+        Errors, and margins of assembly.
+    mean, covariance : ndarray, optional
+        As of `failure_probability`, in place of those of `linear`.
+    """
+    mean = linear.shift().T if mean is None else mean
+    covariance = linear.covariance() if covariance is None else covariance
+    found = failure_probability(covariance, bands, discs, mean)
+    parts = ndtr(-closing.distance())
+    counts = parts > np.maximum(_NO_PART * found, _LEAST_PART)
+    count = covariance.shape[-1]
+    for pose in np.flatnonzero(counts.any(axis=0)).tolist():
+        both = linear.beside(closing).take([pose])
+        spread, middle = both.covariance()[0], both.shift()[:, 0]
+        spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
+        here = [replace(band, low=low[pose], high=high[pose]) for band in bands
+                for low, high in [[np.broadcast_to(end, found.shape) for end in (band.low, band.high)]]]  # fmt: skip
+        here += [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
+        found[pose] = failure_probability(spread, here, discs, middle)
+    return found
 
 
 def failure_probability(

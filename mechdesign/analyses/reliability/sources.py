@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechdesign.analyses.reliability.copula import Correlation
 from mechdesign.analyses.reliability.laws import (
     PIN_LAWS,
     SLIDE_LAWS,
-    Correlation,
     Marginal,
     Measured,
     PinLaw,

@@ -42,6 +42,8 @@ class Task:
         See `mechdesign.mechanism.Reason`.
     nominal : ndarray, shape (channels, poses)
         Values of the channels (radians, lengths).
+    closing : FirstOrder
+        Margins of assembly, see `first_order.linear_margins`.
     settings : sequence of Setting
         Poses that can be assembled, in their order; none where only the first order is asked.
     most : int
@@ -55,6 +57,7 @@ class Task:
     reason: NDArray[np.int8]
     nominal: Floats
     linear: FirstOrder
+    closing: FirstOrder
     elastic: Elastic | None = None
     settings: Sequence[Setting] = ()
     seed: int = 0

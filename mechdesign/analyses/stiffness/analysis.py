@@ -15,6 +15,7 @@ from mechdesign.analyses.poses import (
     Shown,
     SolvedPoses,
     judge_failures,
+    of_poses,
     pose_in_words,
     solve_poses,
     study_poses,
@@ -186,7 +187,7 @@ def tables(study: Study, body: Body, poses: Poses, solved: Solved) -> dict[str, 
             forces_table(study, poses, body.network, solved.effects),
             displacements_table(study, poses, body.network, solved.effects),
         ]
-    return {table.name: table for table in made}
+    return of_poses(made, solved.reason)
 
 
 def ask(study: Study) -> Body:

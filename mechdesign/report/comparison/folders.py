@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -10,7 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import SWEEP
 from mechdesign.errors import Problem, StudyError
@@ -28,41 +27,12 @@ from mechdesign.report.comparison.differences import (
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.report.tables import from_csv
 from mechdesign.results import VARIED, Table
+from mechdesign.rows import UnknownColumnError, in_unit
 from mechdesign.study.text.document import leaves, read
+from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
-
-
-class _Column(BaseModel):
-    name: str
-    unit: str
-    meaning: str
-
-
-class _Table(BaseModel):
-    columns: list[_Column]
-
-
-class _Study(BaseModel):
-    resolved: dict[str, Any] = {}
-
-
-class _Verdict(BaseModel):
-    requirement: str
-    met: bool
-    worst: float | None = None
-
-
-class _Manifest(BaseModel):
-    """What is read of a manifest here."""
-
-    study: _Study
-    tables: dict[str, _Table]
-    requirements: list[_Verdict]
-    tool: dict[str, str] = {}
-    libraries: dict[str, str] = {}
-    inputs: dict[str, str] = {}
 
 
 def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
@@ -116,20 +86,14 @@ def results(root: Path) -> dict[str, dict[str, Any]]:
         return {".": results(root.parent)["."]}
     if not root.is_dir():
         raise StudyError(f"{root}: {'is no folder' if root.exists() else 'there is no such folder'} of results")
-    found = {}
-    for path in sorted(root.rglob(manifest.NAME)):
-        content = manifest.read(path.parent)
-        try:
-            _Manifest.model_validate(content, strict=True)
-        except ValidationError:
-            raise StudyError(f"{path}: is not a manifest that mechdesign wrote; run the study again") from None
-        assert content is not None
-        found[path.parent.relative_to(root).as_posix()] = content
-    return found
+    folders = [path.parent for path in sorted(root.rglob(manifest.NAME))]
+    return {folder.relative_to(root).as_posix(): manifest.whole(folder) for folder in folders}
 
 
 def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
     """Read tolerances in YAML, ``reliability.*.sigma: {rtol: 0.05}``; what a pattern leaves out is the `default`.
+
+    An absolute tolerance may have a unit, ``{atol: 0.1 mm}``.
 
     Raises
     ------
@@ -144,15 +108,32 @@ def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
         raise StudyError([document.values[()].problem("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")])
     patterns, problems = {}, list(document.problems)
     for pattern, given in document.data.items():
-        right = isinstance(given, dict) and given and given.keys() <= {"rtol", "atol"}
-        if right and all(type(value) in (int, float) and 0 <= value < math.inf for value in given.values()):
-            patterns[str(pattern)] = default._replace(**{name: float(value) for name, value in given.items()})
-        else:
-            message = "a tolerance is {rtol: 0.05}, {atol: 0.001} or both, numbers from 0 on"
-            problems.append(document.values[(pattern,)].problem(message, str(pattern)))
+        try:
+            if not (isinstance(given, dict) and given and given.keys() <= {"rtol", "atol"}):
+                raise failure("a tolerance is {rtol: 0.05}, {atol: 0.001 mm} or both")
+            patterns[str(pattern)] = default._replace(**{name: _tolerance(name, raw) for name, raw in given.items()})
+        except PydanticCustomError as error:
+            problems.append(document.values[(pattern,)].problem(error.message(), str(pattern)))
     if problems:
         raise StudyError(problems)
     return Tolerances(default, patterns)
+
+
+def _tolerance(name: str, raw: Any) -> float:
+    size = read_number(raw, Context(), "none" if name == "rtol" else None).nominal
+    if size < 0:
+        raise failure(f"{name} is a number from 0 on, not {shown(raw)}")
+    return size
+
+
+def _in_unit(tolerance: Tolerance, pattern: str, table: Table, column: str) -> Tolerance:
+    """A tolerance with its absolute part in the unit of a column of numbers."""
+    if tolerance.atol is None or not table.column(column).numeric:
+        return tolerance
+    try:
+        return tolerance._replace(atol=in_unit(tolerance.atol, table, column))
+    except UnknownColumnError as error:
+        raise StudyError(f"tolerances: {pattern!r}: {error}") from None
 
 
 def _fits(pattern: str, folder: str, command: str, table: str, column: str) -> bool:
@@ -216,7 +197,9 @@ def compare_results(
         for column in pair[0].names:
             fitting = [each for each in tolerances.patterns if _fits(each, folder, command, table, column)]
             fitted.update(fitting)
-            chosen[column] = tolerances.patterns[fitting[-1]] if fitting else tolerances.default
+            chosen[column] = tolerances.default
+            if fitting:
+                chosen[column] = _in_unit(tolerances.patterns[fitting[-1]], fitting[-1], pair[0], column)
         found.compared.update(tables=1, columns=len(chosen))
         found.cases.append((folder, table))
         for difference, moved in compare_tables(*pair, chosen, given[1][0], same_poses=given[0] == given[1]):
@@ -251,8 +234,6 @@ def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table
     """
     about = content["tables"][name]
     try:
-        if Path(name).name != name:
-            raise ValueError(name)
         text = (directory / name).read_text(encoding="utf-8")
         return from_csv(text, name.removesuffix(".csv"), about["columns"])
     except OSError as error:

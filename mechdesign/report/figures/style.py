@@ -23,6 +23,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from mechdesign.numerics.arrays import Floats
 
@@ -246,18 +247,18 @@ def raised(power: int) -> str:
     return str(power).translate(_RAISED)
 
 
-def encoded(figure: Figure, kind: str = "png") -> bytes:
-    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date, software or host.
+def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> bytes:
+    """A figure as a file's bytes, ``png``, ``svg`` or ``pdf``, without date or host; `creator` is who made it.
 
     A PNG has at most 256 colours, a third of the size.
     """
     stream, dots = io.BytesIO(), matplotlib.rcParams["savefig.dpi"]
     if kind == "svg":
-        figure.savefig(stream, format=kind, metadata={"Date": None})
+        figure.savefig(stream, format=kind, metadata={"Date": None} | ({"Creator": creator} if creator else {}))
         return _reduced(stream.getvalue(), _reduction())
     if kind == "pdf":
         pages, reduced = cast(Any, PdfPages(stream)), cast(Any, _Reduced)
-        pages._file = reduced(stream, dict.fromkeys(("CreationDate", "Creator", "Producer")))
+        pages._file = reduced(stream, {"CreationDate": None, "Creator": creator, "Producer": None})
         with pages:
             figure.savefig(pages, format=kind)
         return stream.getvalue()
@@ -266,7 +267,10 @@ def encoded(figure: Figure, kind: str = "png") -> bytes:
     picture = Image.frombytes("RGBA", figure.canvas.get_width_height(), pixels.getvalue()).convert("RGB")
     # Of Pillow's ways this one keeps rare colours: no colour moves by more than some 15 of 255, measured.
     few = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL)
+    words = PngInfo()
+    if creator is not None:
+        words.add_text("Software", creator)
+    few.save(stream, format="png", dpi=(dots, dots), compress_level=DEFLATE_LEVEL, pnginfo=words)
     return stream.getvalue()
 
 

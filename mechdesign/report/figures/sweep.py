@@ -16,6 +16,7 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
+from mechdesign.study.text.units import Amount
 
 # Inches.
 _MARGINS = {"left": 1.1, "right": 0.15, "bottom": 0.75}
@@ -62,6 +63,7 @@ class _Axis:
         """The axis of a column."""
         name = column.name.removeprefix("mechanism.parameters.").removeprefix("mechanism.")
         if column.numeric:
+            low, high = (None if each is None else Amount.of(each).within(column.unit) for each in (low, high))
             return cls(name, column.unit, column.values.astype(float), (), low, high, varied)
         words = tuple(dict.fromkeys(map(str, column.values)))
         return cls(name, "", np.array([words.index(str(word)) for word in column.values], dtype=float), words)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.report.figures.style import printed, raised
-from mechdesign.report.requirements import unit_of
 from mechdesign.results import Column, Result, Table
+from mechdesign.rows import unit_of
 
 # Most numbers of a question.
 MOST = 8
@@ -141,11 +141,12 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
         for row in finite[np.argsort(sign * values[finite], kind="stable")].tolist():
             best.setdefault(groups[row], row)
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
-    for row in rows:
+    between = _between(rule, table, column)
+    for row in rows[:1] if between else rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
         if rule.table == "extremes" and words["output"].endswith(("_effort", "_advantage")):
             continue
-        unit = unit_of(table, column.name, row)
+        unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
@@ -154,12 +155,19 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            if rule.row not in ("first", "each") and (place := _pose(table, row)):
-                notes.append(f"at {place}")
+            value, place = between or (values[row], "" if rule.row in ("first", "each") else _pose(table, row))
+            notes += [f"at {place}"] * bool(place)
             if rule.several and len(finite) > 1:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
-            yield Headline(label, shown(values[row]), unit, "; ".join(notes))
+            yield Headline(label, shown(value), unit, "; ".join(notes))
+
+
+def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | None:
+    """The number over the whole motion, and its place, where the table knows the motion between its rows."""
+    if table.scope is None or table.scope.worst is None or rule.row in ("first", "each"):
+        return None
+    return table.scope.worst(column.name, -1 if rule.row == "smallest" else 1, rule.row == "size")
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:

@@ -33,6 +33,7 @@ from mechdesign.report.requirements import Verdict, judged_by
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.reliability import in_words
+from mechdesign.study.text.units import text_of
 
 # Pixels of the drawings in an index, twice as many as they are wide on the page, and their colours.
 _THUMBNAIL = (240, 180)
@@ -187,7 +188,7 @@ def _in_words(requirement: Requirement) -> dict[str, str]:
     return {
         "what": f"|{path}|" if requirement.abs else path,
         "where": ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items()),
-        "limit": ", ".join(f"{sign} {shown(bound)}" for sign, bound in bounds if bound is not None),
+        "limit": ", ".join(f"{sign} {text_of(bound) or shown(bound)}" for sign, bound in bounds if bound is not None),
     }
 
 

@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from mechdesign.errors import OutputError, printable_lines
+from mechdesign.files import marked
 
 REPORT = "report.html"
 INDEX = "index.html"
-# By this a file is known as one of these pages, in its first bytes.
+SECTION = "report.json"  # what a page says of a result
+# By this a file is known as one of these pages.
 GENERATOR = '<meta name="generator" content="mechdesign">'
-_HEAD = 2000
 
 
 def harmless(value: Any) -> Any:
@@ -27,13 +28,7 @@ def remove(path: Path) -> None:
     OutputError
         If it cannot be removed.
     """
-    try:
-        with path.open("rb") as stream:
-            ours = GENERATOR.encode() in stream.read(_HEAD)
-    except OSError:
-        # There is none, as a rule.
-        return
-    if ours:
+    if marked(path, GENERATOR.encode()):
         try:
             path.unlink()
         except OSError as error:

@@ -15,7 +15,6 @@ from mechdesign.report.tables import cells, json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-NAME = "report.json"
 # Of a mechanism that moves: the picture of the same curves is left out.
 CURVES = "motion"
 # Tables of more rows than this are shown by their first ones.

@@ -13,9 +13,9 @@ from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.building import section as models
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import StudyNumber
+from mechdesign.study.text.fields import Context, StudyNumber
 from mechdesign.study.text.reporter import Reporter
-from mechdesign.study.text.units import Units
+from mechdesign.study.text.units import kind_of
 
 ROOT: KeyPath = ("mechanism",)
 
@@ -24,11 +24,12 @@ class Builder:
     """What a description is built from; mistakes go to the reporter, and what they spoil is left out."""
 
     def __init__(
-        self, section: models.MechanismSection, units: Units, parameters: Mapping[str, float], reporter: Reporter
-    ) -> None:
+        self, section: models.MechanismSection, context: Context, reporter: Reporter
+    ) -> None:  # fmt: skip
         self.section = section
-        self.parameter_values = parameters
-        self.units = units
+        self.parameter_values = context.parameters
+        self.quantities = context.quantities
+        self.units = context.units
         self.reporter = reporter
         self.places: dict[str, Place] = {}
         self.formulas: dict[str, Expression] = {}
@@ -41,9 +42,11 @@ class Builder:
         factors = {
             name: self.units.angle_factor if place.quantity == "angle" else 1.0 for name, place in self.places.items()
         }
+        kinds = {name: kind_of(text) for name, text in self.quantities.items()}
         return Parameters(
-            dict(self.parameter_values), dict(formulas), dict(self.formulas), factors, frozenset(self.measured)
-        )
+            dict(self.parameter_values), dict(formulas), dict(self.formulas), factors, frozenset(self.measured),
+            {name: kind for name, kind in kinds.items() if kind is not None},
+        )  # fmt: skip
 
     def report(self, path: Iterable[str | int], message: str, *, at_key: bool = False) -> None:
         """Note a problem at a path below ``mechanism``."""

@@ -221,7 +221,10 @@ def _drives(builder: Builder) -> dict[str, Drive]:
         kind, item = mechanism.driven(name)
         path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
         reference = section.from_ or GROUND if section is not None else GROUND
-        if section is None:
+        if item == GROUND:
+            builder.report(path, "the ground never moves; name what is driven")
+            right = False
+        elif section is None:
             right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
         elif kind == "length" and item in mechanism.moving and item not in mechanism.legs:
             builder.report(path, f"link {item!r} is not telescopic: its length is fixed")

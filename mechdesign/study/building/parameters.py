@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Expression, Number
-from mechdesign.mechanism.model import MEASURED
+from mechdesign.mechanism.model import MEASURED, Place, Quantity
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,8 @@ class Parameters:
     factors: Mapping[str, float] = field(default_factory=dict)
     # Places that the study leaves out and that are so measured from its sketch.
     measured: frozenset[str] = frozenset()
+    # Parameters that are written with a unit, and the kinds of their quantities.
+    kinds: Mapping[str, str] = field(default_factory=dict)
 
     def moved(self, names: Collection[str]) -> set[str]:
         """Those of the names that are parameters, and the parameters that follow from them."""
@@ -97,6 +99,16 @@ class Parameters:
             return None
         partials = formula.derivatives(self.nominal)
         return float(sum(float(partials[name]) * slopes[name] for name in partials if name in slopes))
+
+    def kind(self, name: str, places: Mapping[str, Place]) -> str | None:
+        """Kind of quantity of a parameter: the only one of `needed`, or else that of its unit; None where not known."""
+        needed = self.needed(name, places)
+        return needed.pop() if len(needed) == 1 else self.kinds.get(name)
+
+    def needed(self, name: str, places: Mapping[str, Place]) -> set[Quantity]:
+        """Quantities of the numbers of the geometry (`places`) that change as much as a parameter does."""
+        slopes = self.derivatives(name).items()
+        return {places[place].quantity for place, slope in slopes if abs(slope) == self.factors[place]} - {"none"}
 
     def match(self, pattern: str) -> tuple[str, ...]:
         """Places that a pattern such as ``*.length`` names."""

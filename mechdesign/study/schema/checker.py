@@ -29,7 +29,7 @@ class Checker:
         self.parameters = parameters
         self.parts, self.folder = parts, folder
         self.known, self.kind = builder.reporter.known, builder.reporter.kind
-        self.report = builder.reporter.report
+        self.report, self.doubt, self.units = builder.reporter.report, builder.reporter.doubt, builder.units
 
     def coordinate(
         self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), order: int | None = None
@@ -53,6 +53,12 @@ class Checker:
                 what = "coordinate or parameter" if others else "coordinate"
                 self.known(name, [*self.mechanism.coordinates, *others], what, path, at_key=at_key)
         return quantity
+
+    def quantity(self, name: str) -> str | None:
+        """Kind of a parameter, a dimension or a drive; None where it is not known."""
+        if name in self.parameters.nominal:
+            return self.parameters.kind(name, self.places)
+        return self.places[name].quantity if name in self.places else self.mechanism.driven_kinds.get(name)
 
     def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
         """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""

@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
+from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
@@ -15,8 +16,8 @@ from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, failure, shown
-from mechdesign.study.text.units import QUANTITY
+from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.units import QUANTITY, text_of, written
 
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
@@ -86,6 +87,14 @@ def _required(raw: Any, context: Context) -> str:
     raise failure(f"a requirement judges the result of a command, and {shown(raw)} is of parameters alone; {cure}")
 
 
+def _amount(value: str | float, info: ValidationInfo) -> str | float:
+    """A quantity as an `Amount`; what only looks like one is a word."""
+    with suppress(PydanticCustomError):
+        if text_of(value):
+            return read_number(value, info.context or Context()).nominal
+    return value
+
+
 class Judged(fields.Model):
     """A result, and the rows of it that count; or an expression over parameters."""
 
@@ -98,13 +107,15 @@ class Judged(fields.Model):
     """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
     counts, or an expression over parameters. Example: kinematics.extremes.C.x.range
     """
-    where: dict[str, str | float | int] = Field(default_factory=dict)
-    """Rows that count: those whose columns have these values. Left out: all rows. Example: {method: monte_carlo}"""
+    where: dict[str, Annotated[str | float | int, AfterValidator(_amount)]] = Field(default_factory=dict)
+    """Rows that count: those whose columns have these values, in the column's unit or with one of its kind. Left out:
+    all rows. Example: {method: monte_carlo}
+    """
     abs: bool = False
     """Whether the absolute value is judged."""
     unassembled: Annotated[str, fields.choice(_UNASSEMBLED, "answer to poses that are not valid")] | None = None
-    """What is said of a motion with poses that cannot be assembled or lie outside the limits. Left out: it has to be
-    valid at every pose asked for and between them. Example: allowed
+    """What becomes of a motion with poses that cannot be assembled or lie outside the limits. Left out: it is not met,
+    and a design is infeasible, where one pose is not valid or the motion ends between two. Example: allowed
     """
 
     @property
@@ -126,16 +137,18 @@ class Condition(Judged):
 
     bare, short = "", ()
     at_least: fields.Number | None = None
-    """Lowest value, in the result's unit. At least one of ``at_least`` and ``at_most`` is given. Example: 0.35"""
+    """Lowest value, in the result's unit or with one of its kind. ``at_least``, ``at_most`` or both are given.
+    Example: 0.35 Example: 3 cm
+    """
     at_most: fields.Number | None = None
-    """Highest value, in the result's unit. Example: 2.5"""
+    """Highest value, likewise. Example: 2.5"""
 
     @model_validator(mode="after")
     def _bounded(self) -> Condition:
         if self.at_least is None and self.at_most is None:
             raise failure("a condition needs 'at_least', 'at_most' or both")
         if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
-            raise failure(f"nothing is at least {self.at_least:g} and at most {self.at_most:g}")
+            raise failure(f"nothing is at least {written(self.at_least)} and at most {written(self.at_most)}")
         return self
 
 
@@ -143,8 +156,9 @@ class Requirement(Condition):
     """A condition on the result of a command."""
 
     result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "title": "result"})]
-    """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, and
-    nan is not met. Example: kinematics.mu Example: kinematics.extremes.C.x.range
+    """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, along
+    a motion the worst place between the rows, too, and nan is not met. Example: kinematics.mu Example:
+    kinematics.extremes.C.x.range
     """
 
 
@@ -287,8 +301,8 @@ class OptimizeSection(fields.Model):
                     below = " above it" if unknown in self.variables else ""
                     message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
                     report((*path, key), message)
-            if name in checker.places:
-                checker.kind(path, checker.places[name].quantity)
+            if (quantity := checker.quantity(name)) is not None:
+                checker.kind(path, quantity)
             above.append(name)
             if self.method == "grid" and variable.step is None and variable.number is None:
                 report(path, "a variable of a grid needs either 'step' or 'number'")

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
+from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import Wanted
 from mechdesign.study.poses import Poses
@@ -119,16 +120,20 @@ def timing(drives: Sequence[str], poses: Poses) -> str | None:
     return moving[0] if len(moving) == 1 else None
 
 
-def check_poses(targets: Mapping[str, Target], drives: Sequence[str], poses: Poses, reporter: Reporter) -> None:
+def check_poses(targets: Mapping[str, Target], mechanism: Mechanism, poses: Poses, reporter: Reporter) -> None:
     """Check that targets and the poses of kinematics fit each other."""
     for owner, target in targets.items():
         if target.table is None:
             continue
         rows = len(target.table)
-        if target.timed and timing(drives, poses) is None:
+        drive = timing(mechanism.drives, poses)
+        if target.timed and drive is not None:
+            for row in range(rows):
+                reporter.kind((*ROOT, owner, row, 0), mechanism.quantity(drive))
+        elif target.timed:
             message = (
-                f"its first column is the value of the drive, but of {', '.join(drives)} no single one is swept; "
-                "give one row a pose"
+                f"its first column is the value of the drive, but of {', '.join(mechanism.drives)} no single one is "
+                "swept; give one row a pose"
             )
             reporter.report((*ROOT, owner), message)
         elif not target.timed and len(target.coordinates) == 1 and rows != poses.count:

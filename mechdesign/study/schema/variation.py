@@ -157,7 +157,9 @@ class Dimension(fields.Model):
     dimension's nominal size. Example: 0.03 Example: [-0.1, 0.3] Example: js9 Example: ISO 2768-m
     """
     sigma: fields.NonNegative | None = None
-    """Standard deviation, in place of a tolerance. Example: 0.01"""
+    """Standard deviation, in place of a tolerance; of truncated_normal that of the normal law before it is cut at 3
+    sigma, which leaves 0.9866 sigma. Example: 0.01
+    """
     distribution: Annotated[str, fields.choice(_OF_DIMENSIONS, "distribution")] = "normal"
     """Distribution of the deviations."""
     shape: (
@@ -307,9 +309,7 @@ def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: Ke
         nominal = checker.parameters.nominal.get(name)
         if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
             checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
-    if name not in checker.parameters.nominal:
-        kinds = {**checker.mechanism.driven_kinds, **LOADS}
-        quantity = checker.places[name].quantity if name in checker.places else kinds[name]
+    if (quantity := LOADS.get(name) or checker.quantity(name)) is not None:
         for key in (dimension.kind, "nominal"):
             checker.kind((*path, key), quantity)
     if dimension.measured is not None:

@@ -6,6 +6,7 @@ Nesting is bounded before anything is built, the expanded size of aliases while 
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -105,6 +106,15 @@ def read(content: bytes, name: str) -> Document:
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
         raise StudyError([Mark(name).problem(f"is not a text in YAML: {first}")]) from None
+
+
+def in_yaml(value: Any) -> str:
+    """Plain data in one line of YAML: letters as they are, what is not printable as an escape, ``\\U0000200b``.
+
+    It is JSON but for those escapes, whose pairs of surrogates are no letters in YAML.
+    """
+    text = json.dumps(value, ensure_ascii=False)
+    return text if text.isprintable() else "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
 
 
 def _misread(error: yaml.MarkedYAMLError, name: str) -> Problem:

@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.study.text.document import read
-from mechdesign.study.text.units import QUANTITY, QuantityError, Units
+from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure, text_of
 
 Form = dict[str, Any]
 """JSON Schema of a part of the study; a title says in words what is accepted."""
@@ -52,12 +52,13 @@ MAX_NAMED = 12
 class Context:
     """What numbers are read with: units, values of the parameters (nan where one is wrong) and those not known yet.
 
-    `used` gathers the names in expressions that were read.
+    `quantities` are the texts of parameters that have a unit; `used` gathers the names in expressions that were read.
     """
 
     units: Units = field(default_factory=Units)
     parameters: Mapping[str, float] = field(default_factory=dict)
     below: Collection[str] = ()
+    quantities: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
 
     def expression(self, text: str) -> Expression:
@@ -69,7 +70,7 @@ class Context:
 
 @dataclass(frozen=True)
 class StudyNumber:
-    """A number in the study's units, with its expression where it depends on parameters."""
+    """A number in the study's units (an `Amount` where it has a unit), with its expression over parameters."""
 
     nominal: float
     expression: Expression | None = None
@@ -128,14 +129,19 @@ def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
         number = context.units.convert(text, kind)
         if not math.isfinite(number):
             raise failure(f"{text!r} is too large a number")
-        return StudyNumber(number)
+        return StudyNumber(Amount(number, text.strip()))
+    if text.rstrip().endswith("%"):
+        raise failure(f"{text!r} is in per cent, which is no unit here: write the fraction, or what it is of, 0.01*r")
     if _DECIMAL_COMMA.fullmatch(text):
         raise failure(f"{text!r} has a decimal comma; a decimal is written with a point: {text.replace(',', '.')}")
     expression = context.expression(text)
     for name in sorted(expression.names - set(context.parameters)):
         hint = _known_names(name, context)
         raise failure(f"unknown name {name!r} in {shown(text)}{hint}")
-    return StudyNumber(float(expression.evaluate(context.parameters)), expression if expression.names else None)
+    value = float(expression.evaluate(context.parameters))
+    return StudyNumber(
+        Amount(value, context.quantities.get(text.strip(), "")), expression if expression.names else None
+    )
 
 
 def read_expression(raw: object, context: Context) -> Expression:
@@ -236,6 +242,9 @@ def number(
     def read(raw: Any, context: Context) -> float | StudyNumber:
         found = read_number(raw, context, kind)
         size = found.nominal
+        if kind and not value and found.expression and text_of(size):
+            # Parameters are judged by the geometry that they change.
+            _check_kind(text_of(size), kind)
         if minimum is not None and 0 < size < smallest:
             raise failure(f"{size:g} is too small a number: none but 0 is below {smallest:g}; choose a smaller unit")
         if minimum is not None and (size < minimum or (exclusive and size == minimum)):
@@ -244,6 +253,13 @@ def number(
         return found if value else size
 
     return Read(read, NUMBER_FORM, kind or "")
+
+
+def _check_kind(text: str, kind: str) -> None:
+    try:
+        measure(text, kind)
+    except QuantityError as error:
+        raise failure(str(error)) from None
 
 
 def whole(minimum: int = 0, maximum: int | None = None) -> Read:

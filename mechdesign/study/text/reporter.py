@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from mechdesign.errors import Problem, StudyError, nearest, suggestion
 from mechdesign.study.text.document import Document, KeyPath, dotted, has, leaves, plain
 from mechdesign.study.text.fields import LOST, MAX_NAMED, Model, shown
-from mechdesign.study.text.units import QUANTITY, QuantityError, measure
+from mechdesign.study.text.units import QuantityError, measure, text_of
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
@@ -82,9 +82,11 @@ class Reporter:
         """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
         self.kinds[path] = kind
         for keys, raw in leaves(self.raw(path)):
-            if isinstance(raw, str) and QUANTITY.fullmatch(raw):
+            # A parameter alone has its own unit.
+            parameter = self.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
+            if text := text_of(raw) or text_of(parameter):
                 try:
-                    measure(raw, kind)
+                    measure(text, kind)
                 except QuantityError as error:
                     self.report((*path, *keys), str(error))
 
@@ -96,6 +98,10 @@ class Reporter:
             self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
         else:
             self.warnings.append(self._placed(self.written(path), f"nothing uses {what} {name!r}", True))
+
+    def doubt(self, path: Sequence[str | int], message: str) -> None:
+        """Warn of what is likely a mistake at a path of the data."""
+        self.warnings.append(self._placed(self.written(path), message, False))
 
     def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
         known = found

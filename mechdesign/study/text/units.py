@@ -12,7 +12,7 @@ import math
 import re
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, Self
 
 from mechdesign.errors import nearest
 
@@ -110,6 +110,44 @@ class QuantityError(ValueError):
     """A quantity that cannot be read or converted; the message says why."""
 
 
+class Amount(float):
+    """A number in the study's units, with the quantity that it was written as; without text, a bare number."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str = "") -> Self:
+        """Make it of a number and the quantity's text."""
+        amount = super().__new__(cls, value)
+        amount.text = text
+        return amount
+
+    @classmethod
+    def of(cls, value: float) -> Self:
+        """The number itself if it is one, else a bare one."""
+        return value if isinstance(value, cls) else cls(value)
+
+    def __str__(self) -> str:
+        return self.text or repr(self)
+
+    def within(self, unit: str) -> float:
+        """The number in a unit of a table.
+
+        Raises
+        ------
+        QuantityError
+            Where the quantity is of another kind than the unit.
+        """
+        if not self.text:
+            return float(self)
+        number, powers, factor = measure(self.text)
+        try:
+            _, expected, divisor = measure(f"1 {unit}") if unit else (1.0, KINDS["none"], 1.0)
+        except QuantityError:
+            raise QuantityError(f"{self.text!r} has a unit, and {unit} is none: give a bare number") from None
+        _check_kind(self.text, powers, expected)
+        return number * factor / divisor
+
+
 @dataclass(frozen=True)
 class Units:
     """Units of a study's bare numbers; length may be ``dimensionless``."""
@@ -161,6 +199,25 @@ class Units:
         # Stiffness is per radian by the format, so an angle below the line is never in the study's unit.
         scale *= self.angle_factor ** max(powers[1], 0)
         return number * factor / scale
+
+
+def text_of(value: object) -> str:
+    """The quantity as which a number was written; empty for a bare one."""
+    if isinstance(value, Amount):
+        return value.text
+    return value if isinstance(value, str) and QUANTITY.fullmatch(value) else ""
+
+
+def written(value: float) -> str:
+    """A number as a message has it: the quantity as it was written, or 12 digits."""
+    return text_of(value) or f"{value:.12g}"
+
+
+def kind_of(value: object) -> str | None:
+    """Name in `KINDS` of the quantity as which a number was written; None for a bare number and any other quantity."""
+    text = text_of(value)
+    powers = measure(text)[1] if text else None
+    return next((name for name, known in KINDS.items() if known == powers), None)
 
 
 # Units that are read without the registry, which takes a while to build: their kind and SI value.
@@ -218,10 +275,15 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     powers, factor = _common(unit) or _unit(unit)
     if max(map(abs, powers)) > MAX_POWER:
         raise QuantityError(f"{unit!r} is no unit: it is {_describe(powers)}, and no power is beyond {MAX_POWER}")
-    radian_left_out = kind == "rotational_stiffness" and powers == KINDS["moment"]
-    if kind is not None and powers != KINDS[kind] and not radian_left_out:
-        raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(KINDS[kind])} is expected")
+    if kind is not None:
+        _check_kind(text, powers, KINDS[kind])
     return float(match["number"]), powers, factor
+
+
+def _check_kind(text: str, powers: Powers, expected: Powers) -> None:
+    radian_left_out = expected == KINDS["rotational_stiffness"] and powers == KINDS["moment"]
+    if powers != expected and not radian_left_out:
+        raise QuantityError(f"{text.strip()!r} is {_describe(powers)}, where {_describe(expected)} is expected")
 
 
 def _common(unit: str) -> tuple[Powers, float] | None:

@@ -6,6 +6,7 @@ if it is linear in cosine and sine, and the nearest point is sought again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +32,12 @@ _WALK_POINTS = 60
 _WALK_SPREAD = 0.5
 # Two points in directions nearer than this (cosine), at like distances, are one.
 _SAME_COSINE = 0.95
-MAX_POINTS = 24
+MAX_POINTS = 96
+# How often failures that no tangent explains are searched from, and the part of its distance from which on one does.
+_SEARCHES = 8
+_NEARLY = 0.98
+# In place of a limit: whatever fails.
+_ANY = -1
 # How often directions are turned to the worst, and what is no turn (distance on the circle).
 _TURNS = 6
 _NO_TURN = 0.02
@@ -47,6 +53,12 @@ _LITTLE_GAIN = 0.95
 _DIRECTIONS_APART = 0.5
 
 
+# Design points farther than the nearest one by this many standard deviations bring nothing.
+_FARTHEST = 4.0
+# Points, limits, normals and pulls as in `DesignPoints`, the points and normals of shape (dimension, points).
+_Found = tuple[Floats, Ints, Floats, Floats]
+
+
 @dataclass(frozen=True, eq=False)
 class DesignPoints:
     """Points where a limit is broken, nearest to the mean, nearest first.
@@ -55,7 +67,7 @@ class DesignPoints:
     ----------
     u : ndarray, shape (points, dimension)
     limit : ndarray of int, shape (points,)
-        Which limit; -1 where the margins end.
+        Which limit; -1 where it has no slope, or the margins end.
     normal : ndarray, shape (points, dimension)
         Unit vectors into the failure; zero where directions alone decide.
     pull : ndarray, shape (points, directions, 2)
@@ -78,74 +90,110 @@ class DesignPoints:
         """Distance of the limit's tangent from the mean, negative where the mean itself fails, shape (points,)."""
         return np.asarray((self.u * self.normal).sum(axis=1))
 
+    @property
+    def near(self) -> Flags:
+        """Which points count: those farther than the nearest one by `_FARTHEST` bring nothing."""
+        return np.asarray(self.distance <= self.distance.min(initial=np.inf) + _FARTHEST)
+
 
 def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
-    """Look for the design points of all limits."""
+    """Look for the design points of all limits, again and again from failures that no tangent explains."""
     d = problem.dimension
     near = problem.draw(rng, _DIRECTED_STARTS if len(problem.circles) else 1, 0.1 / np.sqrt(d))
-    u = np.concatenate([near, *(problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS)], axis=1)
+    u = np.concatenate([near, _explored(problem, rng)], axis=1)
     margins = problem.margins(u)
     limit, starts = _starts(problem, u, margins)
     ends = starts[:, limit < 0]
     limits = np.arange(len(margins))
     starts = np.concatenate([np.tile(near, len(limits)), starts[:, limit >= 0]], axis=1)
     limit = np.concatenate([np.repeat(limits, near.shape[1]), limit[limit >= 0]])
-    found = _worst(problem, limit, starts, sizes(problem))
+    found = [_worst(problem, limit, starts, sizes(problem)), _ended(problem, ends, rng)]
+    seen, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
+    points = _distinct(problem, found, seen, lost)
+    for _ in range(0 if len(problem.circles) else _SEARCHES):
+        u = u[:, failed(margins)]
+        starts = _apart(problem, u[:, ~_explained(points, u)], _STARTS)
+        if not starts.shape[1] or len(points.u) == MAX_POINTS:
+            break
+        starts = _edges(problem, np.full(starts.shape[1], _ANY), starts)
+        margins = problem.margins(starts)
+        limit = np.argmin(np.nan_to_num(margins, nan=np.inf), axis=0)
+        nearest, normal, good = descend(problem, limit, starts, sizes(problem), together=False)
+        # On a jump of the margins the slope is not that of the way to the mean.
+        good &= (nearest * normal).sum(axis=0) >= _SAME_COSINE * np.linalg.norm(nearest, axis=0)
+        found.append((nearest[:, good], limit[good], normal[:, good], np.zeros((int(good.sum()), 0, 2))))
+        good |= _explained(_distinct(problem, found, seen, lost), starts)
+        found.append(_ended(problem, starts[:, ~good], rng))
+        before, points = points, _distinct(problem, found, seen, lost)
+        if points.near.sum() == before.near.sum():
+            break
+        u = _explored(problem, rng)
+        margins = problem.margins(u)
+    return points
+
+
+def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
+    """Samples of all spreads."""
+    return np.concatenate([problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS], axis=1)
+
+
+def _explained(points: DesignPoints, u: Floats) -> Flags:
+    """Which failures `u` of shape (dimension, n) lie beyond the tangent of a design point."""
+    return np.asarray((points.normal @ u >= _NEARLY * points.distance[:, None]).any(axis=0))
+
+
+def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _Found:
+    """Ends of what is kept, as near to the mean as they come without a slope."""
     ends = _nearer(problem, ends, rng)
     straight = np.where(problem.straight[:, None], ends, 0.0)
     length = np.linalg.norm(straight, axis=0)
-    return _distinct(
-        problem,
-        np.concatenate([found[0], ends], axis=1),
-        np.concatenate([found[1], np.full(ends.shape[1], -1)]),
-        np.concatenate([found[2], straight / np.where(length > 0, length, 1.0)], axis=1),
-        np.concatenate([found[3], np.zeros((ends.shape[1], len(problem.circles), 2))]),
-        u[:, failed(margins)],
-        np.flatnonzero(~(margins >= 0).any(axis=1)),
-    )
+    count = ends.shape[1]
+    normal = straight / np.where(length > 0, length, 1.0)
+    return ends, np.full(count, _ANY), normal, np.zeros((count, len(problem.circles), 2))
 
 
 def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
-    """Limits (-1 where margins end) and their edges towards samples, shape (dimension, starts), that lie far apart."""
+    """Limits (`_ANY` where margins end) and their edges to samples, shape (dimension, starts), that lie far apart."""
     nowhere = np.isnan(margins).any(axis=0)
     broken = [(margin < 0) & ~nowhere for margin in margins]
     most = _FEW_STARTS if len(problem.circles) else _STARTS
     chosen = [*(_apart(problem, u[:, beyond], most) for beyond in broken), _apart(problem, u[:, nowhere], _FEW_STARTS)]
-    limit = np.repeat([*range(len(margins)), -1], [part.shape[1] for part in chosen])
+    limit = np.repeat([*range(len(margins)), _ANY], [part.shape[1] for part in chosen])
     return limit, _edges(problem, limit, np.concatenate(chosen, axis=1))
 
 
 def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
-    """Where limits (-1: where margins end) are on the rays to points beyond them, shape (dimension, points)."""
+    """Where limits (`_ANY`: where any is broken) are on the rays to points beyond them, shape (dimension, points)."""
     low, high = np.zeros(len(limit)), np.ones(len(limit))
     straight = problem.straight[:, None]
     for _ in range(_HALVINGS if len(limit) else 0):
         middle = 0.5 * (low + high)
         found = problem.margins(np.where(straight, middle * far, far))
-        ended = np.isnan(found).any(axis=0)
-        out = np.where(limit < 0, ended, ended | (found[limit, np.arange(len(limit))] < 0))
+        out = np.where(
+            limit < 0, failed(found), np.isnan(found).any(axis=0) | (found[limit, np.arange(len(limit))] < 0)
+        )
         high, low = np.where(out, middle, high), np.where(out, low, middle)
     return np.where(straight, high * far, far)
 
 
 def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
-    """Ends of the margins nearer to the mean, shape (dimension, ends).
+    """Ends of what is kept nearer to the mean, shape (dimension, ends).
 
-    In place of the slope there is the direction that separates points with margins from those without.
+    In place of the slope there is the direction that separates what is kept from what fails.
     """
     d, count = ends.shape
     about = max(_WALK_POINTS, 4 * d)
     for _ in range(_WALKS if count else 0):
         shift = rng.standard_normal((d, count, about)) * problem.straight[:, None, None]
         found = problem.margins((ends[:, :, None] + _WALK_SPREAD * shift).reshape(d, -1))
-        gone = np.isnan(found).any(axis=0).reshape(count, about)
+        gone = failed(found).reshape(count, about)
         steep = np.einsum("dca,ca->dc", shift, gone - gone.mean(axis=1, keepdims=True))
         size = (steep * steep).sum(axis=0)
         # A little farther than where the tangent plane is nearest.
         far = 1.25 * steep * (steep * ends).sum(axis=0) / np.where(size > 0, size, 1.0)
         far = np.where(problem.straight[:, None], far, ends)
-        beyond = np.isnan(problem.margins(far)).any(axis=0)
-        near = _edges(problem, np.full(count, -1), far)
+        beyond = failed(problem.margins(far))
+        near = _edges(problem, np.full(count, _ANY), far)
         ends = np.where(beyond & ((near * near).sum(axis=0) < (ends * ends).sum(axis=0)), near, ends)
     return ends
 
@@ -165,10 +213,10 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     return u[:, chosen]
 
 
-def _distinct(
-    problem: Problem, u: Floats, limit: Ints, normal: Floats, pull: Floats, seen: Floats, lost: Ints
-) -> DesignPoints:  # fmt: skip
+def _distinct(problem: Problem, found: Sequence[_Found], seen: Floats, lost: Ints) -> DesignPoints:
     """Nearest first, each place once; `lost` are limits that no sample keeps."""
+    u, normal = (np.concatenate([part[k] for part in found], axis=1) for k in (0, 2))
+    limit, pull = (np.concatenate([part[k] for part in found]) for k in (1, 3))
     order = np.argsort((u * normal).sum(axis=0), kind="stable")
     kept: list[int] = []
     for k in order.tolist():
@@ -193,7 +241,7 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
     return np.asarray(len(SPREADS) * np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
 
-def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats, Floats]:
+def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
     """Descend with directions held, and turn these to the worst, one after the other until they stay.
 
     Arguments as of `descend`; answers as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
@@ -292,9 +340,9 @@ def descend(
             break
         margins, gradients = problem.gradients(u[:, lanes])
         rows, k = limit[lanes], np.arange(len(lanes))
-        g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
-        # Of a limit out of all proportion it is infinite, and its nearest point is not known.
+        # Of a limit out of all proportion they are infinite, and its nearest point is not known.
         with np.errstate(over="ignore"):
+            g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
             size = (slope**2).sum(axis=0)
         known = np.isfinite(g) & np.isfinite(size) & (size > 0)
         active[lanes[~known]] = False

@@ -121,13 +121,17 @@ class Mixture:
         )  # fmt: skip
 
     def fitted(self, u: Floats, worth: Floats, least: float) -> Mixture:
-        """Parts with the moments of their own points `u`, shape (dimension, n); those below a share `least` end."""
+        """Parts with the moments of their own points `u`, shape (dimension, n); those below a share `least` of all end.
+
+        Of so many parts that all are as small it is half of what is even.
+        """
         logs = self.logs(u)
         share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
         share *= worth / share.sum(axis=0)
         normal, directions = u[self.problem.normals], u[self.problem.circles]
         d, total = len(normal), float(worth.sum())
         weight, centres, roots, headings = [], [], [], []
+        least = min(least, 0.5 / len(self.weight))
         for own in share[:-1]:
             mass = float(own.sum())
             if not mass > least * total:

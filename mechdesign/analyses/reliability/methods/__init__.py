@@ -38,13 +38,17 @@ def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodRes
 
 
 def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covariance: Floats) -> dict[int, Estimate]:
-    """Estimates by pose from normal errors, as of `normal`, for the limits of a question about the task's channels."""
+    """Estimates by pose from normal errors, as of `normal`, for the limits of a question about the task's channels.
+
+    What cannot be assembled breaks them.
+    """
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
-    from mechdesign.analyses.reliability.probability import failure_probability
+    from mechdesign.analyses.reliability.probability import made_failure
 
     rows = np.flatnonzero(task.assembled)
     bands = question.at(task.nominal[:, rows]).bands
-    values = failure_probability(covariance[rows], bands, question.discs, mean.T[rows])
+    linear, closing = task.linear.take(rows), task.closing.take(rows)
+    values = made_failure(linear, closing, bands, question.discs, mean.T[rows], covariance[rows])
     return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
 
 

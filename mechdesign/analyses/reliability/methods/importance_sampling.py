@@ -13,7 +13,6 @@ import numpy as np
 
 from mechdesign.analyses.reliability.engine.design_points import (
     EXPLORED,
-    MAX_POINTS,
     DesignPoints,
     explored_weights,
     find,
@@ -34,11 +33,10 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.reliability import Precision
 
-# Design points farther than the nearest one by this many standard deviations bring nothing.
-_FARTHEST = 4.0
-# Rounds of learning, from all failures so far, and their samples a dimension and at least.
+# Rounds of learning, from all failures so far, and their samples a dimension, each part besides, and at least.
 _ROUNDS = 6
 _ROUND_SAMPLES = 40
+_PART_SAMPLES = 10
 _ROUND_LEAST = 1600
 # Learned enough where the relative variance of a round's weights is below this.
 _GOOD_VARIANCE = 2.0
@@ -46,6 +44,8 @@ _GOOD_VARIANCE = 2.0
 _PART_WEIGHT = 0.05
 _PART_VARIANCE = 0.1
 _PART_LACK = 10.0
+# Parts up to which more are added.
+_MAX_PARTS = 24
 # Explored failures, by their weights, from which on they add parts before the first round.
 _EXPLORED_MANY = 5
 # Share of the samples that stay with the design points, and with the least of them.
@@ -123,7 +123,7 @@ def _about(problem: Problem, points: DesignPoints) -> Mixture:
     """Parts about the design points, weighted by the tangents' probabilities, and what is beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
-    near = points.distance <= points.distance.min() + _FARTHEST
+    near = points.near
     # A mean that fails itself is where most of the failures are.
     centre = np.where(points.distance[near, None] > 0, points.u[near][:, problem.normals], 0.0)
     logs = log_ndtr(-points.distance[near]) + np.log(i0e(np.linalg.norm(points.pull[near], axis=2))).sum(axis=1)
@@ -149,7 +149,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
     # Where many of them count, the samples that starts were taken from know of places without a design point.
     if float(explored.sum()) ** 2 > _EXPLORED_MANY * float(explored @ explored):
         parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
-    count = max(_ROUND_LEAST, _ROUND_SAMPLES * problem.dimension)
+    count = max(_ROUND_LEAST, (_ROUND_SAMPLES + _PART_SAMPLES * len(fixed.weight)) * problem.dimension)
     seen, known = [], []
     for rounds in range(1, _ROUNDS + 1):
         mixture = parts.joined(fixed, _FIXED_SHARE)
@@ -180,7 +180,7 @@ def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: i
     if not total > 0:
         return parts
     held, own = (np.exp(np.minimum(each.logs(u), _MAX_LOG_DENSITY)).sum(axis=0) for each in (fixed, parts))
-    while len(parts.weight) < MAX_POINTS:
+    while len(parts.weight) < max(len(fixed.weight), _MAX_PARTS):
         # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
         density = _FIXED_SHARE * held + (1 - _FIXED_SHARE) * own
         lack = drawn / (total * np.maximum(density, _LEAST_DENSITY))

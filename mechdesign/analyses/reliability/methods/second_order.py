@@ -13,7 +13,8 @@ from itertools import permutations
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import Normal, pair_nodes
+from mechdesign.analyses.reliability.copula import JointMoments
+from mechdesign.analyses.reliability.laws import Normal
 from mechdesign.analyses.reliability.methods import normal
 from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Sources
@@ -169,14 +170,13 @@ def _of_pairs(sources: Sources, covariance: Floats) -> Iterator[tuple[tuple[int,
     for i, j in np.argwhere(np.triu(sources.correlation.coefficients, 1)).tolist():
         if isinstance(laws[i], Normal) and isinstance(laws[j], Normal):
             continue
-        u, v, weight = pair_nodes(float(behind[i, j]))
-        x, y = laws[i].at(u) - laws[i].moments[0], laws[j].at(v) - laws[j].moments[0]
+        moments, rho = JointMoments(laws[i], laws[j], 3), float(behind[i, j])
         a, b, c = covariance[i, i], covariance[j, j], covariance[i, j]
-        yield (i, i, j), float((weight * x * x * y).sum())
-        yield (i, j, j), float((weight * x * y * y).sum())
-        yield (i, i, i, j), float((weight * x**3 * y).sum() - 3.0 * a * c)
-        yield (i, i, j, j), float((weight * x * x * y * y).sum() - a * b - 2.0 * c * c)
-        yield (i, j, j, j), float((weight * x * y**3).sum() - 3.0 * b * c)
+        yield (i, i, j), moments.at(rho, 2, 1)
+        yield (i, j, j), moments.at(rho, 1, 2)
+        yield (i, i, i, j), moments.at(rho, 3, 1) - 3.0 * a * c
+        yield (i, i, j, j), moments.at(rho, 2, 2) - a * b - 2.0 * c * c
+        yield (i, j, j, j), moments.at(rho, 1, 3) - 3.0 * b * c
 
 
 def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:

@@ -23,8 +23,8 @@ def prepare(study: Study) -> Evaluate:
     """
     from mechdesign.analyses.kinematics.rates import constant_rates, of_given
     from mechdesign.analyses.reliability.deflection import elasticity
-    from mechdesign.analyses.reliability.first_order import linear_errors, nominal_values
-    from mechdesign.analyses.reliability.probability import failure_probability
+    from mechdesign.analyses.reliability.first_order import linear_errors, linear_margins, nominal_values
+    from mechdesign.analyses.reliability.probability import made_failure
     from mechdesign.analyses.reliability.question import ask
     from mechdesign.analyses.reliability.sources import find_sources
 
@@ -44,7 +44,7 @@ def prepare(study: Study) -> Evaluate:
         elastic = None if bent is None else bent.at(configuration, question.channels)
         linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic)
         bands = question.at(nominal_values(mechanism, configuration, question.channels, rates)).bands
-        return 1.0 - failure_probability(linear.covariance(), bands, question.discs, linear.shift().T)
+        return 1.0 - made_failure(linear, linear_margins(mechanism, configuration, sources), bands, question.discs)
 
     return of_configurations(evaluate)
 

@@ -1,0 +1,44 @@
+"""Names of the files that a command may write into the folder of its results, as patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from mechdesign.commands import SENSITIVITIES, SWEEP
+from mechdesign.indices import INDEX_NAMES
+
+MECHANISM = "mechanism"
+ANIMATION = "motion.gif"
+
+_TABLES = {
+    "kinematics": "motion instant_centres extremes jacobian limits loops toggles targets modes",
+    "workspace": "indices path totals pieces boundary local singularities",
+    "optimize": "optimum designs bounds best sensitivity pareto",
+    "reliability": "moments reliability capability contributions density histogram convergence estimate allocation "
+    "confirmation",
+    "stiffness": "stiffness compliance eigen springs deflections displacements forces",
+    SWEEP.name: "sweep",
+    SENSITIVITIES.name: "sensitivities",
+}
+_PICTURES = {
+    "kinematics": "motion paths poses transmission modes",
+    "workspace": "workspace range path speed_ratio ellipses inscribed drives",
+    "optimize": "CPI objective indices designs pareto convergence optimum",
+    "reliability": "bands means deviations difference deviation_map failure_map reliability density density_contours "
+    "histogram convergence estimate contributions allocation",
+    "stiffness": "springs deflections free directions stiffness joint_forces force_hodographs",
+    SWEEP.name: "main_effects scatter",
+    SENSITIVITIES.name: "sensitivities",
+}
+# Studies, and copies of the files that they read.
+_STUDIES = {"optimize": "optimum.yaml optimum_*.yaml knee.yaml *input_*", "reliability": "allocated.yaml *input_*"}
+
+
+def names(command: str, formats: str = "", *, animate: bool = False) -> Iterator[str]:
+    """Patterns of the names of a command's tables and studies, and of its pictures in these formats."""
+    yield from (f"{table}.csv" for table in _TABLES[command].split())
+    yield from _STUDIES.get(command, "").split()
+    pictures = (MECHANISM, *_PICTURES[command].split(), *(INDEX_NAMES if command == "workspace" else ()))
+    yield from (f"{name}.{kind}" for kind in formats.split(",") for name in pictures)
+    if animate:
+        yield ANIMATION

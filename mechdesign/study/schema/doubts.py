@@ -1,0 +1,120 @@
+"""What can be computed and is likely a mistake all the same: slips of units, of places, of sizes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import Any
+
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Description, Link
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.units import text_of
+
+# Parts of a turn that a sweep or a pose likely means, and how well written radians agree with them, as 6.28 does.
+TURNS = (0.25, 0.5, 1.0, 2.0)
+DIGITS = 6e-4
+# Bare angles in radians beyond so many turns are degrees where they are multiples of so much.
+MOST_TURNS = 4
+STEP = 5
+# Lengths of links that are so many times apart are hardly in one unit.
+APART = 1000
+
+
+def note(checker: Checker, parts: Mapping[str, Any], description: Description) -> None:
+    """Note as warnings what is likely a mistake in the parts of a study that has none."""
+    for part in parts.values():
+        if isinstance(part, PoseSection):
+            _angles(checker, part)
+    _lengths(checker, description)
+    _pivots(checker, description.links[GROUND], description)
+    reliability = parts.get("reliability")
+    if reliability is not None:
+        _tolerances(checker, reliability)
+    for name in checker.mechanism.drives:
+        if name.casefold() == GROUND:
+            checker.doubt(("mechanism", "drives", name), f"{name!r} is the name of a drive, and the ground never moves")
+
+
+def _angles(checker: Checker, section: PoseSection) -> None:
+    """Angles of sweeps and poses without a unit that are whole parts of a turn in the unit that is not the study's."""
+    factor = checker.units.angle_factor
+    for path, sizes in _given(section):
+        if checker.mechanism.coordinates.get(str(path[-1])) != "angle":
+            continue
+        if factor == 1.0:
+            slips = [size for size in sizes if size > MOST_TURNS * 2 * math.pi and size % STEP == 0]
+            meant = "deg"
+        else:
+            slips = [size for size in sizes for turn in TURNS if abs(size / (turn * 2 * math.pi) - 1) < DIGITS]
+            meant = "rad"
+        if slips and meant != checker.units.angle:
+            unit = checker.units.label("angle")
+            checker.doubt(path, f"{slips[0]:g} is in {unit} here; if {meant} is meant, say so: {slips[0]:g} {meant}")
+
+
+def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
+    """Sizes of what each coordinate is given without a unit, and of the range that it passes."""
+    for name, sweep in (section.sweep or {}).items():
+        if not text_of(sweep.from_) and not text_of(sweep.to):
+            sizes = [abs(sweep.to - sweep.from_), abs(sweep.from_), abs(sweep.to)]
+            yield (section.command, "sweep", name), sizes
+    for index, pose in enumerate(section.poses or ()):
+        for name, value in pose.items():
+            if not text_of(value):
+                yield (section.command, "poses", index, name), [abs(value)]
+
+
+def _lengths(checker: Checker, description: Description) -> None:
+    """Links whose sizes, from one point to another, are so far apart that their units likely are."""
+    sizes = {
+        name: max((abs(a - b) for a, b in combinations(_points(link, description).values(), 2)), default=0.0)
+        for name, link in description.links.items() if not link.telescopic
+    }  # fmt: skip
+    known = {name: size for name, size in sizes.items() if size > 0}
+    if not known:
+        return
+    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
+    if known[most] >= APART * known[least] * (1 - 1e-9):
+        unit = checker.units.label("length")
+        told = " and ".join(f"{name} is {f'{known[name]:.6g} {unit}'.strip()} long" for name in (least, most))
+        checker.doubt(("mechanism", "links", least), f"{told}, a thousand times apart; are both in one unit?")
+
+
+def _pivots(checker: Checker, ground: Link, description: Description) -> None:
+    """Pins of the ground that lie at one place."""
+    pins = {name: at for name, at in _points(ground, description).items() if len(checker.mechanism.owners[name]) > 1}
+    for one, other in combinations(pins, 2):
+        if abs(pins[one] - pins[other]) <= 1e-9 * max(map(abs, pins.values())):
+            checker.doubt(
+                ("mechanism", "links", GROUND), f"{one!r} and {other!r} are at one place; is it one pivot, or two?"
+            )
+
+
+def _points(link: Link, description: Description) -> dict[str, complex]:
+    """Points of a link in its frame."""
+
+    def number(term: str | float) -> float:
+        return description.places[term].nominal if isinstance(term, str) else term
+
+    return {name: complex(number(x), number(y)) for name, (x, y) in link.points.items()}
+
+
+def _tolerances(checker: Checker, section: ReliabilitySection) -> None:
+    """Lengths of links that are less than their tolerance or standard deviation."""
+    parameters, links = checker.parameters, checker.mechanism.links
+    lengths = {f"{name}.length" for name in links} & checker.places.keys()
+    for name, dimension in section.dimensions.items():
+        low, high = dimension.ends
+        width = max(-low, high, dimension.sigma or 0.0)
+        slopes = parameters.derivatives(name) if name in parameters.known() else {}
+        for place in lengths & slopes.keys():
+            size = checker.places[place].nominal
+            if width * abs(slopes[place]) > size:
+                told = f"a tolerance of {width:g} is larger than {place} itself, {size:g}"
+                checker.doubt(("reliability", "dimensions", name), f"{told}; is it in another unit?")
+                break

@@ -1,0 +1,153 @@
+"""Near a dead centre: made mechanisms that cannot be assembled fail by every method; margins in closed form."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+from scipy.special import ndtr
+
+import mechdesign
+from mechdesign.mechanism.derivatives import conditionings
+from mechdesign.mechanism.margins import closures
+from mechdesign.results import Result
+
+# At 180 degrees rod and rocker reach 142 over 140.
+FOUR_BAR = """
+mechanism:
+  links: {ground: {A: [0, 0], D: [100, 0]}, crank: [A, B, 40], rod: [B, C, 72], rocker: [D, C, 70]}
+  drives: {theta: {angle: crank}}
+  sketch: {B: [-20, 35], C: [45, 50]}
+reliability:
+  poses: [{theta: 180}]
+  outputs: [C.x]
+  limits: {C.x: 10000}
+  dimensions: {crank.length: 1, rod.length: 2, rocker.length: {tolerance: [0, 3]}, ground.D.x: 3}
+  methods: [analytic, second_order]
+  sobol: 0
+"""
+# At 90 degrees the rod of 62 reaches over the crank of 50 and the offset of 10.
+SLIDER_CRANK = """
+mechanism:
+  links: {ground: {O: [0, 0], G: [0, -10]}, crank: [O, A, 50], rod: [A, B, 62], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [43, 25], B: [94, -10]}
+reliability:
+  poses: [{theta: 90}]
+  outputs: [B.x]
+  limits: {B.x: 10000}
+  dimensions: {crank.length: 1, rod.length: 2, ground.G.y: 1.5}
+  methods: [analytic, second_order]
+  sobol: 0
+"""
+# The block at the side of the lever, 28 from its line, is led past the lever's pivot at a distance of 30.
+LEVER = """
+mechanism:
+  links: {ground: {O: [0, 0], D: [0, 0]}, crank: [D, P, 30], lever: {O: [0, 0], Q: [0, 28]}, block: {P: [0, 0]}}
+  joints: {slot: {prismatic: [lever, block], through: Q}}
+  drives: {theta: {angle: crank}}
+  sketch: {P: [30, 0], Q: [22, 18]}
+reliability:
+  poses: [{theta: 0}]
+  outputs: [lever.angle]
+  limits: {lever.angle: 3 rad}
+  dimensions: {crank.length: 2, lever.Q.y: 1.5}
+  methods: [analytic, second_order]
+  sobol: 0
+"""
+
+
+def platform(turn: float) -> str:
+    """Three driven legs of one length to a platform that is turned; at 0 degrees their lines meet."""
+    ground, body, sketch = {}, {}, {"P": [0, 0]}
+    for k in range(3):
+        base, arm = cmath.rect(2, 2 * math.pi * k / 3), cmath.rect(1, 2 * math.pi * k / 3)
+        ground[f"A{k}"], body[f"B{k}"] = [base.real, base.imag], [arm.real, arm.imag]
+        there = arm * cmath.rect(1, math.radians(turn))
+        sketch[f"B{k}"] = [there.real, there.imag]
+    legs = "".join(f"    leg{k}: {{from: A{k}, to: B{k}, telescopic: true}}\n" for k in range(3))
+    drives = ", ".join(f"l{k}: {{length: leg{k}}}" for k in range(3))
+    length = abs(2 - cmath.rect(1, math.radians(turn)))
+    return f"""
+mechanism:
+  links:
+    ground: {ground}
+    platform: {body | {"P": [0, 0]}}
+{legs}
+  drives: {{{drives}}}
+  sketch: {sketch}
+reliability:
+  poses: [{{l0: {length}, l1: {length}, l2: {length}}}]
+  outputs: [P]
+  limits: {{P: {{radius: 100}}}}
+  dimensions: {{l0: {{sigma: 0.01}}, l1: {{sigma: 0.01}}, l2: {{sigma: 0.01}}}}
+  methods: [analytic, second_order]
+  sobol: 0
+"""
+
+
+def failures(result: Result) -> dict[str, float]:
+    table = result.tables["reliability"]
+    return dict(zip(table["method"].tolist(), table["failure"].tolist(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "distance"),
+    [
+        (FOUR_BAR, 3.5 / (math.hypot(1, 2, 1.5, 3) / 3)),
+        (SLIDER_CRANK, 2 / (math.hypot(1, 2, 1.5) / 3)),
+        (LEVER, 2 / (math.hypot(2, 1.5) / 3)),
+    ],
+    ids=["two links", "link and slide", "slide that turns"],
+)
+def test_what_cannot_be_assembled_fails_and_is_told(text: str, distance: float) -> None:
+    """The margin is a sum of lengths: its probability is exact."""
+    result = mechdesign.reliability(study_of(text))
+    exact = float(ndtr(-distance))
+    assert failures(result) == pytest.approx({"analytic": exact, "second_order": exact}, rel=1e-6)
+    (told,) = [warning for warning in result.warnings if "by the first order of the margin" in warning]
+    assert told.startswith(f"analytic, second_order: {100 * exact:.2g} % of the made mechanisms cannot be assembled")
+
+
+def test_where_several_limits_and_a_dead_centre_count_simulation_agrees() -> None:
+    limits = "reliability.limits={C.x: 12, C.y: [-40, 25], rocker.angle: 25 deg}"
+    result = mechdesign.reliability(study_of(FOUR_BAR, limits, "reliability.methods=[analytic, monte_carlo]"))
+    found = failures(result)
+    assert found["analytic"] > float(ndtr(-3.5 / (math.hypot(1, 2, 1.5, 3) / 3)))
+    capability = result.tables["capability"]
+    assert capability["ppm"].min() >= 1e6 * ndtr(-3.5 / (math.hypot(1, 2, 1.5, 3) / 3)) * (1 - 1e-3)
+
+
+def test_links_that_are_solved_together() -> None:
+    """Equal legs cannot be shorter than 1 on the mean; the probability is that of their mean but for curvature."""
+    text = platform(6.0)
+    result = mechdesign.reliability(study_of(text, "reliability.methods=[analytic, monte_carlo]", "seed=3"))
+    found = failures(result)
+    assert found["analytic"] == pytest.approx(found["monte_carlo"], rel=0.1)
+
+
+@pytest.mark.parametrize("text", [FOUR_BAR, SLIDER_CRANK, LEVER, platform(20.0)])
+def test_slopes_of_the_margins_are_their_differences(text: str) -> None:
+    mechanism = study_of(text).mechanism
+    places = [name for name, place in mechanism.description.places.items() if place.quantity in ("length", "angle")]
+    configuration = mechanism.sketch_configuration
+    given = [configuration.value(coordinate) for coordinate in mechanism.forward.structure.given]
+
+    def margins(name: str, way: float) -> np.ndarray:
+        moved = mechanism.forward.solve(given, {name: mechanism.nominal[name] + way * 1e-6}, start=configuration)
+        linear = mechanism.linearize(moved)
+        found = closures(linear, places)[0]
+        for index, group in enumerate(linear.structure.groups):
+            if group.form == "newton":
+                found[-1] = conditionings(linear)[index] ** 2
+        return found
+
+    found, slopes = closures(mechanism.linearize(configuration), places)
+    scale = margins(places[0], 0.0) / found
+    for k, name in enumerate(places):
+        difference = (margins(name, 1.0) - margins(name, -1.0)) / 2e-6 / scale
+        assert slopes[:, k] == pytest.approx(difference, rel=1e-5, abs=1e-6)
