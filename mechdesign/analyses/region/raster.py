@@ -83,7 +83,10 @@ class Raster:
         )  # fmt: skip
 
     def _thin(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
-        """Designs and places in the region where no centre around is: cells that no margin excludes are divided."""
+        """Designs and places in the region where no centre around is: cells that no margin excludes are divided.
+
+        As long as that takes no more places than the raster. Parts left of cells where nothing is met are unseen.
+        """
         size = self.inside.shape[1]
         shape = size, size, len(some)
         place, centre = z.reshape(shape), inside.reshape(shape)
@@ -92,21 +95,23 @@ class Raster:
             centre = centre | ahead | behind
         row, column, lane = np.nonzero(_open(margins.reshape(len(margins), *shape)) & ~centre)
         design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
-        owners, places = [design[:0]], [place[:0]]
+        owner, found, whole = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
+        parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
+        x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
         for _ in range(DIVISIONS):
+            if len(design) * len(x) > z.size:
+                break
             cell = cell / PARTS
-            parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
-            x, y = np.meshgrid(parts, parts)
-            z = place + x.reshape(-1, 1) * cell.real + 1j * y.reshape(-1, 1) * cell.imag
-            good, margins = self.designs.look(z, design)
+            part = place + x * cell.real + 1j * y * cell.imag
+            good, margins = self.designs.look(part, design, assembly=True)
             met = good.any(axis=0)
-            owners.append(design[met])
-            places.append(z[good.argmax(axis=0), np.arange(len(design))][met])
+            found[whole[met]] = part[good.argmax(axis=0), np.arange(len(design))][met]
             left = _open(margins.reshape(len(margins), PARTS, PARTS, len(design))) & ~met
-            part, lane = np.nonzero(left.reshape(PARTS * PARTS, len(design)))
-            design, place, cell = design[lane], z[part, lane], cell[lane]
-        np.add.at(self.unseen, design, cell.real * cell.imag)
-        return np.concatenate(owners), np.concatenate(places)
+            at, lane = np.nonzero(left.reshape(len(x), len(design)))
+            design, place, cell, whole = design[lane], part[at, lane], cell[lane], whole[lane]
+        met = ~np.isnan(found)
+        np.add.at(self.unseen, design, cell.real * cell.imag * ~met[whole])
+        return owner[met], found[met]
 
     def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
         """Designs and places where a margin is negative, though at the centres of all cells around it is not.
@@ -226,7 +231,7 @@ def _open(margins: Floats) -> Flags:
         around = [np.roll(most, step, axis) for axis in (1, 2) for step in (1, -1)]
         # What is unknown beside where a leg is stretched is as it is at the next cell.
         most = np.where(np.isnan(most), np.fmax.reduce(around), most)
-        return np.asarray(~(most <= 0).any(axis=0))
+        return np.asarray((most > 0).all(axis=0))
 
 
 def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:

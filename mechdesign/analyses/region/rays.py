@@ -109,10 +109,13 @@ class Designs:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
         return self.look(z, design)[0]
 
-    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
-        """Whether places lie in the region, as `inside`, and margins there, those of the assembly perhaps left out."""
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
+        """Whether places lie in the region, as `inside`, and margins there.
+
+        Unless they are asked for, those of the `assembly` may be left out, as inf, where others exclude a place.
+        """
         field, places = self.field, self.of(design)
-        both = field.plan.iterative or not field.same_assembly
+        both = assembly or field.plan.iterative or not field.same_assembly
         found = field.margins(z, places, assembly=both)
         good = np.asarray((found > 0).all(axis=0))
         if not both:
@@ -120,6 +123,9 @@ class Designs:
             place, lane = np.nonzero(good)
             margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
             good[place, lane] = (margins > 0).all(axis=0)
+            rest = np.full((len(margins) - len(found), *z.shape), np.inf)
+            rest[:, place, lane] = margins[len(found) :]
+            found = np.concatenate([found, rest])
         return good, found
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:

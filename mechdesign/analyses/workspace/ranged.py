@@ -338,7 +338,7 @@ class SomeDesigns(Designs):
         assert isinstance(self.field, Some)
         return self.field
 
-    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
         """As `Designs.look`."""
         height = self._over.deciding(z)[0]
         return np.asarray(height[0] > 0), height
