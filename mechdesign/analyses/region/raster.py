@@ -85,7 +85,8 @@ class Raster:
     def _thin(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
         """Designs and places in the region where no centre around is: cells that no margin excludes are divided.
 
-        As long as that takes no more places than the raster. Parts left of cells where nothing is met are unseen.
+        Once, and then as long as that takes no more places than the raster. Parts left are unseen where nothing is met
+        in the cell and every margin is positive somewhere around.
         """
         size = self.inside.shape[1]
         shape = size, size, len(some)
@@ -96,10 +97,11 @@ class Raster:
         row, column, lane = np.nonzero(_open(margins.reshape(len(margins), *shape)) & ~centre)
         design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
         owner, found, whole = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
+        rises = np.zeros(len(lane), dtype=bool)
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
-        for _ in range(DIVISIONS):
-            if len(design) * len(x) > z.size:
+        for division in range(DIVISIONS):
+            if division and len(design) * len(x) > z.size:
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
@@ -109,8 +111,9 @@ class Raster:
             left = _open(margins.reshape(len(margins), PARTS, PARTS, len(design))) & ~met
             at, lane = np.nonzero(left.reshape(len(x), len(design)))
             design, place, cell, whole = design[lane], part[at, lane], cell[lane], whole[lane]
+            rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         met = ~np.isnan(found)
-        np.add.at(self.unseen, design, cell.real * cell.imag * ~met[whole])
+        np.add.at(self.unseen, design, cell.real * cell.imag * (rises & ~met[whole]))
         return owner[met], found[met]
 
     def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:

@@ -325,12 +325,13 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
         near = middle + np.arange(3)[:, None]
         lane = design[near[1]]
         np.maximum.at(best, (EVERY, side, lane), _climb(panels, side, lane, theta[near], away[side, near]))
-    # A tip that was not climbed to may lie as far as the line through rays beside it says.
-    beside = beside.reshape(len(SIDES), len(BESIDE), -1)
-    nearer, here, farther = beside[:, :-2], beside[:, 1:-1], beside[:, 2:]
-    lost = (here > nearer) & (here > farther) & np.isfinite(farther)
+    # A tip that was not climbed to may lie as far as the lines through rays on either side of it say.
+    beside, step = beside.reshape(len(SIDES), len(BESIDE), -1), np.diff(BESIDE)[:, None]
+    here = beside[:, 1:-1]
     with np.errstate(invalid="ignore"):
-        more = np.where(lost, (here - farther) * (BESIDE[1:-1] / np.diff(BESIDE[1:]))[:, None], 0.0)
+        nearer, farther = here - beside[:, :-2], here - beside[:, 2:]
+        more = np.minimum(nearer * step[1:] / step[:-1], farther * step[:-1] / step[1:])
+        more = np.where((more > 0) & np.isfinite(more), more, 0.0)
     np.maximum.at(best[1], (EVERY, owner[: 2 * len(width)]), (here + more).max(axis=1))
     size = (best[:, 0] + best[:, 1]) * (best[:, 2] + best[:, 3])
     area, most = np.where(np.isfinite(size), size, 0.0)
@@ -366,5 +367,6 @@ def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats
     nearer, beside, farther = (-depth(every, place + part * gap) for part in (TOWARDS, -TOWARDS, -1.0))
     with np.errstate(invalid="ignore"):
         tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
+        tip &= np.abs(gap) < theta[2] - theta[0]
         more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
     return np.stack([-low + more, -low + (1 + TIP) * more])
