@@ -230,10 +230,9 @@ class Some(Ranged):
 
     def _stretches(self, z: Complexes) -> tuple[Ints, Floats, Floats, Flags]:
         """Those over which all legs reach, or the whole range."""
-        whole, count = super()._stretches(z), int(self.sliced.singular.sum())
+        whole, count, width = super()._stretches(z), int(self.sliced.singular.sum()), self.high - self.low
         if not count:
             return whole
-        width = self.high - self.low
 
         def legs(lane: Ints, part: Floats) -> Floats:
             return self.at(np.broadcast_to(z[lane], part.shape), self.low + part * width, assembly=False)[:count]
