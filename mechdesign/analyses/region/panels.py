@@ -44,6 +44,8 @@ class Panels:
         Intervals of a ray inside each panel.
     seen : ndarray, shape (designs,)
         Area that the raster is sure of: that of its cells inside, less what it is not known to.
+    unseen : ndarray, shape (designs,)
+        Area of places that the raster cannot exclude though none of them was met.
     """
 
     designs: Designs
@@ -54,6 +56,7 @@ class Panels:
     closes: Flags
     intervals: Ints
     seen: Floats
+    unseen: Floats
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
         """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`."""
@@ -130,7 +133,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     full = (counts > 0) | (high - low < NARROW)
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
-    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt)
+    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt, raster.unseen)
 
 
 def _turn_by_turn(

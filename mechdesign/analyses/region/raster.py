@@ -26,6 +26,8 @@ PARABOLAS = (1.0, 0.1)
 AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 # Farthest that such a place is from a centre (cells).
 FARTHEST = 1.0
+# Times that a cell is divided in which a sliver may lie, and parts each way.
+DIVISIONS, PARTS = 3, 4
 # Times that a box is doubled whose outermost cells lie inside, where the mechanism's dimensions give no bound.
 DOUBLINGS = 12
 
@@ -36,7 +38,8 @@ class Raster:
 
     A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
     lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
-    the region, shape (designs, rows, columns). And places in holes that no centre met, with their designs.
+    the region, shape (designs, rows, columns). And places in holes, and in slivers of the region, that no centre met,
+    with their designs, and the area in which slivers may lie that are still thinner.
     """
 
     designs: Designs
@@ -44,6 +47,8 @@ class Raster:
     cell: Complexes
     inside: Flags
     holes: tuple[Ints, Complexes]
+    slivers: tuple[Ints, Complexes]
+    unseen: Floats
 
     @staticmethod
     def of(designs: Designs) -> Raster:
@@ -53,10 +58,15 @@ class Raster:
         for _ in range(DOUBLINGS):
             none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank = np.zeros((designs.count, cells, cells), dtype=bool)
-            found, holes = Raster(designs, low, (high - low) / cells, blank, none), [none]
+            found, holes = (
+                Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count)),
+                [none],
+            )
+            slivers = [none]
             for some, z in found._centres(np.arange(designs.count)):
                 inside, margins = designs.look(z, some)
                 holes.append(found._between_centres(some, z, margins, inside))
+                slivers.append(found._thin(some, z, margins, inside))
                 inside &= ray_through(z - designs.about, begin) <= end
                 found.inside[some] = inside.T.reshape(-1, cells, cells)
             rim = found.inside.copy()
@@ -66,8 +76,45 @@ class Raster:
                 break
             size = np.where(open_, high - low, 0)
             low, high = low - 0.5 * size, high + 0.5 * size
-        owners, places = zip(*holes, strict=True)
-        return replace(found, holes=(np.concatenate(owners), np.concatenate(places)))
+        (owners, places), (thin, within) = zip(*holes, strict=True), zip(*slivers, strict=True)
+        return replace(
+            found, holes=(np.concatenate(owners), np.concatenate(places)),
+            slivers=(np.concatenate(thin), np.concatenate(within)),
+        )  # fmt: skip
+
+    def _thin(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
+        """Designs and places in the region where no centre around is: cells that no margin excludes are divided.
+
+        Once, and then as long as that takes no more places than the raster. Parts left are unseen where nothing is met
+        in the cell and every margin is positive somewhere around.
+        """
+        size = self.inside.shape[1]
+        shape = size, size, len(some)
+        place, centre = z.reshape(shape), inside.reshape(shape)
+        for axis in (0, 1):
+            ahead, behind = (np.roll(centre, step, axis) for step in (1, -1))
+            centre = centre | ahead | behind
+        row, column, lane = np.nonzero(_open(margins.reshape(len(margins), *shape)) & ~centre)
+        design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
+        owner, found, whole = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
+        rises = np.zeros(len(lane), dtype=bool)
+        parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
+        x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
+        for division in range(DIVISIONS):
+            if division and len(design) * len(x) > z.size:
+                break
+            cell = cell / PARTS
+            part = place + x * cell.real + 1j * y * cell.imag
+            good, margins = self.designs.look(part, design, assembly=True)
+            met = good.any(axis=0)
+            found[whole[met]] = part[good.argmax(axis=0), np.arange(len(design))][met]
+            left = _open(margins.reshape(len(margins), PARTS, PARTS, len(design))) & ~met
+            at, lane = np.nonzero(left.reshape(len(x), len(design)))
+            design, place, cell, whole = design[lane], part[at, lane], cell[lane], whole[lane]
+            rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
+        met = ~np.isnan(found)
+        np.add.at(self.unseen, design, cell.real * cell.imag * (rises & ~met[whole]))
+        return owner[met], found[met]
 
     def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
         """Designs and places where a margin is negative, though at the centres of all cells around it is not.
@@ -132,31 +179,34 @@ class Raster:
 
         The rays ascend by design and angle; each design has at least those at both ends of the scan.
         """
-        every, (begin, end) = np.arange(len(self.low) + 1), self.designs.scan
-        first, ends = np.searchsorted(design, every), intervals.by_ray(intervals.inner, intervals.outer)
+        begin, end = self.designs.scan
+        rays, ends = design + 1j * angle, intervals.by_ray(intervals.inner, intervals.outer)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-        for block, z in self._centres(some):
-            inside = self.inside[block].reshape(len(block), -1).T
+        for owner, z, inside in self._looked_at(some):
             way = z - self.designs.about
             theta, radius = ray_through(way, begin), np.abs(way)
-            at = np.empty(z.shape, dtype=np.intp)
-            for lane, k in enumerate(block):
-                rays = angle[first[k] : first[k + 1]]
-                at[:, lane] = first[k] + np.clip(np.searchsorted(rays, theta[:, lane]) - 1, 0, len(rays) - 2)
+            within = (theta < end) & (theta > begin)
+            owner, theta, radius, inside = owner[within], theta[within], radius[within], inside[within]
+            at = np.searchsorted(rays, owner + 1j * theta) - 1
             before, after = _hold(ends, at, radius), _hold(ends, at + 1, radius)
-            passed = np.where(inside, ~before & ~after, before & after) & (theta < end) & (theta > begin)
-            if not passed.any():
-                continue
+            passed = np.where(inside, ~before & ~after, before & after)
+            owner, theta, inside, gap = owner[passed], theta[passed], inside[passed], at[passed]
             # Of the places between the same two rays the one farthest from both: a piece, and a hole.
-            cells, lanes = np.nonzero(passed)
-            gap = at[cells, lanes]
-            aside = np.minimum(theta[cells, lanes] - angle[gap], angle[gap + 1] - theta[cells, lanes])
-            kind = 2 * gap + inside[cells, lanes]
+            aside = np.minimum(theta - angle[gap], angle[gap + 1] - theta)
+            kind = 2 * gap + inside
             order = np.lexsort((-aside, kind))
-            chosen = order[np.append(True, np.diff(kind[order]) > 0)]
-            owners.append(block[lanes[chosen]])
-            angles.append(theta[cells[chosen], lanes[chosen]])
+            chosen = order[np.append(True, np.diff(kind[order]) > 0)[: len(order)]]
+            owners.append(owner[chosen])
+            angles.append(theta[chosen])
         return np.concatenate(owners), np.concatenate(angles)
+
+    def _looked_at(self, designs: Ints) -> Iterator[tuple[Ints, Complexes, Flags]]:
+        """Designs, places, and whether they lie inside: centres of the cells of some designs, and in slivers."""
+        for some, z in self._centres(designs):
+            yield np.tile(some, len(z)), z.ravel(), self.inside[some].reshape(len(some), -1).T.ravel()
+        owner, place = self.slivers
+        own = np.isin(owner, designs)
+        yield owner[own], place[own], np.ones(int(own.sum()), dtype=bool)
 
     def _centres(self, designs: Ints) -> Iterator[tuple[Ints, Complexes]]:
         """Some of the designs, and centres of their cells, shape (cells, designs), row by row."""
@@ -168,6 +218,23 @@ class Raster:
             some = designs[k : k + step]
             low, cell = self.low[some], self.cell[some]
             yield some, low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
+
+
+def _open(margins: Floats) -> Flags:
+    """Cells (rows, columns, lanes) none of whose margins falls so far below zero as it changes to the next cell."""
+    change = np.zeros_like(margins)
+    with np.errstate(invalid="ignore"):
+        for axis in (1, 2):
+            step = np.nan_to_num(np.abs(np.diff(margins, axis=axis)))
+            last = [(0, 0)] * 4
+            for pad in ((1, 0), (0, 1)):
+                last[axis] = pad
+                change = np.maximum(change, np.pad(step, last))
+        most = margins + change
+        around = [np.roll(most, step, axis) for axis in (1, 2) for step in (1, -1)]
+        # What is unknown beside where a leg is stretched is as it is at the next cell.
+        most = np.where(np.isnan(most), np.fmax.reduce(around), most)
+        return np.asarray((most > 0).all(axis=0))
 
 
 def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:

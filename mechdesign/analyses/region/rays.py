@@ -109,10 +109,13 @@ class Designs:
         """Whether places lie in the region; shape (places, designs), one column for each of `design`."""
         return self.look(z, design)[0]
 
-    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
-        """Whether places lie in the region, as `inside`, and margins there, those of the assembly perhaps left out."""
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
+        """Whether places lie in the region, as `inside`, and margins there.
+
+        Unless they are asked for, those of the `assembly` may be left out, as inf, where others exclude a place.
+        """
         field, places = self.field, self.of(design)
-        both = field.plan.iterative or not field.same_assembly
+        both = assembly or field.plan.iterative or not field.same_assembly
         found = field.margins(z, places, assembly=both)
         good = np.asarray((found > 0).all(axis=0))
         if not both:
@@ -120,6 +123,9 @@ class Designs:
             place, lane = np.nonzero(good)
             margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
             good[place, lane] = (margins > 0).all(axis=0)
+            rest = np.full((len(margins) - len(found), *z.shape), np.inf)
+            rest[:, place, lane] = margins[len(found) :]
+            found = np.concatenate([found, rest])
         return good, found
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
@@ -213,7 +219,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
     if not (quadratic.all() and not designs.field.same_assembly):
-        found = _others(designs, places, start_of, direction, found, quadratic, slack * reach, reach)
+        found = _others(designs, places, start_of, direction, found, quadratic, slack, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
 
 
@@ -251,7 +257,7 @@ def _others(
     direction: Complexes,
     found: Intervals,
     quadratic: Flags,
-    thin: Floats,
+    slack: float,
     reach: Floats,
 ) -> Intervals:
     """Cut intervals where one of the margins that are not quadratic along their ray is negative or unknown."""
@@ -284,12 +290,27 @@ def _others(
 
     radii, values = _turn_by_turn(look, radii, SAME_ROOT * reach[owner])
     noise = designs.field.rounding[rows]
-    radii, values = _with_dips(margins_at, radii, _without_rounding(values, noise), noise)
-    positive = values > 0
-    lanes = np.flatnonzero(~positive.all(axis=(0, 1)) & (width > thin[owner]))
+    radii, values = with_dips(margins_at, radii, _without_rounding(values, noise), noise)
+    lanes = np.flatnonzero(~(values > 0).all(axis=(0, 1)) & (width > slack * reach[owner]))
     if not lanes.size:
         return found
-    radii, values, positive = radii[:, lanes], values[:, :, lanes], positive[:, :, lanes]
+    radii, values = radii[:, lanes], values[:, :, lanes]
+    cut_of = sampled[lanes]
+    margin, lane, turn, radius, start = sign_changes(
+        lambda lane, radius: margins_at(lanes[lane], radius), radii, values, ROUNDING * found.outer[cut_of]
+    )
+    part = intervals_between(rows[margin], lane, turn, radius, start, found.outer[cut_of], slack)
+    return _replace(found, cut_of, part, NARROWEST * reach)
+
+
+def sign_changes(
+    margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, tolerance: Floats
+) -> tuple[Ints, Ints, Ints, Floats, Ints]:
+    """Margin, lane, direction and place of roots of samples (margins, samples, lanes), and how many begin negative.
+
+    `tolerance` is the wanted accuracy of the places on each lane.
+    """
+    positive = values > 0
     margin, cell, lane = np.nonzero(positive[:, 1:] != positive[:, :-1])
     ends = np.stack([cell, cell + 1, np.where(cell > 0, cell - 1, np.minimum(cell + 2, len(radii) - 1))])
     x, f = radii[ends, lane], values[margin, ends, lane]
@@ -300,15 +321,11 @@ def _others(
 
     def evaluate(which: Ints, radius: Floats) -> Floats:
         which = asked[which]
-        return margins_at(lanes[lane[which]], radius)[margin[which], np.arange(len(which))]
+        return margins_at(lane[which], radius)[margin[which], np.arange(len(which))]
 
-    cut_of = sampled[lanes]
     (a, b, c), (fa, fb, fc) = x[:, asked], f[:, asked]
-    tolerance = ROUNDING * found.outer[cut_of[lane[asked]]]
-    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance)
-    start = (~positive[:, 0]).sum(axis=0)
-    part = intervals_between(rows[margin], lane, np.where(f[1] > 0, 1, -1), radius, start, found.outer[cut_of], 0.0)
-    return _replace(found, cut_of, part, NARROWEST * reach)
+    radius[asked] = bracketed_roots(evaluate, a, fa, b, fb, c, fc, tolerance[lane[asked]])
+    return margin, lane, np.where(f[1] > 0, 1, -1), radius, (~positive[:, 0]).sum(axis=0)
 
 
 def _turn_by_turn(
@@ -362,7 +379,7 @@ def _without_rounding(values: Floats, noise: Floats) -> Floats:
     return values
 
 
-def _with_dips(
+def with_dips(
     margins_at: Callable[[Ints, Floats], Floats], radii: Floats, values: Floats, noise: Floats
 ) -> tuple[Floats, Floats]:
     """Samples of margins with those added at which a margin has the other sign than at the samples on both sides.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from mechdesign.analyses.poses import radians
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.panels import Panels, find_panels
 from mechdesign.analyses.region.pieces import Pieces
-from mechdesign.analyses.region.rays import Designs, Effort
+from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Effort, Intervals
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
@@ -37,11 +38,15 @@ MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
 OF_RANGE = ("SUI", "area", "box_area")
 # Rays through the ends of panels may meet an interval that rounding has closed (a cusp): it still bounds the region.
 SLACK = 1e-9
-# Distances that differ by this part of themselves are equal; steps towards the farthest place of a smooth curve.
-ROUNDING = 1e-12
-STEPS = 8
+# Rays beside the ends of panels, as parts of half a panel.
+BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+# Between rays a curve goes no farther than by this part of its fall to the next. The place of a tip is known to this
+# part of the way there from the last ray that meets it; beyond that ray the distance falls so much more than before it,
+# at so small a part of the angle that is left.
+RISE, TIP, SHARP, TOWARDS = 0.5, 2.0, 4.0, 0.5
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
+EVERY: Any = slice(None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +192,7 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
             panels = pieces.only(0)
     if not panels.closes.any():
         nothing = {name: np.full(count, 0.0 if name in ("area", "box_area") else np.nan) for name in question.wanted}
-        errors = {name: np.maximum(panels.seen, 0.0) * (name == "area") for name in question.wanted}
+        errors = {name: np.maximum(panels.seen, panels.unseen) * (name == "area") for name in question.wanted}
         return Evaluation(nothing, errors, panels, pieces)
     gauss = question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
@@ -207,11 +212,15 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
-    found = {"area": (integral.area, np.maximum(integral.area_error, missing))}
+    found = {"area": (integral.area, np.maximum(integral.area_error + panels.unseen, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
-        box = bounding_box(panels, integral.boundary)
+        box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found |= {"box_area": (box, np.zeros(count)), "SUI": (integral.area / box, integral.area_error / box)}
+            share = integral.area / box
+            found |= {
+                "box_area": (box, doubt),
+                "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
+            }
     for column in question.wanted:
         name, kind = split(column)
         if name:
@@ -284,59 +293,80 @@ def _statistic(
     return spread, error
 
 
-def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> Floats:
-    """Areas of the rectangles, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
+def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple[Floats, Floats]:
+    """Areas of the rectangles and their errors, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
 
-    The farthest point in each direction is either at the end of a panel (a corner or cusp), where a ray is traced, or
-    on a smooth curve, where parabolas through the nearest boundary points lead to it.
+    The farthest place in a direction is a corner or cusp at the end of a panel, where rays are traced at several
+    angles beside the end, or lies on a smooth curve, where parabolas through boundary points lead to it. A cusp may be
+    too thin to be met at its tip, which is then at the end of the line through the places met beside it.
     """
-    count, about = len(panels.closes), panels.designs.about
-    owner, ends = np.tile(panels.design, 2), np.concatenate([panels.low, panels.high])
-    traced = panels.trace(owner, ends, SLACK)
-    corner = np.tile(traced.ray, 2)
-    design = np.concatenate([boundary[0], owner[corner]])
-    theta = np.concatenate([boundary[1], ends[corner]])
-    radius = np.concatenate([boundary[2], traced.inner, traced.outer])
-    place = about + radius * np.exp(1j * theta)
-    at_end = np.arange(len(place)) >= len(boundary[0])
-    farthest = np.zeros((len(SIDES), count))
-    for side, turn in enumerate(SIDES):
-        best, low, middle, high = _best((place * turn).real, design, theta, count)
-        smooth = (low < middle) & (middle < high)
-        # As far at the end of a panel, but for rounding: a corner.
-        corners = at_end & ((place * turn).real >= (best - ROUNDING * np.abs(best))[design])
-        smooth[design[corners]] = False
-        if smooth.any():
-            climbed = _climb(panels, np.nonzero(smooth)[0], low, middle, high, turn)
-            best[smooth] = np.maximum(best[smooth], climbed)
-        farthest[side] = best
-    size = (farthest[0] + farthest[1]) * (farthest[2] + farthest[3])
-    return np.where(np.isfinite(size), size, 0.0)
+    count, about, (design, theta, radius) = len(panels.closes), panels.designs.about, boundary
+    width = 0.5 * (panels.high - panels.low)
+    ends = np.stack([panels.low + width * BESIDE[:, None], panels.high - width * BESIDE[:, None]], axis=1)
+    owner = np.broadcast_to(panels.design, ends.shape).ravel()
+    traced = panels.trace(owner, ends.ravel(), SLACK)
+    beside = _farthest(panels.designs, ends.ravel(), traced)
+    rays, ray = np.unique(design + 1j * theta, return_inverse=True)
+    within = np.full((len(SIDES), len(rays)), -np.inf)
+    np.maximum.at(within, (EVERY, ray), ((about + radius * np.exp(1j * theta)) * SIDES[:, None]).real)
+    rays, order = np.unique(np.concatenate([rays, owner + 1j * ends.ravel()]), return_index=True)
+    design, theta, away = rays.real.astype(np.intp), rays.imag, np.concatenate([within, beside], axis=1)[:, order]
+    at_end = np.zeros(len(rays), dtype=bool)
+    at_end[np.searchsorted(rays, owner + 1j * ends.ravel())[: 2 * len(width)]] = True
+    best = np.full((2, len(SIDES), count), -np.inf)
+    np.maximum.at(best, (EVERY, EVERY, design), away)
+    same = (design[2:] == design[:-2]) & ~at_end[1:-1]
+    before, here, after = away[:, :-2], away[:, 1:-1], away[:, 2:]
+    with np.errstate(invalid="ignore"):
+        fall = np.maximum(*(np.where(np.isfinite(other), here - other, 0.0) for other in (before, after)))
+        top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[0][:, design[1:-1]])
+    side, middle = np.nonzero(top)
+    if len(side):
+        near = middle + np.arange(3)[:, None]
+        lane = design[near[1]]
+        np.maximum.at(best, (EVERY, side, lane), _climb(panels, side, lane, theta[near], away[side, near]))
+    # A tip that was not climbed to may lie as far as the lines through rays on either side of it say.
+    beside, step = beside.reshape(len(SIDES), len(BESIDE), -1), np.diff(BESIDE)[:, None]
+    here = beside[:, 1:-1]
+    with np.errstate(invalid="ignore"):
+        nearer, farther = here - beside[:, :-2], here - beside[:, 2:]
+        more = np.minimum(nearer * step[1:] / step[:-1], farther * step[:-1] / step[1:])
+        more = np.where((more > 0) & np.isfinite(more), more, 0.0)
+    np.maximum.at(best[1], (EVERY, owner[: 2 * len(width)]), (here + more).max(axis=1))
+    size = (best[:, 0] + best[:, 1]) * (best[:, 2] + best[:, 3])
+    area, most = np.where(np.isfinite(size), size, 0.0)
+    return area, most - area + SAME_ROOT * area
 
 
-def _best(distance: Floats, design: Ints, theta: Floats, count: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Per design the largest distance, the angle where it is, and the angles of the rays on either side of it."""
-    top, low, middle, high = (np.full(count, value) for value in (-np.inf, -np.inf, np.nan, np.inf))
-    np.maximum.at(top, design, distance)
-    here = distance == top[design]
-    middle[design[here]] = theta[here]
-    below, above = theta < middle[design], theta > middle[design]
-    np.maximum.at(low, design[below], theta[below])
-    np.minimum.at(high, design[above], theta[above])
-    return top, np.where(np.isfinite(low), low, middle), middle, np.where(np.isfinite(high), high, middle)
+def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
+    """How far rays reach in each direction of the rectangle, shape (directions, rays); -inf where they meet nothing."""
+    found = np.full((len(SIDES), len(theta)), -np.inf)
+    for radius in (traced.inner, traced.outer):
+        place = designs.about + radius * np.exp(1j * theta[traced.ray])
+        np.maximum.at(found, (EVERY, traced.ray), (place * SIDES[:, None]).real)
+    return found
 
 
-def _climb(panels: Panels, which: Ints, low: Floats, middle: Floats, high: Floats, turn: complex) -> Floats:
-    """Largest distance of designs between two rays."""
+def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats) -> Floats:
+    """Largest distances in some directions, between the outer two of three rays each, shape (3, n), and their bounds.
 
-    def depth(lane: Ints, theta: Floats) -> Floats:
-        traced = panels.trace(which[lane], theta, SLACK)
-        found = np.full(len(lane), np.inf)
-        for radius in (traced.inner, traced.outer):
-            place = panels.designs.about + radius * np.exp(1j * theta[traced.ray])
-            np.minimum.at(found, traced.ray, -(place * turn).real)
-        return found
+    Of shape (2, n). Where rays nearer to the end of a panel meet less there is a tip: the line through rays beyond
+    tells its place.
+    """
 
-    rays = np.stack([low, middle, high])[:, which]
-    depths = np.stack([depth(np.arange(len(which)), theta) for theta in rays])
-    return -dips(depth, rays, depths, np.full(len(which), -np.inf), STEPS)[1]
+    def depth(lane: Ints, angle: Floats) -> Floats:
+        found = _farthest(panels.designs, angle, panels.trace(design[lane], angle, SLACK))
+        return np.asarray(-found[side[lane], np.arange(len(lane))])
+
+    every = np.arange(len(side))
+    place, low = dips(depth, theta, -away, np.full(len(side), -np.inf))
+    ends = np.sort(np.concatenate([panels.design + 1j * panels.low, panels.design + 1j * panels.high]))
+    after = np.clip(np.searchsorted(ends, design + 1j * place), 1, len(ends) - 1)
+    gaps = np.stack([ends[after - 1].imag, ends[after].imag]) - place
+    gap = np.take_along_axis(gaps, np.abs(gaps).argmin(axis=0)[None], axis=0)[0]
+    nearer, beside, farther = (-depth(every, place + part * gap) for part in (TOWARDS, -TOWARDS, -1.0))
+    with np.errstate(invalid="ignore"):
+        tip = (-low - nearer > SHARP * np.abs(-low - beside)) & np.isfinite(farther)
+        tip &= np.abs(gap) < theta[2] - theta[0]
+        more = np.where(tip, np.maximum(-low - farther, 0.0), 0.0)
+    return np.stack([-low + more, -low + (1 + TIP) * more])

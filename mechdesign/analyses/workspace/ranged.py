@@ -18,7 +18,15 @@ from typing import ClassVar
 import numpy as np
 
 from mechdesign.analyses.region.field import Field, Places
-from mechdesign.analyses.region.rays import NARROWEST, Designs, Intervals, intervals_between, trace
+from mechdesign.analyses.region.rays import (
+    NARROWEST,
+    Designs,
+    Intervals,
+    intervals_between,
+    sign_changes,
+    trace,
+    with_dips,
+)
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
@@ -26,6 +34,12 @@ from mechdesign.numerics.roots import bracketed_roots
 
 # Samples of the range: with half as many a stretch was missed, 2e-4 of the area of a 3-RPR's.
 SAMPLES = 49
+# Samples of the whole range by which it is told where legs reach: distances are smooth in its values.
+OF_LEGS = 17
+# First and last sample of a stretch that a leg ends, as a part of it.
+AT_END = 1e-9
+# Angle whose sine the samples are at the end of the range itself: nearly evenly.
+GENTLE = 0.5
 # Places looked at at once, so that their samples fit into the processor's cache.
 BLOCK = 1024
 # Distance of the values close to an extreme, as a part of the distance between samples.
@@ -104,43 +118,78 @@ class Ranged(Field):
         shape = (len(found), *z.shape)
         return found.reshape(shape), value.reshape(shape), pair.reshape(2, *shape)
 
+    def _stretches(self, z: Complexes) -> tuple[Ints, Floats, Floats, Flags]:
+        """Place, both ends, and whether a leg is stretched or folded at either, of stretches of the range to sample.
+
+        Each place has one at least.
+        """
+        return np.arange(len(z)), np.full(len(z), self.low), np.full(len(z), self.high), np.zeros((2, len(z)), bool)
+
     def _extremes(self, z: Complexes) -> tuple[Floats, Floats, Ints]:
-        every = isinstance(self, Every)
-        margins = self.at(np.broadcast_to(z, (SAMPLES, len(z))), self.values[:, None])
+        every, (lane, low, high, singular) = isinstance(self, Every), self._stretches(z)
+        samples, places, z = _Samples.of(low, high, singular), np.arange(len(z)), z[lane]
+        margins = self.at(np.broadcast_to(z, (SAMPLES, len(z))), samples.value(np.arange(SAMPLES)[:, None]))
         height = _known(-margins) if every else _smallest(margins)[None]
         node = height.argmax(axis=1)
-        found, value = height.max(axis=1), self.values[node]
+        found, value = height.max(axis=1), samples.value(node)
         lowest = np.where(np.isnan(margins), np.inf, margins)[:, node[0], np.arange(len(z))].argmin(axis=0)
         pair = np.array(np.broadcast_to(lowest, (2, *found.shape)))
-        row, lane, top, at, names = self._refined(z, margins, height)
-        better = np.flatnonzero(top > found[row, lane])
+        row, which, top, at, names = self._refined(z, samples, margins, height)
+        better = np.flatnonzero(top > found[row, which])
         better = better[np.argsort(top[better], kind="stable")]
-        # Of several extremes of one place the last assigned is the highest.
-        where = row[better], lane[better]
+        # Of several extremes of one stretch the last assigned is the highest, and of several stretches the last.
+        where = row[better], which[better]
         found[where], value[where] = top[better], at[better]
         pair[:, where[0], where[1]] = names[:, better]
+        order = np.lexsort((found[0], lane))
+        best = order[np.searchsorted(lane[order], places, side="right") - 1]
+        found, value, pair = found[:, best], value[:, best], pair[..., best]
         return np.where(np.isinf(found), np.nan, -found if every else found), value, pair
 
-    def _refined(self, z: Complexes, margins: Floats, height: Floats) -> tuple[Ints, Ints, Floats, Floats, Ints]:
-        """Row, place, height, value of the range, and margins of the extremes near the highest samples."""
-        every, values = isinstance(self, Every), self.values
-        step, close = values[1] - values[0], CLOSE * (values[1] - values[0])
+    def _refined(
+        self, z: Complexes, samples: _Samples, margins: Floats, height: Floats
+    ) -> tuple[Ints, Ints, Floats, Floats, Ints]:
+        """Row, stretch, height, value of the range, and margins of the extremes near the highest samples."""
+        every = isinstance(self, Every)
         row, node, lane = _peaks(height, FAR[every])
-        each = np.arange(len(row))
+        each, own = np.arange(len(row)), samples.only(lane)
 
         def highest(near: Floats, low: Floats | float, high: Floats | float) -> tuple[Floats, Floats, Ints]:
             return _highest(-near[row, :, each].T[None] if every else near, low, high)
 
         middle = np.clip(node, 1, SAMPLES - 2)
         place = highest(np.stack([margins[:, middle + k, lane] for k in (-1, 0, 1)], axis=1), -1.0, 1.0)[0]
-        centre = np.clip(values[middle] + step * place, self.low + close, self.high - close)
-        near = self.at(np.broadcast_to(z[lane], (3, len(lane))), centre + close * np.array([[-1], [0], [1]]))
-        first, last = (self.low - centre) / close, (self.high - centre) / close
+        centre = np.clip(middle + place, CLOSE, SAMPLES - 1 - CLOSE)
+        near = self.at(np.broadcast_to(z[lane], (3, len(lane))), own.value(centre + CLOSE * np.array([[-1], [0], [1]])))
+        first, last = -centre / CLOSE, (SAMPLES - 1 - centre) / CLOSE
         place, _, names = highest(near, np.maximum(first, -2), np.minimum(last, 2))
-        at = np.where(place <= first, self.low, np.where(place >= last, self.high, centre + close * place))
+        at = own.value(np.where(place <= first, 0, np.where(place >= last, SAMPLES - 1, centre + CLOSE * place)))
         there = self.at(z[lane], at)
         top = _known(-there[row, each]) if every else _smallest(there)
         return row, lane, top, at, names
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """Samples of stretches of a range: their ends, and the sines of which angles they are, shape (2, stretches)."""
+
+    ends: Floats
+    angles: Floats
+
+    @staticmethod
+    def of(low: Floats, high: Floats, singular: Flags) -> _Samples:
+        """Samples of stretches; at ends that are `singular` the values of the range have no slope."""
+        return _Samples(np.stack([low, high]), np.where(singular, 0.5 * np.pi, GENTLE) * np.array([[-1], [1]]))
+
+    def only(self, some: Ints) -> _Samples:
+        """Those of some of the stretches."""
+        return _Samples(self.ends[:, some], self.angles[:, some])
+
+    def value(self, sample: Floats | Ints) -> Floats:
+        """Value of the range at the number of a sample of each stretch, or between two of them."""
+        (low, high), (begin, end), part = self.ends, self.angles, sample / (SAMPLES - 1)
+        share = (np.sin(begin + part * (end - begin)) - np.sin(begin)) / (np.sin(end) - np.sin(begin))
+        return np.asarray(np.where(part == 1, high, low + share * (high - low)))
 
 
 class Every(Ranged):
@@ -178,6 +227,33 @@ class Some(Ranged):
     def margins(self, z: Complexes, places: Places, *, assembly: bool = True) -> Floats:
         """Unknown, shape (labels, *z.shape): nothing but rays tells where labels change."""
         return np.broadcast_to(np.nan, (len(self.labels), *z.shape))
+
+    def _stretches(self, z: Complexes) -> tuple[Ints, Floats, Floats, Flags]:
+        """Those over which all legs reach, or the whole range."""
+        whole, count, width = super()._stretches(z), int(self.sliced.singular.sum()), self.high - self.low
+        if not count:
+            return whole
+
+        def legs(lane: Ints, part: Floats) -> Floats:
+            return self.at(np.broadcast_to(z[lane], part.shape), self.low + part * width, assembly=False)[:count]
+
+        every, none = np.arange(len(z)), np.zeros(count)
+        parts = np.tile(np.linspace(0.0, 1.0, OF_LEGS)[:, None], len(z))
+        parts, values = with_dips(legs, parts, legs(every, parts), none)
+        margin, lane, turn, part, start = sign_changes(legs, parts, values, np.full(len(z), ROUNDING))
+        found = intervals_between(margin, lane, turn, part, start, np.ones(len(z)), 0.0)
+        found = found.kept(found.outer - found.inner > NARROWEST)
+        if not len(found.ray):
+            return whole
+        ended = np.stack([found.enters, found.leaves]) >= 0
+        low, high = np.stack([found.inner, found.outer]) + ended * AT_END * (found.outer - found.inner) * [[1], [-1]]
+        left = np.flatnonzero(found.counts == 0)
+        return (
+            np.append(found.ray, whole[0][left]),
+            np.append(np.where(ended[0], self.low + low * width, self.low), whole[1][left]),
+            np.append(np.where(ended[1], self.low + high * width, self.high), whole[2][left]),
+            np.concatenate([ended, whole[3][:, left]], axis=1),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +337,7 @@ class SomeDesigns(Designs):
         assert isinstance(self.field, Some)
         return self.field
 
-    def look(self, z: Complexes, design: Ints) -> tuple[Flags, Floats]:
+    def look(self, z: Complexes, design: Ints, *, assembly: bool = False) -> tuple[Flags, Floats]:
         """As `Designs.look`."""
         height = self._over.deciding(z)[0]
         return np.asarray(height[0] > 0), height

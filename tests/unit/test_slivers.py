@@ -1,0 +1,68 @@
+"""Pieces thinner than a raster's cells, tips, and narrow ranges of orientations, against closed forms and rasters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.studies import study_of
+
+import mechdesign
+
+# Upper arm, forearm, and the ranges of both joints in degrees.
+THIN = (0.4, 0.25, (-14.5, -13.3), (37.9, 39.3))
+LONG = (0.52, 0.43, (-58.8, -49.6), (110.6, 305.7))
+
+
+@pytest.mark.parametrize("about", ["[0, 0]", "[0.37, 0.57]", "[-1.9, -2.2]"])
+@pytest.mark.parametrize("arm", [THIN, LONG], ids=["thin", "long"])
+def test_an_arm_with_narrow_limits(
+    arm: tuple[float, float, tuple[float, float], tuple[float, float]], about: str
+) -> None:
+    """With the elbow on one side dA = l1 l2 sin(q2) dq1 dq2; the rectangle by points all along both limits."""
+    one, two, first, second = arm
+    q1, q2 = np.radians(np.linspace(*first, 4001)), np.radians(np.linspace(second[0], min(second[1], 180), 40001))
+    area = one * two * np.ptp(q1) * (np.cos(q2[0]) - np.cos(q2[-1]))
+    forearm = one + two * np.exp(1j * q2)
+    border = np.concatenate(
+        [np.exp(1j * q) * forearm for q in q1[[0, -1]]] + [np.exp(1j * q1) * forearm[k] for k in (0, -1)]
+    )
+    box = np.ptp(border.real) * np.ptp(border.imag)
+    elbow, hand = one * np.exp(1j * q1[1000]), np.exp(1j * q1[1000]) * forearm[100]
+    found = mechdesign.workspace(study_of(f"""
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, upper: [O, A, {one}], fore: [A, P, {two}]}}
+  drives: {{q1: {{angle: upper}}, q2: {{angle: fore, from: upper}}}}
+  limits: [{{drive: q1, min: {first[0]}, max: {first[1]}}}, {{drive: q2, min: {second[0]}, max: {second[1]}}}]
+  sketch: {{A: [{elbow.real}, {elbow.imag}], P: [{hand.real}, {hand.imag}]}}
+workspace: {{point: P, assembly: any, indices: [], scan: {{about: {about}}}}}
+""")).main  # fmt: skip
+    assert abs(found["area"][0] - area) <= found["area_error"][0] + 1e-9 * area
+    assert abs(found["SUI"][0] - area / box) <= found["SUI_error"][0] + 1e-7
+    assert found["SUI_error"][0] <= 0.02
+
+
+def test_three_links_over_a_range_of_orientations() -> None:
+    """Reached where some orientation of the hand lets all three joints be within their limits, by a raster."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, a: [O, A, 0.4], b: [A, B, 0.3], h: [B, P, 0.1]}
+  drives: {t1: {angle: a}, t2: {angle: b, from: a}, t3: {angle: h, from: b}}
+  limits: [{drive: t1, min: -100, max: 170}, {drive: t2, min: -150, max: -5}, {drive: t3, min: 120, max: 300}]
+  sketch: {A: [0.38, 0.13], B: [0.38, -0.17], P: [0.33, -0.257]}
+workspace: {point: P, assembly: any, scan: {about: [0, 0], from: -60, to: -30}, at: {h.angle: {from: -120, to: -60}}}
+""")
+    cells, half = 160, 0.8
+    x = (np.arange(cells) + 0.5) * half / cells
+    z = x - 1j * x[:, None]
+    z = z[(np.abs(np.angle(z) + np.radians(45)) < np.radians(15)) & (np.abs(z) > 0.4)]
+    reached = np.zeros(z.shape, dtype=bool)
+    for angle in np.radians(np.linspace(-120, -60, 1501)):
+        wrist = z - 0.1 * np.exp(1j * angle)
+        cosine = (np.abs(wrist) ** 2 - 0.25) / 0.24
+        t2 = -np.arccos(np.clip(cosine, -1, 1))
+        t1 = np.angle(wrist / (0.4 + 0.3 * np.exp(1j * t2)))
+        turns = ((t1, -100, 270), (t2, -150, 145), (angle - t1 - t2, 120, 180))
+        within = [(turn - np.radians(low)) % (2 * np.pi) <= np.radians(width) for turn, low, width in turns]
+        reached |= (np.abs(cosine) <= 1) & np.all(within, axis=0)
+    found = mechdesign.workspace(study).main["area"][0]
+    assert found == pytest.approx(reached.sum() * (half / cells) ** 2, rel=5e-3)
