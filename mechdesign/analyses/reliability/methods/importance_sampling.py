@@ -172,7 +172,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
         if count * float(weights @ weights) < (1.0 + _GOOD_VARIANCE) * float(weights.sum()) ** 2:
             break
     if worth.sum() > 0:
-        parts = parts.fitted(failures, worth, _LEAST_SHARE)
+        parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
     mixture = parts.joined(parts.widened, _WIDE_SHARE).joined(fixed, _FIXED_SHARE)
     weights = mixture.worth(failures)
     return mixture, float(worth @ weights) / (rounds * count), float(weights.max(initial=0.0))
