@@ -38,7 +38,7 @@ _ROUNDS = 12
 _ROUND_SAMPLES = 40
 _PART_SAMPLES = 10
 _ROUND_LEAST = 1600
-# Learned enough where the relative variance of a round's weights is below this.
+# Learned enough where the relative variance of a round's weights is below this, or below the number of rounds.
 _GOOD_VARIANCE = 2.0
 # A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
 _PART_WEIGHT = 0.05
@@ -169,7 +169,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
         failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
         if worth.sum() > 0:
             parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
-        if count * float(weights @ weights) < (1.0 + _GOOD_VARIANCE) * float(weights.sum()) ** 2:
+        if count * float(weights @ weights) < (1.0 + max(_GOOD_VARIANCE, rounds)) * float(weights.sum()) ** 2:
             break
     if worth.sum() > 0:
         parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
