@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 from math import comb, factorial
 
 import numpy as np
 from scipy.special import gammaincc, ndtr, ndtri
 
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.analyses.reliability.laws import Measured
 from mechdesign.analyses.reliability.methods import quasi_monte_carlo as quasi
 from mechdesign.numerics.arrays import Floats
 
@@ -97,6 +99,18 @@ def ends(beta: float) -> Case:
 
     one, other = ndtr(-beta), ndtr(-beta - 1)
     return Case(3, margins, float(one + other - one * other))
+
+
+def measured(count: int, limit: float) -> Case:
+    """The sum of dimensions measured at 100 parts, two of them outliers by 0.1, beyond a limit, by convolution."""
+    rng, step = np.random.default_rng(0), 1e-4
+    laws = [Measured.of(np.r_[rng.normal(0, 0.002, 98), rng.normal(0.1, 0.002, 2)], 0.0) for _ in range(count)]
+    grid = step * np.arange(-2000, 2000)
+    # Each law in a cell about every node; sums of cells are as far off as half of them on the average.
+    shares = [np.diff(np.interp(grid - 0.5 * step, law.ordered, (np.arange(100) + 0.5) / 100, 0, 1)) for law in laws]
+    total = reduce(np.convolve, shares)
+    exact = float(total[step * np.arange(len(total)) + count * grid[0] > limit].sum())
+    return Case(count, lambda u: (limit - sum(law.at(row) for law, row in zip(laws, u, strict=True)))[None], exact)
 
 
 def uniforms(dimension: int, limit: float) -> Case:

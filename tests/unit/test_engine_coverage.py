@@ -28,10 +28,15 @@ CASES = {
     "four_branches_in_one": limit_states.four_branches(7, together=True),
     "parabola": limit_states.parabola(),
     "ring": limit_states.ring(4.0),
-    "largest_of_eight": limit_states.largest(8, 5.55),
-    "two_outliers_of_three": limit_states.outliers(3, 0.002, 4.5),
     "ends": limit_states.ends(4.0),
     "two_uniforms": limit_states.uniforms(2, 1.95),
+}
+# Where learning takes longer.
+HARD_SEEDS = 40
+HARD = {
+    "largest_of_eight": limit_states.largest(8, 5.55),
+    "two_outliers_of_three": limit_states.outliers(3, 0.002, 4.5),
+    "measured": limit_states.measured(5, 0.35),
 }
 
 
@@ -60,6 +65,19 @@ def test_importance_sampling(case: Case) -> None:
         intervals.append((found.low, found.high))
         # An interval as wide as that of plain samples would cover without importance.
         assert found.high - found.low < found.failure
+    check(intervals, case.exact)
+
+
+@pytest.mark.parametrize("case", HARD.values(), ids=HARD)
+def test_importance_sampling_of_many_places_of_failure(case: Case) -> None:
+    """One limit that is broken in many corners, or in boxes where nothing has a slope."""
+    intervals = []
+    for seed in range(1000, 1000 + HARD_SEEDS):
+        rng, problem = generator(seed), case.problem
+        found = importance_sampling(problem, find(problem, rng), rng, 2000)
+        intervals.append((found.low, found.high))
+    # Plain samples would have an interval of a thousandth at the least.
+    assert np.median(np.diff(intervals)) < 2 * case.exact
     check(intervals, case.exact)
 
 

@@ -51,8 +51,6 @@ _ZERO_MARGIN = 1e-2
 _LITTLE_GAIN = 0.95
 # Directions farther from each other than this (distance on the circle) are two.
 _DIRECTIONS_APART = 0.5
-
-
 # Design points farther than the nearest one by this many standard deviations bring nothing.
 _FARTHEST = 4.0
 # Points, limits, normals and pulls as in `DesignPoints`, the points and normals of shape (dimension, points).

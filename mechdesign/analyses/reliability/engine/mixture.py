@@ -113,6 +113,12 @@ class Mixture:
             heading=np.concatenate([self.heading, other.heading]),
         )  # fmt: skip
 
+    @property
+    def widened(self) -> Mixture:
+        """Parts with covariances halfway to those of the law: above half of these the weights' variance is finite."""
+        covariance = 0.5 * (self.root @ self.root.swapaxes(1, 2) + np.eye(self.root.shape[1]))
+        return replace(self, root=np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
+
     def about(self, u: Floats) -> Mixture:
         """One part about the point `u`, shape (dimension,), and nothing beyond."""
         return replace(

@@ -34,11 +34,11 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.reliability import Precision
 
 # Rounds of learning, from all failures so far, and their samples a dimension, each part besides, and at least.
-_ROUNDS = 6
+_ROUNDS = 12
 _ROUND_SAMPLES = 40
 _PART_SAMPLES = 10
 _ROUND_LEAST = 1600
-# Learned enough where the relative variance of a round's weights is below this.
+# Learned enough where the relative variance of a round's weights is below this, or below the number of rounds.
 _GOOD_VARIANCE = 2.0
 # A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
 _PART_WEIGHT = 0.05
@@ -48,6 +48,8 @@ _PART_LACK = 10.0
 _MAX_PARTS = 24
 # Explored failures, by their weights, from which on they add parts before the first round.
 _EXPLORED_MANY = 5
+# Share of the learned parts' samples that are drawn widely, so that the variance of the weights is finite.
+_WIDE_SHARE = 0.2
 # Share of the samples that stay with the design points, and with the least of them.
 _FIXED_SHARE = 0.1
 _LEAST_SHARE = 0.02
@@ -92,8 +94,8 @@ def importance_sampling(
     """
     if not len(points.u):
         return Estimate(0.0, 0.0, 1.0, problem.evaluations)
-    mixture = _learned(problem, points, rng)
-    total = squares = most = 0.0
+    mixture, square, most = _learned(problem, points, rng)
+    total = squares = 0.0
     done = failures = invalid = 0
     wanted = samples if precision is None else min(_FIRST_SAMPLES, samples)
     while done < wanted:
@@ -108,10 +110,10 @@ def importance_sampling(
         invalid += int(np.isnan(margins).any(axis=0).sum())
         if done == wanted < samples and precision is not None and total > 0:
             mean = total / done
-            if not reached(precision, mean, *weighted(total, squares, most, done)):
-                more = _MARGIN * needed(precision, mean, squares / done - mean * mean)
+            if not reached(precision, mean, *weighted(total, max(squares, done * square), most, done)):
+                more = _MARGIN * needed(precision, mean, max(squares / done, square) - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
-    low, high = weighted(total, squares, most, done)
+    low, high = weighted(total, max(squares, done * square), most, done)
     # Weights are 1 on the average only.
     return Estimate(min(total / done, 1.0), low, high, problem.evaluations, done, failures, invalid)
 
@@ -141,8 +143,11 @@ def _least(normal: Floats) -> float:
     return float(np.sqrt((normal * normal).sum(axis=0).min(initial=np.inf)))
 
 
-def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Mixture:
-    """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round."""
+def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> tuple[Mixture, float, float]:
+    """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round.
+
+    With it, from all failures of the rounds: the mean square and the largest of the weights of its own samples.
+    """
     fixed = _about(problem, points)
     parts = replace(fixed, weight=(1.0 - _LEAST_SHARE) * fixed.weight / fixed.weight.sum())
     explored = explored_weights(problem, points.seen)
@@ -152,7 +157,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
     count = max(_ROUND_LEAST, (_ROUND_SAMPLES + _PART_SAMPLES * len(fixed.weight)) * problem.dimension)
     seen, known = [], []
     for rounds in range(1, _ROUNDS + 1):
-        mixture = parts.joined(fixed, _FIXED_SHARE)
+        mixture = parts.joined(parts.widened, _WIDE_SHARE).joined(fixed, _FIXED_SHARE)
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
         weights = mixture.worth(u)
@@ -164,11 +169,13 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
         failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
         if worth.sum() > 0:
             parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
-        if count * float(weights @ weights) < (1.0 + _GOOD_VARIANCE) * float(weights.sum()) ** 2:
+        if count * float(weights @ weights) < (1.0 + max(_GOOD_VARIANCE, rounds)) * float(weights.sum()) ** 2:
             break
     if worth.sum() > 0:
-        parts = parts.fitted(failures, worth, _LEAST_SHARE)
-    return parts.joined(fixed, _FIXED_SHARE)
+        parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
+    mixture = parts.joined(parts.widened, _WIDE_SHARE).joined(fixed, _FIXED_SHARE)
+    weights = mixture.worth(failures)
+    return mixture, float(worth @ weights) / (rounds * count), float(weights.max(initial=0.0))
 
 
 def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
