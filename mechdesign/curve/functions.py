@@ -358,8 +358,9 @@ class Functions:
             height = chebyshev.value(product[piece], x)
             real = np.abs(height) > POLE * sizes[0][piece]
             # From either side the divisor has its sign a little before the place.
-            beside = [chebyshev.value(divisor[piece], np.clip(x + step, -1, 1)) for step in (-1e-4, 1e-4)]
-            up = np.stack([sign * height * by > 0 for by in beside]).any(axis=0) & real
+            beside = np.stack([x - 1e-4, x + 1e-4])
+            by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
+            up = ((sign * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
             found.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
         return tuple(np.concatenate(part) for part in zip(*found, strict=True))  # type: ignore[return-value]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from typing import Any
 
@@ -140,8 +140,12 @@ def scopes_of(question: MotionQuestion, along: Along | None, reason: NDArray[np.
     if along is not None and not along.whole[0]:
         missing.append(f"{100 * (1 - along.present[0]):.3g} % of the motion is missing")
 
+    @cache
+    def followed(name: str) -> Along | None:
+        return along_of(question, [name])
+
     def worst(name: str, sign: int, absolute: bool) -> tuple[float, str] | None:
-        own = along_of(question, [name])
+        own = followed(name)
         if own is None or own.curve.spent[0] or not own.follows(name):
             return None
         value, place = own.worst(name, sign, absolute=absolute)
