@@ -195,3 +195,87 @@ def test_rates_at_a_corner_are_those_behind_it_and_a_warning_says_so() -> None:
     assert motion["P.y_velocity"] == pytest.approx([0, 0, 50, 50], abs=1e-9)
     (warning,) = result.warnings
     assert warning.startswith("the path has corners at 1 pose, the first: P.x = 90 mm, P.y = 40 mm")
+
+
+SMALL_CIRCLE = "{path: {C: {circle: {center: [20, 25], radius: 20}, points: 25}}, outputs: [J]}"
+REACH = """\
+mechanism:
+  links: {ground: {O: [0, 0]}, up: [O, J, 100], fore: [J, C, 80]}
+  drives: {q1: {angle: up}, q2: {angle: fore, from: up}}
+  sketch: {J: [0, 100], C: [80, 100]}
+"""
+
+
+def circle_of_reach() -> np.ndarray:
+    """Joints of the arm while C passes the small circle outside its inner reach of 20, the dead centres among them."""
+    c = 20 + 25j + 20 * np.exp(1j * np.linspace(0, 2 * np.pi, 200_001))
+    c = c[np.abs(c) >= 20]
+    along = (100**2 - 80**2 + np.abs(c) ** 2) / (2 * np.abs(c))
+    # Where both circles of radius 20 meet the arm is folded along the line to C.
+    half = abs(20 + 25j) / 2
+    meet = (20 + 25j) / abs(20 + 25j) * (half + np.array([1j, -1j]) * np.sqrt(20**2 - half**2))
+    return np.concatenate([c / np.abs(c) * (along + 1j * np.sqrt(100**2 - along**2)), 5 * meet])
+
+
+def test_a_circle_beyond_the_inner_reach_is_followed_to_its_dead_centres() -> None:
+    result = kinematics(study_of(REACH + f"kinematics: {SMALL_CIRCLE}\n"))
+    joints = circle_of_reach()
+    for output, values in (("J.x", joints.real), ("J.y", joints.imag)):
+        extremes = row(result, output)
+        assert (extremes["min"], extremes["max"]) == pytest.approx((values.min(), values.max()), abs=1e-5)
+    assert row(result, "J.x")["max"] == pytest.approx(result.tables["limits"]["J.x"].max(), rel=1e-9)
+
+
+def test_a_limit_behind_a_dead_centre_ends_the_motion_there() -> None:
+    limited = REACH + "  measures: {x: J.x}\n  limits: [{measure: x, max: 60}]\n"
+    result = kinematics(study_of(limited + f"kinematics: {SMALL_CIRCLE}\n"))
+    assert result.tables["limits"]["kind"].tolist() == ["dead centre", "limit"]
+    assert row(result, "J.x")["max"] == pytest.approx(60, rel=1e-12)
+
+
+def test_least_magnitudes_do_not_jump_over_zero_at_a_corner() -> None:
+    # C turns back at (110, 60): the rate of the elbow changes its sign there, and its least magnitude is at a row.
+    path = "kinematics: {path: {C: [[60, 60], [110, 60], [60, 60]]}, speed: 100, outputs: [C]}\n"
+    c = np.linspace(60, 110, 100_001) + 60j
+    elbow = np.arccos((np.abs(c) ** 2 - 100**2 - 80**2) / (2 * 100 * 80))
+    rate = np.abs(np.degrees(np.gradient(elbow, c.real))) * 100
+    below, above = judged(
+        REACH + path,
+        f"result: kinematics.q2_velocity, abs: true, at_least: {rate.min() - 0.01}",
+        f"result: kinematics.q2_velocity, abs: true, at_least: {rate.min() + 0.01}",
+    )
+    assert (below.met, above.met) == (True, False)
+
+
+def test_a_limit_that_is_touched_ends_no_motion() -> None:
+    text = """\
+mechanism:
+  links: {ground: {O: [0, 0], G: [0, 0]}, crank: [O, A, 30], rod: [A, B, 100], slider: {B: [0, 0]}}
+  joints: {guide: {prismatic: [ground, slider], through: G, point: B}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 30], B: [95, 0]}
+  measures: {x: B.x}
+  limits: [{measure: x, max: 130}]
+kinematics: {sweep: {theta: {from: -100, to: 260, step: 20}}, outputs: [B.x]}
+"""
+    (verdict,) = judged(text, "result: kinematics.B.x, at_most: 130.001")
+    assert verdict.met
+    assert not len(kinematics(study_of(text)).tables["limits"])
+
+
+def test_a_rate_is_infinite_where_a_spline_crosses_the_reach() -> None:
+    path = """\
+kinematics:
+  path: {C: {through: [[-38.4, -72.1], [-62.1, -70.7], [-57.2, -60.7], [-59.7, -45.3], [-46.2, -49.7]], spline: true}}
+  speed: 100
+  outputs: [J]
+"""
+    text = REACH.replace("[O, J, 100]", "[O, J, 43]").replace("[J, C, 80]", "[J, C, 55]")
+    text = text.replace("{J: [0, 100], C: [80, 100]}", "{J: [0, 43], C: [55, 43]}") + path
+    for verdict in judged(
+        text,
+        *(f"result: kinematics.{q}_velocity, abs: true, at_most: 1e15, unassembled: allowed" for q in ("q1", "q2")),
+    ):
+        assert not verdict.met
+        assert verdict.worst == np.inf
+    assert not any("corners" in words for words in kinematics(study_of(text)).warnings)
