@@ -101,7 +101,7 @@ class Raster:
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
         for division in range(DIVISIONS):
-            if division and len(design) * len(x) > z.size:
+            if not len(design) or (division and len(design) * len(x) > z.size):
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
