@@ -56,7 +56,7 @@ def check(rng: np.random.Generator, text: str, scan: dict[str, np.ndarray]) -> N
 
 
 def test_gates_along_paths_of_five_bars(seeds: Seeds) -> None:
-    for seed in seeds(40):
+    for seed in seeds(20):
         rng = np.random.default_rng([seed, 1])
         robot = FiveBar(rng)
         path = Path(rng, robot.drawn)
