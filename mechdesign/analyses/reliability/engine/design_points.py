@@ -36,6 +36,8 @@ MAX_POINTS = 96
 # How often failures that no tangent explains are searched from, and the part of its distance from which on one does.
 _SEARCHES = 8
 _NEARLY = 0.98
+# So many times as far from the mean as a design point is beyond it.
+_BEYOND = 1.02
 # In place of a limit: whatever fails.
 _ANY = -1
 # How often directions are turned to the worst, and what is no turn (distance on the circle).
@@ -109,7 +111,8 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     seen, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
     points = _distinct(problem, found, seen, lost)
     for _ in range(0 if len(problem.circles) else _SEARCHES):
-        u = u[:, failed(margins)]
+        u = np.concatenate([u, _exchanged(problem, points, rng)], axis=1)
+        u = u[:, failed(problem.margins(u))]
         starts = _apart(problem, u[:, ~_explained(points, u)], _STARTS)
         if not starts.shape[1] or len(points.u) == MAX_POINTS:
             break
@@ -126,13 +129,24 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
         if points.near.sum() == before.near.sum():
             break
         u = _explored(problem, rng)
-        margins = problem.margins(u)
     return points
 
 
 def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
     """Samples of all spreads."""
     return np.concatenate([problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS], axis=1)
+
+
+def _exchanged(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Floats:
+    """Design points, a little beyond, with the values of two variables exchanged: like parts fail in like places."""
+    u = _BEYOND * points.u[points.near]
+    first, second = np.triu_indices(problem.dimension, 1)
+    point, pair = (each.ravel() for each in np.indices((len(u), len(first))))
+    some = rng.permutation(len(point))[:EXPLORED]
+    point, pair, lane = point[some], pair[some], np.arange(len(some))
+    u = u[point]
+    u[lane, first[pair]], u[lane, second[pair]] = u[lane, second[pair]], u[lane, first[pair]]
+    return np.asarray(u.T)
 
 
 def _explained(points: DesignPoints, u: Floats) -> Flags:
