@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.reliability.engine.problem import Problem, failed
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 
 # Standard deviations of the samples that starts are taken from, and how many of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
@@ -111,8 +111,8 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     seen, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
     points = _distinct(problem, found, seen, lost)
     for _ in range(0 if len(problem.circles) else _SEARCHES):
-        u = np.concatenate([u, _exchanged(problem, points, rng)], axis=1)
-        u = u[:, failed(problem.margins(u))]
+        exchanged = _exchanged(problem, points)
+        u = np.concatenate([u[:, failed(margins)], exchanged[:, failed(problem.margins(exchanged))]], axis=1)
         starts = _apart(problem, u[:, ~_explained(points, u)], _STARTS)
         if not starts.shape[1] or len(points.u) == MAX_POINTS:
             break
@@ -129,6 +129,7 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
         if points.near.sum() == before.near.sum():
             break
         u = _explored(problem, rng)
+        margins = problem.margins(u)
     return points
 
 
@@ -137,12 +138,12 @@ def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
     return np.concatenate([problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS], axis=1)
 
 
-def _exchanged(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> Floats:
+def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
     """Design points, a little beyond, with the values of two variables exchanged: like parts fail in like places."""
     u = _BEYOND * points.u[points.near]
     first, second = np.triu_indices(problem.dimension, 1)
     point, pair = (each.ravel() for each in np.indices((len(u), len(first))))
-    some = rng.permutation(len(point))[:EXPLORED]
+    some = evenly(len(point), EXPLORED)
     point, pair, lane = point[some], pair[some], np.arange(len(some))
     u = u[point]
     u[lane, first[pair]], u[lane, second[pair]] = u[lane, second[pair]], u[lane, first[pair]]
