@@ -111,8 +111,7 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     seen, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
     points = _distinct(problem, found, seen, lost)
     for _ in range(0 if len(problem.circles) else _SEARCHES):
-        exchanged = _exchanged(problem, points)
-        u = np.concatenate([u[:, failed(margins)], exchanged[:, failed(problem.margins(exchanged))]], axis=1)
+        u = np.concatenate([u[:, failed(margins)], _exchanged(problem, points)], axis=1)
         starts = _apart(problem, u[:, ~_explained(points, u)], _STARTS)
         if not starts.shape[1] or len(points.u) == MAX_POINTS:
             break
@@ -139,7 +138,7 @@ def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
 
 
 def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
-    """Design points, a little beyond, with the values of two variables exchanged: like parts fail in like places."""
+    """Failures among the design points with two variables exchanged, a little beyond: like parts fail alike."""
     u = _BEYOND * points.u[points.near]
     first, second = np.triu_indices(problem.dimension, 1)
     point, pair = (each.ravel() for each in np.indices((len(u), len(first))))
@@ -147,7 +146,7 @@ def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
     point, pair, lane = point[some], pair[some], np.arange(len(some))
     u = u[point]
     u[lane, first[pair]], u[lane, second[pair]] = u[lane, second[pair]], u[lane, first[pair]]
-    return np.asarray(u.T)
+    return np.asarray(u.T[:, failed(problem.margins(u.T))] if len(u) else u.T)
 
 
 def _explained(points: DesignPoints, u: Floats) -> Flags:
