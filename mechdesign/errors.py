@@ -180,6 +180,10 @@ class AssemblyError(MechdesignError):
 
     exit_code = 3
 
+    def __init__(self, message: str, result: Result | None = None) -> None:
+        self.result = result  #: of an optimisation without a feasible design: the one that misses least
+        super().__init__(message)
+
 
 class OutputError(MechdesignError):
     """Results could not be written."""

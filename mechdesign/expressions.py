@@ -205,6 +205,20 @@ class Expression:
 
         return bool(self._run(constant, variable, kind) == "angle")
 
+    def substituted(self, values: Mapping[str, Expression | float]) -> Expression:
+        """The expression with others, or numbers, in place of its variables; trigonometry has their angle unit."""
+        given = {name: each for name, each in values.items() if isinstance(each, Expression)}
+        parts: dict[str, tuple[_Step, ...]] = {
+            name: each.program if isinstance(each, Expression) else (("constant", each),)
+            for name, each in values.items()
+        }  # fmt: skip
+        program = tuple(
+            chain.from_iterable(parts[str(item)] if kind == "name" else ((kind, item),) for kind, item in self.program)
+        )
+        names = frozenset(str(item) for kind, item in program if kind == "name")
+        unit = next((each.angle_unit for each in given.values()), self.angle_unit)
+        return Expression(self.text, program, unit, names)
+
     def turning(self, name: str) -> tuple[Expression, dict[str, tuple[Expression, float]]]:
         """The expression with variables in place of its arctangents, and these, each with the turn after it repeats.
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.statistics import Asked, Course
+
 if TYPE_CHECKING:
     import pandas
 
@@ -56,14 +58,13 @@ class Scope:
         Whether nothing is known between the poses asked for.
     missing : str
         In words, which poses or parts of the motion are not valid; empty where all are.
-    worst : callable, optional
-        Largest value of a column over the whole motion, or of it times -1, or of its absolute values (by its name, a
-        sign, and whether absolute values count): the value and its place in words; None where none is known.
+    course : callable, optional
+        A column along the motion, or a part of it; None where that is not known.
     """
 
     poses_only: bool = False
     missing: str = ""
-    worst: Callable[[str, int, bool], tuple[float, str] | None] | None = None
+    course: Callable[[Asked], Course | None] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

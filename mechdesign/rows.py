@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.errors import nearest, suggestion
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
+from mechdesign.statistics import STATISTICS, Asked, Course, Interval, Part, RowSpread
 
 # Number of a column's values that a message names.
 MOST_VALUES = 12
@@ -34,11 +36,70 @@ class Chosen:
     values: Floats  # all rows; absolute values where these are judged
     counts: Flags  # which rows count
     missing: str = ""  # where none counts because the table never has what was asked for: what it has instead
+    statistic: str = ""  # what is told of them, a word of `STATISTICS`
+    part: Part = ()  # where columns lie in the part of a motion that counts
+    name: str = ""  # as the study may name it: command, table and row, without the statistic
+    picked: bool = False  # whether rows are picked by the values of columns, so that what is between them is not meant
 
     @property
     def unit(self) -> str:
-        """Unit of the rows that count."""
-        return unit_of(self.table, self.column, self.counts)
+        """Unit of the rows that count, or of what is told of them."""
+        pure = self.statistic and STATISTICS[self.statistic].pure
+        return "" if pure else unit_of(self.table, self.column, self.counts)
+
+    @property
+    def parts(self) -> tuple[Chosen, ...]:
+        """What it is of, as of a sum."""
+        return (self,)
+
+    @cached_property
+    def course(self) -> Course | None:
+        """The column between the rows, where these are poses of a motion that is followed."""
+        scope = self.table.scope
+        return None if scope is None or scope.course is None or self.picked else scope.course(self.asked)
+
+    @property
+    def asked(self) -> Asked:
+        """What is asked of the column between the rows."""
+        return Asked(self.column, self.part, bool(self.statistic) and STATISTICS[self.statistic].integral)
+
+    def shaped(self, designs: int, *, assembled: bool = False) -> tuple[Floats, Flags]:
+        """Values, and which of them count (of those alone that are assembled), of several designs: (designs, rows)."""
+        shape, counts = (designs, len(self.values) // designs), self.counts
+        if assembled and "valid" in self.table:
+            counts = counts & self.table["valid"].astype(bool)
+        return self.values.reshape(shape), counts.reshape(shape)
+
+    def numbers(self, designs: int = 1, *, assembled: bool = False) -> Floats:
+        """The one number of each design, shape (designs,): its statistic, or the row that counts.
+
+        Along a motion that is followed the statistic is that of the motion between the rows, too. It is nan where none
+        counts, and where a row that counts has no value.
+
+        Raises
+        ------
+        UnknownColumnError
+            If several rows count and no statistic is named.
+        """
+        values, counts = self.shaped(designs, assembled=assembled)
+        if not self.statistic:
+            if (several := counts.sum(axis=1)).max(initial=0) > 1:
+                raise UnknownColumnError(self._several(int(several.max())))
+            return RowSpread(values, counts).end(1)
+        statistic = STATISTICS[self.statistic].of
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rows = statistic(RowSpread(values, counts))
+            if self.course is None:
+                return rows
+            lost = (np.isnan(values) & counts).any(axis=1)
+            return np.where(lost | ~self.course.followed, rows, statistic(self.course))
+
+    def _several(self, count: int) -> str:
+        words = [*STATISTICS]
+        return (
+            f"{self.name} has {count} rows; ask for {self.name}.{words[0]}, or for its {', '.join(words[1:-1])} or "
+            f"{words[-1]}, or name its row"
+        )
 
     def bound(self, value: float) -> float:
         """A bound in the unit of the rows that count.
@@ -48,7 +109,15 @@ class Chosen:
         UnknownColumnError
             If it is a quantity of another kind.
         """
-        return in_unit(value, self.table, self.column, self.counts)
+        return amount_in(value, f"{self.table.name}.{self.column}", self.unit)
+
+
+@runtime_checkable
+class Span(Protocol):
+    """Values from one to another, such as `mechdesign.study.schema.optimize.Span`."""
+
+    def interval(self, unit: str) -> Interval:
+        """The values in a unit of a table; raises ValueError where it is of another kind."""
 
 
 @runtime_checkable
@@ -60,13 +129,13 @@ class Measured(Protocol):
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
-    """Find a column and the rows in which others have the values of `where`.
+    """Find a column and the rows in which others have the values of `where`, or lie in its spans.
 
     Parameters
     ----------
     path : str
         ``column``, of the first table that has it; ``table.column``; or ``table.row.column`` with a word of the row,
-        as in ``extremes.C.x.range``.
+        as in ``extremes.C.x.range``; each also with a word of `STATISTICS` behind it, as in ``C.x.mean``.
 
     Raises
     ------
@@ -74,6 +143,7 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         If there is no such column (why, where the result says so), it holds words, its rows have several units, or a
         value of `where` is a quantity of another kind than its column.
     """
+    path, statistic = named(result, path)
     table, column, rows = located(result, path)
     counts = rows
     values = table[column]
@@ -83,17 +153,44 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
         raise UnknownColumnError(
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
         )
-    where = dict(where)
+    where, part = dict(where), list[tuple[str, Interval]]()
     for name, wanted in where.items():
         if name not in table:
-            raise UnknownColumnError(_unknown("where", name, table.names))
+            several = isinstance(wanted, Span) and table.name == "extremes"
+            told = "; name what is told of a column itself, as in kinematics.C.x.range" * several
+            raise UnknownColumnError(_unknown("where", name, table.names) + told)
+        if isinstance(wanted, Span):
+            part.append((name, _interval(wanted, table, name, counts)))
+            counts = counts & part[-1][1].holds(table[name].astype(float))
+            continue
         if table.column(name).numeric and isinstance(wanted, Measured):
             where[name] = in_unit(wanted, table, name, counts)
         counts = counts & _equal(table[name], where[name])
     _one_unit(table, column, counts)
     numbers = values.astype(float)
-    missing = "" if counts.any() else _missing(table, rows, where)
-    return Chosen(table, column, np.abs(numbers) if absolute else numbers, counts, missing)
+    missing = "" if counts.any() or part else _missing(table, rows, where)
+    return Chosen(
+        table, column, np.abs(numbers) if absolute else numbers, counts, missing, statistic, tuple(part),
+        f"{result.command}.{path}", len(part) < len(where),
+    )  # fmt: skip
+
+
+def named(result: Result, path: str) -> tuple[str, str]:
+    """The path of a column, and the statistic behind it; empty where it names none.
+
+    Raises
+    ------
+    UnknownColumnError
+        If there is no such column or statistic.
+    """
+    if _found(result, path) is not None:
+        return path, ""
+    head, _, word = path.rpartition(".")
+    if not head or _found(result, head) is None:
+        located(result, head if word in STATISTICS and head else path)
+    if word not in STATISTICS:
+        raise UnknownColumnError(f"{head} has no {word!r}; it has {', '.join(STATISTICS)}")
+    return head, word
 
 
 def unit_of(table: Table, name: str, rows: Flags) -> str:
@@ -111,14 +208,29 @@ def in_unit(value: Any, table: Table, name: str, rows: Flags | None = None) -> f
     UnknownColumnError
         If it is a quantity of another kind, or the rows have several units.
     """
-    if not isinstance(value, Measured):
-        return float(value)
     rows = np.ones(len(table), dtype=bool) if rows is None else rows
+    if isinstance(value, Measured):
+        _one_unit(table, name, rows)
+    return amount_in(value, f"{table.name}.{name}", unit_of(table, name, rows))
+
+
+def amount_in(value: Any, what: str, unit: str) -> float:
+    """A number in a unit; a bare one is in it already. Raises UnknownColumnError if it is of another kind."""
+    try:
+        return value.within(unit) if isinstance(value, Measured) else float(value)
+    except ValueError as error:
+        raise UnknownColumnError(f"{what}: {error}") from None
+
+
+def _interval(span: Span, table: Table, name: str, rows: Flags) -> Interval:
+    """A span in the unit of a column in some rows, which must have one."""
+    if not table.column(name).numeric:
+        raise UnknownColumnError(f"where: column {name!r} of {table.name} holds words, which have no range")
     _one_unit(table, name, rows)
     try:
-        return value.within(unit_of(table, name, rows))
+        return span.interval(unit_of(table, name, rows))
     except ValueError as error:
-        raise UnknownColumnError(f"{table.name}.{name}: {error}") from None
+        raise UnknownColumnError(f"where: {name}: {error}") from None
 
 
 def _one_unit(table: Table, column: str, counts: Flags) -> None:
@@ -141,16 +253,19 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
     )
 
 
-def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
-    """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
-    none = -np.inf if largest else np.inf
-    inside = np.where(counts, values, none)
-    found = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
-    return np.where(counts.any(axis=-1), found, np.nan)
-
-
 def located(result: Result, path: str) -> tuple[Table, str, Flags]:
     """The table and the column that a path names, and which rows; see `choose`."""
+    if (found := _found(result, path)) is not None:
+        return found
+    for absent in result.absent:
+        if absent in path.split("."):
+            raise UnknownColumnError(_why_absent(result, absent))
+    known = [column for table in result.tables.values() for column in table.names]
+    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+
+
+def _found(result: Result, path: str) -> tuple[Table, str, Flags] | None:
+    """What `located` gives; None where there is no such column."""
     name, _, rest = path.partition(".")
     named = result.tables.get(name)
     for table, column in (*((each, path) for each in result.tables.values()), *([(named, rest)] if named else [])):
@@ -162,11 +277,7 @@ def located(result: Result, path: str) -> tuple[Table, str, Flags]:
             for words in named.columns if word != rest else ():
                 if not words.numeric and (rows := _equal(words.values, word)).any():
                     return named, column, rows
-    for absent in result.absent:
-        if absent in path.split("."):
-            raise UnknownColumnError(_why_absent(result, absent))
-    known = [column for table in result.tables.values() for column in table.names]
-    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+    return None
 
 
 def _why_absent(result: Result, name: str) -> str:
@@ -209,4 +320,6 @@ def _present(values: NDArray[Any], wanted: object) -> str:
 def _equal(values: NDArray[Any], wanted: object) -> Flags:
     if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
         return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
+    if values.dtype.kind == "U":
+        return np.asarray(values == str(wanted))
     return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)

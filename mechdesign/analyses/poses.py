@@ -23,7 +23,9 @@ from mechdesign.numerics.arrays import Floats, Ints, evenly
 from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column, Scope, Table
 from mechdesign.study import Study
-from mechdesign.study.poses import PoseGroup, Poses, default, expand
+from mechdesign.study.designs import Designs
+from mechdesign.study.expansion import OWN, Numbers, default, expand, number_of_poses
+from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.poses import PoseSection
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
@@ -43,8 +45,8 @@ class SolvedPoses:
     configuration: Configuration
 
 
-def study_poses(study: Study, section: str) -> Poses:
-    """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked.
+def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
+    """Poses at which ``kinematics``, ``reliability`` or ``stiffness`` is asked, of the study's own design or of some.
 
     A section that says none takes those of kinematics, and these are by default a turn of the drive or its limits.
 
@@ -61,10 +63,26 @@ def study_poses(study: Study, section: str) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.folder)
+            found = expand(asked, study.folder, numbers)
             if found is not None:
                 return found
-    return default(study.mechanism.description)
+    return default(study.mechanism.description, numbers)
+
+
+def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
+    """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
+    asked = next((each for name in dict.fromkeys((section, "kinematics"))
+                  if (each := getattr(designs.study, name)) is not None and each.source is not None), None)  # fmt: skip
+    counts = np.zeros((len(rows), 0)) if asked is None else number_of_poses(asked, designs.take(rows).numbers)
+    kinds, which = np.unique(counts, axis=0, return_inverse=True)
+    for kind in range(len(kinds)):
+        members = rows[which.ravel() == kind]
+        if (kinds[kind] < 0).any():
+            yield members
+            continue
+        count = study_poses(designs.study, section, designs.take(members[:1]).numbers).count
+        size = max(1, POSES_AT_ONCE // count)
+        yield from (members[begin : begin + size] for begin in range(0, len(members), size))
 
 
 def radians(study: Study, coordinate: Coordinate, value: Value) -> Value:
@@ -150,7 +168,7 @@ class _Turns:
         if self._grid is not None:
             return dict(zip((angle.name for angle in self.angles), self._grid[:, rows], strict=True))
         line, s = np.divmod(rows, self.poses.line)
-        table = np.nan_to_num(self.curve.turned(line, s.astype(float)))
+        table = np.nan_to_num(self.curve.beside(line, s.astype(float)))
         if self.curve.spent.any():
             # Of what is not followed between the poses an angle goes the nearest way.
             table = np.where(self.curve.spent[line], self._nearest(configuration), table)
@@ -211,13 +229,15 @@ def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -
     ]
 
 
-def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tuple[list[str], str]:
-    """Warnings for poses that failed, and the message where that is an error (exit code 3).
+def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8], begin: int = 0) -> tuple[list[str], str]:
+    """Warnings for poses of a design that failed, and the message where that is an error (exit code 3).
 
     Parameters
     ----------
-    reason : int8 array, shape (poses,)
+    reason : int8 array, shape (poses of the design,)
         See `mechdesign.mechanism.Reason`.
+    begin : int
+        Row of its first pose.
 
     Raises
     ------
@@ -228,8 +248,8 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8]) -> tupl
     if not len(bad):
         return [], ""
     invalid = invalid_in_words(reason)
-    named = [f"{pose_in_words(study, poses, int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
-    if len(bad) == poses.count:
+    named = [f"{pose_in_words(study, poses, begin + int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
+    if len(bad) == len(reason):
         raise AssemblyError(f"no pose is valid; {'; '.join(named)}" + ("; ..." if len(bad) > len(named) else ""))
     if poses.listed:
         return [invalid], f"pose {'; pose '.join(named)}"

@@ -260,11 +260,11 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     """Answer one question and say what came out; what goes wrong is its outcome."""
     try:
         with owned(directory):
-            given = replace(answer(study, command, directory, options, progress), table=None)
+            given = answer(study, command, directory, options, progress)
         tell(given, study, options)
     except Exception as error:
         return failure(study.label, command, directory, error, study)
-    return given
+    return replace(given, table=None)
 
 
 def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -> Entry | None:

@@ -35,7 +35,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             study = load_source(source_of(path, options), options)
             label = study.label
             if not options.quiet:
-                clearances = in_words(study.reliability, study.mechanism.graph)
+                clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
                 terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
             for warning in study.warnings:

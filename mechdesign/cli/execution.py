@@ -20,7 +20,7 @@ from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
-from mechdesign.commands import DIVIDED, MERGE
+from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.journal import NAME, Journal
@@ -28,6 +28,7 @@ from mechdesign.parallel import Divided, divided, one_thread
 from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
+from mechdesign.report.cases import best_of
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_by
@@ -164,6 +165,11 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         writer.write(directory, study, interrupt.result, (), asked)
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
+    except AssemblyError as error:
+        if error.result is not None:
+            plain = dataclasses.replace(asked, plots=False, animate=False, report=False)
+            writer.write(directory, study, error.result, (), plain)
+        raise
     try:
         with progress:
             verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress)
@@ -248,7 +254,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
     """3 where a pose that was asked for cannot be assembled, 1 where a requirement is not met; of cases the worst."""
-    cases: list[int] = table["exit_code"].tolist() if "exit_code" in table else []
+    cases = (int(part["exit_code"].max(initial=0)) for part in (table.blocks() if "exit_code" in table else ()))
     return max([3 if failed else 0 if all(verdict.met for verdict in verdicts) else 1, *cases])
 
 
@@ -298,6 +304,8 @@ def tell(given: Outcome, study: Study, options: Options) -> None:
         terminal.say(f"{who} warning: {warning}", quiet=options.quiet)
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
+    if given.command == SWEEP.name and given.table is not None and (best := best_of(given.table)) is not None:
+        terminal.say(f"{who} {best}", quiet=options.quiet)
     if given.failed:
         from mechdesign.cli.docs import look_up
 

@@ -187,6 +187,22 @@ RESULTS = _text(
     "Results that are listed besides the requirements, with commas between, e.g. kinematics.mu.min,GII. Repeatable; in "
     "place of those of the study's matrix.",
 )
+MAXIMIZE = _text(
+    "maximize",
+    list[str],
+    "--maximize",
+    "LIST",
+    "Results that are to be large: cases that meet every requirement get a rank, and the Pareto front is marked. Named "
+    "as for --results. Repeatable; in place of what the study's matrix maximizes.",
+)
+MINIMIZE = _text(
+    "minimize",
+    list[str],
+    "--minimize",
+    "LIST",
+    "Results that are to be small, likewise.",
+)
+SORT = _flag("sort", "--sort", "The best case is the first row of the table.")
 VERIFY = _text(
     "verify",
     Path,
@@ -248,7 +264,7 @@ TOLERANCES = _text(
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
 # Of the cases of a sweep.
-MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS)
+MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
 # What every question takes, and what only some of them do.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {

@@ -29,6 +29,9 @@ class Matrix:
     samples: int | None = None
     cases: Path | None = None
     results: Sequence[str] | None = None
+    maximize: Sequence[str] | None = None
+    minimize: Sequence[str] | None = None
+    sort: bool = False
 
     def overrides(self, study: Path | None) -> Iterator[str]:
         """The same as changes of the section ``matrix``; of other cases nothing of the study's design stays.
@@ -57,8 +60,20 @@ class Matrix:
         if self.samples is not None:
             yield f"matrix.samples={self.samples}"
         if self.results:
-            names = [name.strip() for each in self.results for name in each.split(",")]
-            yield f"matrix.results={in_yaml(names)}"
+            yield f"matrix.results={_listed(self.results)}"
+        if self.maximize or self.minimize:
+            yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
+        if self.maximize:
+            yield f"matrix.best.maximize={_listed(self.maximize)}"
+        if self.minimize:
+            yield f"matrix.best.minimize={_listed(self.minimize)}"
+        if self.sort:
+            yield "matrix.best.sort=true"
+
+
+def _listed(texts: Sequence[str]) -> str:
+    """Names with commas between them."""
+    return in_yaml([name.strip() for each in texts for name in each.split(",")])
 
 
 def _varied(text: str) -> tuple[str, Any]:
@@ -78,7 +93,7 @@ def _varied(text: str) -> tuple[str, Any]:
 
 def _as_typed(error: StudyError) -> StudyError:
     """The same mistakes under the options that say what `Matrix.overrides` made of them."""
-    written = re.compile(r"--set matrix\.(\w+)=.*")
+    written = re.compile(r"--set matrix\.(?:best\.)?(\w+)=.*")
     return StudyError([replace(each, file=written.sub(r"--\1", each.file)) for each in error.problems])
 
 

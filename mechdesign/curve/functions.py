@@ -1,27 +1,23 @@
 """Functions along motions: their extremes, zeros and means, between the poses as well.
 
-Each function is a Chebyshev series on every piece of a motion, which is halved until the series is exact or the piece
-can hold no extreme. One that has poles, such as a drive's effort at a singularity, is followed as the quotient of two
-that have none; at its poles it is infinite.
+Each function is a Chebyshev series on every piece of a motion, or the quotient of two: at the poles of one it is
+infinite.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from mechdesign.curve.motion import AT_ONCE, BUDGET, Curve
-from mechdesign.curve.pieces import MOST_HALVINGS, Pieces
+from mechdesign.curve.motion import INSET
+from mechdesign.curve.pieces import MOST_HALVINGS, between_marks, largest
+from mechdesign.curve.series import EXACT, Series
 from mechdesign.numerics import chebyshev
-from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
+from mechdesign.numerics.arrays import Floats, Ints, Lanes
 
-# Series that leave less than this part of a function's size are exact; near a singularity, where fewer digits are
-# known, as many times more as one is to the conditioning.
-EXACT = 2e-15
-# Means are known to this part of a function's size.
-MEAN_ERROR = 1e-10
 # A function is infinite where its divisor is zero and the product of both is more than this part of its size.
 POLE = 1e-9
 # Where its divisor is this part of its size or less, at the end of a piece, it is zero.
@@ -32,25 +28,17 @@ ZERO_AT_FOLD = 1e-4
 BESIDE_ROW = 1e-4
 # A value of a series that is farther than this part of the function's size from the function is not one of it.
 TRUE = 1e-7
-# Nodes of a piece at which a quotient may have no value.
-MOST_LOST = 4
+# From the first to behind the last of some in order.
+_SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 # A function without a divisor that grows by this factor over its halvings, and goes on to, is infinite.
 ENDLESS = 1e4
-
-# Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
-Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
 class Extremes:
-    """The largest values of functions on each line, of shape (functions, lines); nan where there is none.
+    """The smallest and the largest values of functions on each line, arrays of shape (2, functions, lines).
 
-    Parameters
-    ----------
-    value : ndarray
-        Of the functions times the sign that was asked for.
-    place : ndarray
-        Along the line, in rows.
+    They are nan where there is none. The places are along the line, in rows.
     """
 
     value: Floats
@@ -66,155 +54,75 @@ class Zeros(Lanes):
     place: Floats
 
 
-class Functions:
-    """Functions along the motions of a curve.
+class Functions(Series):
+    """Functions along the motions of a curve; see `Series` of what they are made from."""
 
-    Parameters
-    ----------
-    names : sequence of str
-        The functions that `evaluate` gives, in its order.
-    sizes : sequence of float
-        What rounding of each is judged by, at least.
-    divisors : mapping of str to sequence of (str, int)
-        Of functions with poles: others, whose zeros these are, and of which order.
-    extremes, means, zeros : sequence of str
-        Functions of which these are wanted; the others are evaluated only.
-    """
+    def at_ends(self, names: Sequence[str], line: Ints, place: Floats, x: Ints) -> Floats:
+        """Values of functions at ends of motions, shape (names, n): of the pieces that end (`x` 1) or begin (-1) there.
 
-    def __init__(
-        self, curve: Curve, names: Sequence[str], evaluate: Evaluate, sizes: Sequence[float],
-        divisors: Mapping[str, Sequence[tuple[str, int]]] | None = None, *,
-        extremes: Sequence[str] = (), means: Sequence[str] = (), zeros: Sequence[str] = (),
-    ) -> None:  # fmt: skip
-        self.curve, self.names, self._evaluate = curve, {name: k for k, name in enumerate(names)}, evaluate
-        self._sizes = np.array(sizes, dtype=float)
-        self._divisors = {
-            self.names[name]: [(self.names[by], power) for by, power in by_what]
-            for name, by_what in (divisors or {}).items()
-        }
-        self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
-        self._extremes, self._means, self._zeros = (
-            np.array([name in wanted for name in names], dtype=bool) for wanted in (extremes, means, zeros)
-        )
-        self.unresolved = np.zeros(curve.lines, dtype=bool)
-        self._follow()
-
-    def at(self, line: Ints, s: Floats) -> Floats:
-        """Values of all functions at places of lines, shape (functions, n)."""
-        return self._values(line, s)[0]
-
-    def _values(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
-        parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]
-        return np.concatenate([part[0] for part in parts], axis=1), np.concatenate([part[1] for part in parts])
-
-    def _sampled(self, pieces: Pieces) -> tuple[Floats, Floats, Floats]:
-        """At the nodes of pieces: functions (those with poles times their divisors), divisors, and exactness.
-
-        Of shapes (functions, pieces, nodes), twice, and (pieces,).
+        They are nan where no piece does.
         """
-        s = pieces.nodes
-        values, conditioning = self._values(np.repeat(pieces.line, s.shape[1]), s.ravel())
-        values = values.reshape(len(self.names), *s.shape)
-        divisors = np.ones_like(values)
-        for k, by_what in self._divisors.items():
-            for by, power in by_what:
-                divisors[k] *= values[by] ** power
-        with np.errstate(invalid="ignore", over="ignore"):
-            products = np.where(self._poled[:, None, None], values * divisors, values)
-        # At a pole itself a quotient has no value: its product goes on through the other nodes.
-        lost = ~np.isfinite(products) & self._poled[:, None, None]
-        number = np.count_nonzero(lost, axis=2)
-        for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
-            products[k, piece] = chebyshev.filled(products[k, piece], ~lost[k, piece])
-        least = np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape).min(axis=1, initial=1.0)
-        return products, divisors, EXACT / np.clip(least, 1e-6, 1.0)
-
-    def _follow(self) -> None:
-        """Halve pieces until every function is known where it matters."""
-        lines, spent = self.curve.lines, np.zeros(self.curve.lines)
-        pieces = pending = self.curve.pieces
-        values, divisors, exact = self._sampled(pieces)
-        done: list[tuple[Pieces, Floats, Floats, Floats, Flags]] = []
-        self._scale = np.zeros((len(self.names), lines))
-        self._divisor_scale = np.zeros((len(self.names), lines))
-        best = np.full((2, len(self.names), lines), -np.inf)
-        span = max(float(self.curve.poses.end), 1.0)
-        while len(pending.line):
-            spent += chebyshev.COUNT * np.bincount(pending.line, minlength=lines)
-            size = np.nanmax(np.where(np.isfinite(values), np.abs(values), 0.0), axis=2, initial=0.0)
-            for k in range(len(self.names)):
-                np.maximum.at(self._scale[k], pending.line, size[k])
-                np.maximum.at(self._divisor_scale[k], pending.line, np.abs(np.nan_to_num(divisors[k])).max(axis=1))
-            known = np.where(np.isfinite(values) & ~self._poled[:, None, None], values, np.nan)
-            ends = [
-                np.where(np.isnan(known), -np.inf, sign * known).max(axis=2, initial=-np.inf) for sign in (1.0, -1.0)
-            ]
-            for end, top in zip(ends, best, strict=True):
-                for k in range(len(self.names)):
-                    np.maximum.at(top[k], pending.line, end[k])
-            scale = np.maximum(self._scale, self._sizes[:, None] * ~self._poled[:, None])[:, pending.line]
-            rest = chebyshev.remainder(chebyshev.series(values))
-            rough = ~(rest <= exact * scale) & np.isfinite(values).any(axis=2)
-            with np.errstate(invalid="ignore"):
-                steps = np.abs(np.diff(known, axis=2))
-                steps = np.where(np.isnan(known[..., 1:]) != np.isnan(known[..., :-1]), np.inf, np.nan_to_num(steps))
-                above = np.stack([
-                    end + 2 * steps.max(axis=2, initial=0.0) >= top[:, pending.line] - exact * scale
-                    for end, top in zip(ends, best, strict=True)
-                ]).any(axis=0)  # fmt: skip
-            left = chebyshev.remainder(chebyshev.series(values * pending.stretch))
-            mean = left > MEAN_ERROR * span * scale
-            crossed = np.nanmin(np.abs(np.where(np.isfinite(values), values, np.inf)), axis=2) <= steps.max(axis=2)
-            matters = (
-                (self._extremes[:, None] & (self._poled[:, None] | above))
-                | (self._means[:, None] & mean)
-                | (self._zeros[:, None] & (self._poled[:, None] | crossed))
+        pieces = self.pieces
+        piece = np.full(len(line), -1)
+        for j, (one, first, last) in enumerate(
+            zip(place.tolist(), *(np.searchsorted(pieces.line, line, side) for side in _SIDES), strict=True)
+        ):
+            ends = (pieces.end if x[j] > 0 else pieces.begin)[first:last]
+            piece[j] = next(iter(first + np.flatnonzero(ends == one)), -1)
+        rows, lanes = self._rows(names), np.flatnonzero(piece >= 0)
+        values = np.full((len(rows), len(line)), np.nan)
+        if not len(lanes):
+            return values
+        piece, end = piece[lanes], chebyshev.basis(x[lanes].astype(float))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            above, below = (
+                np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
+                for table in (self._table, self._divisor)
             )
-            halve = (rough & matters).any(axis=0) & (pending.depth < MOST_HALVINGS)
-            self.unresolved |= np.bincount(pending.line[halve], minlength=lines).astype(bool) & (spent > BUDGET)
-            halve &= spent[pending.line] <= BUDGET
-            done.append((pending.take(~halve), values[:, ~halve], divisors[:, ~halve], exact[~halve], rough[:, ~halve]))
-            pending = pending.take(halve).halves()
-            if len(pending.line):
-                values, divisors, exact = self._sampled(pending)
-        parts = list(zip(*done, strict=True)) if done else None
-        if parts is None:
-            self.pieces = pieces
-            self._table = self._divisor = values
-            self._rough = np.zeros(values.shape[:2], dtype=bool)
-            return
-        joined = Pieces.joined(parts[0])
-        order = np.lexsort((joined.begin, joined.line))
-        self.pieces = joined.take(order)
-        self._table, self._divisor = (np.concatenate(part, axis=1)[:, order] for part in parts[1:3])
-        self._rough = np.concatenate(parts[4], axis=1)[:, order]
+            found = above / below
+        places = self.curve.inside(line[lanes], place[lanes])
+        shape = len(rows), len(lanes)
+        own, which = (part.ravel() for part in np.broadcast_arrays(rows[:, None], line[lanes]))
+        table = self.at(line[lanes], places)[rows]
+        values[:, lanes] = self._true(own, which, table.ravel(), found.ravel()).reshape(shape)
+        return values
 
-    def at_end(self, name: str, line: int, place: float, x: int) -> float:
-        """Value of a function at an end of the motion: of the piece that ends (`x` 1) or begins (-1) there."""
-        ends = self.pieces.end if x > 0 else self.pieces.begin
-        piece = np.flatnonzero((self.pieces.line == line) & (ends == place))
-        if not len(piece):
-            return np.nan
-        k, end = self.names[name], np.array([float(x)])
-        with np.errstate(divide="ignore"):
-            value = chebyshev.value(chebyshev.series(self._table[k, piece]), end) / chebyshev.value(
-                chebyshev.series(self._divisor[k, piece]), end
-            )
-        lines = np.array([line])
-        places = self.curve.inside(lines, np.array([place]))
-        return float(self._true(np.array([k]), 1, lines, places, value)[0])
+    def _rows(self, names: Sequence[str]) -> Ints:
+        return np.array([self.names[name] for name in names], dtype=np.intp)
 
-    def means(self, name: str, power: int = 1, measure: str | None = None) -> Floats:
-        """Mean of a power of a function over each line, shape (lines,), weighted by another; nan without values."""
+    def means(
+        self, name: str, power: int = 1, measure: str | None = None, *, absolute: bool = False
+    ) -> Floats:  # fmt: skip
+        """Mean of a power of a function (or of its absolute value) over each line, weighted by another.
+
+        Of shape (lines,); nan without values.
+        """
         values = self._table[self.names[name]] ** power
-        weights = self.pieces.weights * (1.0 if measure is None else self._table[self.names[measure]])
-        weights = np.where(np.isfinite(values), weights, 0.0)
-        total, sums = (
-            np.bincount(self.pieces.line, part.sum(axis=1), self.curve.lines)
-            for part in (weights, weights * np.where(weights != 0, values, 0.0))
-        )
+        pace = 1.0 if measure is None else self._table[self.names[measure]]
+        weights = np.where(np.isfinite(values), self.pieces.weights * pace, 0.0)
+        parts = (weights * np.where(weights != 0, values, 0.0)).sum(axis=1)
+        if absolute:
+            parts = self._sizes_of(values, pace, np.abs(parts))
+        total, sums = (np.bincount(self.pieces.line, part, self.curve.lines) for part in (weights.sum(axis=1), parts))
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(sums / np.where(total > 0, total, np.nan))
+
+    def _sizes_of(self, values: Floats, pace: Floats | float, sizes: Floats) -> Floats:
+        """Integrals of absolute values over each piece; `sizes` are those where they do not change their sign."""
+        series = chebyshev.series(values)
+        piece, x = chebyshev.zeros(series, chebyshev.turning_points(series))
+        of, low, high = between_marks(piece, x, np.unique(piece))
+        flow = chebyshev.series(values * pace * self.pieces.stretch)[of]
+        between = np.abs(chebyshev.primitive(flow, high) - chebyshev.primitive(flow, low))
+        crossed = np.bincount(of, between, len(sizes))
+        return np.where(np.isin(np.arange(len(sizes)), of) & np.isfinite(crossed), crossed, sizes)
+
+    def interpolated(self, name: str, line: Ints, s: Floats) -> Floats:
+        """Values of a function at places of lines, shape (n,), by its series; nan where a line has no piece."""
+        piece = self.curve.piece_at(line, s, self.pieces)
+        series = chebyshev.series(self._table[self.names[name]])
+        values = chebyshev.value(series[piece], self.pieces.take(piece).within(s))
+        return np.where(self.pieces.line[piece] == line, values, np.nan)
 
     def integral(self, name: str, line: Ints, s: Floats) -> tuple[Floats, float]:
         """Integrals of a function from the begin of lines to places of them, shape (n,), and the error of the whole."""
@@ -226,128 +134,161 @@ class Functions:
         part = chebyshev.primitive(series[piece], self.pieces.take(piece).within(s))
         return before[piece] - before[first] + part, float(np.sum(chebyshev.remainder(series)))
 
-    def extremes(self, names: Sequence[str], sign: int, still: Floats) -> Extremes:
-        """Largest values of some functions times a sign, the first along the line of those within rounding.
+    def extremes(self, names: Sequence[str], still: Floats) -> Extremes:
+        """Smallest and largest values of some functions, the first along the line of those within rounding.
 
         Parameters
         ----------
         still : ndarray, shape (functions, lines)
             Their rounding.
         """
-        rows = np.array([self.names[name] for name in names], dtype=np.intp)
-        shape = len(rows), self.curve.lines
-        if not len(self.pieces.line) or not len(rows):
-            return Extremes(np.full(shape, np.nan), np.full(shape, np.nan))
-        function, piece, x, value = self._tops(rows, sign, still)
-        poles = self._poles(rows, sign)
-        function, piece, x = (np.concatenate(pair) for pair in zip((function, piece, x), poles, strict=True))
-        value = np.concatenate([value, np.full(len(poles[0]), np.inf)])
-        line, place = self.pieces.line[piece], self.pieces.take(piece).places(x)
-        lane = function * shape[1] + line
-        best = np.full(shape[0] * shape[1], -np.inf)
-        np.maximum.at(best, lane, value)
-        tie = np.flatnonzero(value >= (best - still.ravel())[lane])
-        tie = tie[np.lexsort((place[tie], lane[tie]))]
-        lanes, first = np.unique(lane[tie], return_index=True)
-        chosen = tie[first]
-        found = np.full((2, shape[0] * shape[1]), np.nan)
-        own, line, place = rows[function[chosen]], line[chosen], place[chosen]
+        rows, lines = self._rows(names), self.curve.lines
+        found = np.full((2, 2 * len(rows) * lines), np.nan)
+        if len(self.pieces.line) and len(rows):
+            rows, sign = np.tile(rows, 2), np.repeat([-1.0, 1.0], len(rows))
+            still = np.tile(still, (2, 1))
+            tops, poles = self._tops(rows, sign, still), self._poles(rows, sign)
+            lane, piece, x, value = (np.concatenate(pair) for pair in zip(tops, poles, strict=True))
+            line, place = self.pieces.line[piece], self.pieces.take(piece).places(x)
+            lane = lane * lines + line
+            best = np.full(len(rows) * lines, -np.inf)
+            np.maximum.at(best, lane, value)
+            tie = np.flatnonzero(value >= (best - still.ravel())[lane])
+            tie = tie[np.lexsort((place[tie], lane[tie]))]
+            lanes, first = np.unique(lane[tie], return_index=True)
+            chosen = tie[first]
+            own, sign, still = rows[lanes // lines], sign[lanes // lines], still.ravel()[lanes]
+            found[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
+        value, place = found.reshape(2, 2, len(names), lines)
+        return Extremes(value, place)
+
+    def _settled(
+        self, rows: Ints, sign: Floats, line: Ints, place: Floats, value: Floats, still: Floats
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """Values and places of extremes by the functions themselves; `value` are those of their series times a sign."""
         place = self.curve.inside(line, place)
-        exact = self._true(own, sign, line, place, value[chosen])
         # An extreme is flat: a pose that is as good as the place beside it is that place.
         row = np.round(place)
-        beside = np.flatnonzero((np.abs(row - place) <= BESIDE_ROW) & np.isfinite(exact))
-        at_row = sign * self.at(line[beside], row[beside])[own[beside], np.arange(len(beside))]
-        good = beside[at_row >= exact[beside] - still.ravel()[lanes[beside]]]
-        exact[good], place[good] = sign * self.at(line[good], row[good])[own[good], np.arange(len(good))], row[good]
-        found[:, lanes] = exact, place
-        return Extremes(*found.reshape(2, *shape))
+        near = np.abs(row - place) <= BESIDE_ROW
+        beside = np.flatnonzero(near & self.curve.holds(line, row, INSET * self.curve.poses.end))
+        own = np.concatenate([rows, rows[beside]])
+        table = self.at(np.concatenate([line, line[beside]]), np.concatenate([place, row[beside]]))
+        table = table[own, np.arange(len(own))]
+        at_row = table[len(rows) :]
+        exact = self._true(rows, line, table[: len(rows)], sign * value)
+        with np.errstate(invalid="ignore"):
+            good = np.isfinite(exact[beside]) & (sign[beside] * (at_row - exact[beside]) >= -still[beside])
+        exact[beside[good]], place[beside[good]] = at_row[good], row[beside[good]]
+        return exact, place
 
-    def _true(self, rows: Ints, sign: int, line: Ints, place: Floats, value: Floats) -> Floats:
-        """Values of the functions themselves at places found on their series, where they have the digits."""
-        table = sign * self.at(line, place)[rows, np.arange(len(rows))] if len(rows) else value
+    def _true(self, rows: Ints, line: Ints, values: Floats, series: Floats) -> Floats:
+        """Values of the functions themselves, or where these have lost digits those of their series."""
         size = np.maximum(self._scale, self._sizes[:, None])[rows, line]
         with np.errstate(invalid="ignore"):
-            near = np.abs(table - value) <= TRUE * np.where(self._poled[rows], np.abs(value), size)
-        return np.where(near & np.isfinite(value), table, value)
+            near = np.abs(values - series) <= TRUE * np.where(self._poled[rows], np.abs(series), size)
+        return np.where(near & np.isfinite(series), values, series)
 
-    def _tops(self, rows: Ints, sign: int, still: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-        """Local maxima of functions times a sign that may be their largest: function, piece, place in it, value."""
-        line, poled = self.pieces.line, self._poled[rows]
-        series = chebyshev.series(self._table[rows])
-        below = chebyshev.series(self._divisor[rows])
-        rough = self._rough[rows] & ~poled[:, None]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            table = sign * chebyshev.at_places(series)
-            if poled.any():
-                table[poled] /= chebyshev.at_places(below[poled])
-                # Where both are zero the quotient says nothing.
-                table[poled] = np.where(np.isfinite(table[poled]), table[poled], -np.inf)
-        table = np.where(np.isnan(table) | rough[..., None], -np.inf, table)
-        nodes = np.where(np.isnan(self._table[rows]) | poled[:, None, None], -np.inf, sign * self._table[rows])
-        best = np.full((len(rows), self.curve.lines), -np.inf)
-        for k in range(len(rows)):
-            np.maximum.at(best[k], line, np.where(rough[k], nodes[k].max(axis=1), table[k].max(axis=1)))
-        low = np.full((*table.shape[:2], 1), -np.inf)
+    def _tops(self, rows: Ints, sign: Floats, still: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+        """Local maxima of functions times a sign that may be their largest: lane, piece, place in it, value.
+
+        The smallest and the largest value of a function are neighbouring lanes, half of them all apart.
+        """
+        line, poled, half = self.pieces.line, self._poled[rows], len(rows) // 2
+        known = self._table[rows[:half]]
+        known = np.where(np.isnan(known) | poled[:half, None, None], -np.inf, known)
         with np.errstate(invalid="ignore"):
-            padded = np.concatenate([low, table, low], axis=2)
-            top = (table >= padded[..., :-2]) & (table >= padded[..., 2:]) & np.isfinite(table)
-            bend = np.abs(np.nan_to_num(table[..., 2:] - 2 * table[..., 1:-1] + table[..., :-2], posinf=0, neginf=0))
-        bend = np.concatenate([bend[..., :1], bend, bend[..., -1:]], axis=2)
+            steps = np.nan_to_num(np.abs(np.diff(known, axis=2)), nan=np.inf).max(axis=2)
+        nodes = np.concatenate([np.where(np.isinf(known), -np.inf, -known).max(axis=2), known.max(axis=2)])
+        best = np.full((len(rows), self.curve.lines), -np.inf)
+        largest(best, line, nodes)
+        # Between its nodes a function is larger than there by less than it moves from one to the next.
+        first = np.append(True, line[1:] != line[:-1])
+        rough = self._rough[rows] & ~poled[:, None]
+        with np.errstate(invalid="ignore", over="ignore"):
+            high = nodes + 2 * np.tile(steps, (2, 1)) >= best[:, line] - still[:, line]
+        lane, piece = np.nonzero((high | poled[:, None] | first) & ~rough)
+        owner, quotient = line[piece], poled[lane]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            table = chebyshev.at_places(chebyshev.series(self._table[rows[lane], piece]))
+            below = self._divisor[rows[lane[quotient]], piece[quotient]]
+            product, divisor = table[quotient], chebyshev.at_places(chebyshev.series(below))
+            table[quotient] /= divisor
+            # Where both are zero the quotient says nothing, and at a pole it has no sign.
+            lost = np.where(quotient[:, None], ~np.isfinite(table), np.isnan(table))
+            sizes = (scale[rows[lane], owner][quotient, None] for scale in (self._scale, self._divisor_scale))
+            lost[quotient] |= (np.abs(product) > POLE * next(sizes)) & (np.abs(divisor) <= ZERO * next(sizes))
+            table = np.where(lost, -np.inf, sign[lane, None] * table)
+            np.maximum.at(best.reshape(-1), lane * self.curve.lines + owner, table.max(axis=1))
+            top = np.ones(table.shape, dtype=bool)
+            top[:, 1:] = table[:, 1:] >= table[:, :-1]
+            top[:, :-1] &= table[:, :-1] >= table[:, 1:]
+            # What does not move has both ends at its first place.
+            top &= np.tile(best[:half] + best[half:] > still[:half], (2, 1))[lane, owner][:, None]
+            bend = np.abs(np.nan_to_num(table[:, 2:] - 2 * table[:, 1:-1] + table[:, :-2], posinf=0, neginf=0))
+        bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
         # The first place of a line counts with what is as large but for rounding.
-        top[:, np.append(True, line[1:] != line[:-1]), 0] = True
-        top &= np.isfinite(table)
-        function, piece, m = np.nonzero(top & (table + bend >= best[:, line, None] - still[:, line, None]))
-        one, two = np.maximum(m - 1, 0), np.minimum(m + 1, len(chebyshev.PLACES) - 1)
-        x, value = chebyshev.PLACES[m], table[function, piece, m]
-        c, d = series[function, piece], below[function, piece]
+        top[first[piece], 0] = True
+        top &= np.isfinite(table) & (table + bend >= (best - still)[lane, owner][:, None])
+        which, m = np.nonzero(top)
+        lane, piece = lane[which], piece[which]
+        x, value = self._refined(rows[lane], sign[lane], piece, m, table[which, m])
+        corner, where = np.nonzero(rough & (nodes >= best[:, line]) & np.isfinite(nodes))
+        found = self._corners(rows[corner], sign[corner], where)
+        return tuple(
+            np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *found), strict=True)
+        )  # type: ignore[return-value]
+
+    def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
+        """Places in pieces, and values, of local maxima of functions times a sign near to `chebyshev.PLACES[m]`."""
+        c, d = (chebyshev.series(table[rows, piece]) for table in (self._table, self._divisor))
         slope, divisor_slope = chebyshev.slope_series(c), chebyshev.slope_series(d)
         bends, divisor_bends = chebyshev.slope_series(slope), chebyshev.slope_series(divisor_slope)
-        quotient = poled[function]
 
-        def rise(lane: Flags | Ints, at: Floats) -> tuple[Floats, Floats]:
+        def rise(some: Ints, at: Floats) -> tuple[Floats, Floats]:
             """What has the sign of the slope, and its own slope."""
-            first, second = chebyshev.value(slope[lane], at), chebyshev.value(bends[lane], at)
-            own, by = chebyshev.value(c[lane], at), chebyshev.value(d[lane], at)
-            by_first, by_second = chebyshev.value(divisor_slope[lane], at), chebyshev.value(divisor_bends[lane], at)
-            apart = quotient[lane]
-            return (
-                np.where(apart, first * by - own * by_first, first),
-                np.where(apart, second * by - own * by_second, second),
-            )
+            basis = chebyshev.basis(at)
+            first, second = chebyshev.total(slope[some], basis), chebyshev.total(bends[some], basis)
+            apart = np.flatnonzero(self._poled[rows[some]])
+            if len(apart):
+                basis, some = basis[:, apart], some[apart]
+                own, by = chebyshev.total(c[some], basis), chebyshev.total(d[some], basis)
+                by_first, by_second = (chebyshev.total(part[some], basis) for part in (divisor_slope, divisor_bends))
+                first[apart], second[apart] = (
+                    first[apart] * by - own * by_first, second[apart] * by - own * by_second
+                )  # fmt: skip
+            return first, second
 
-        every = np.arange(len(function))
-        ends = [rise(every, chebyshev.PLACES[side])[0] for side in (one, two)]
-        turning = np.flatnonzero((sign * ends[0] > 0) & (sign * ends[1] < 0))
-        at = chebyshev.root(
-            lambda place: rise(turning, place), chebyshev.PLACES[one[turning]], ends[0][turning],
-            chebyshev.PLACES[two[turning]], ends[1][turning],
-        )  # fmt: skip
-        x[turning] = at
-        refined = sign * chebyshev.value(c[turning], at)
-        refined = np.where(quotient[turning], refined / chebyshev.value(d[turning], at), refined)
+        x, every = chebyshev.PLACES[m], np.arange(len(m))
+        sides = chebyshev.PLACES[np.maximum(m - 1, 0)], chebyshev.PLACES[np.minimum(m + 1, len(chebyshev.PLACES) - 1)]
+        low, high = (rise(every, side)[0] for side in sides)
+        turning = np.flatnonzero((sign * low > 0) & (sign * high < 0))
+        x[turning] = at = chebyshev.root(
+            lambda place: rise(turning, place), sides[0][turning], low[turning], sides[1][turning], high[turning]
+        )
+        refined = sign[turning] * chebyshev.value(c[turning], at) / chebyshev.value(d[turning], at)
         value[turning] = np.maximum(refined, value[turning])
-        # Of a function with a corner its values are what is known.
-        corner, where = np.nonzero(rough & (nodes.max(axis=2) >= best[:, line]) & np.isfinite(nodes.max(axis=2)))
-        k = nodes[corner, where].argmax(axis=1)
-        tops = nodes[corner, where, k]
-        endless = self.pieces.depth[where] >= MOST_HALVINGS - 1
-        for j in np.flatnonzero(endless).tolist():
-            endless[j] = tops[j] > ENDLESS * np.abs(np.nanmedian(self._table[rows[corner[j]]]))
-        return (
-            np.concatenate([function, corner]), np.concatenate([piece, where]),
-            np.concatenate([x, chebyshev.NODES[k]]),
-            np.concatenate([value, np.where(endless & (tops > 0), np.inf, tops)]),
-        )  # fmt: skip
+        return x, value
 
-    def _poles(self, rows: Ints, sign: int) -> tuple[Ints, Ints, Floats]:
-        """Places at which functions times a sign run to plus infinity: function, piece, place in it."""
+    def _corners(self, rows: Ints, sign: Floats, piece: Ints) -> tuple[Floats, Floats]:
+        """Place and value of the largest node of functions with a corner in a piece: their values are what is known."""
+        nodes = self._table[rows, piece]
+        nodes = np.where(np.isnan(nodes), -np.inf, sign[:, None] * nodes)
+        k = nodes.argmax(axis=1)
+        tops = nodes[np.arange(len(k)), k]
+        for j in np.flatnonzero((self.pieces.depth[piece] >= MOST_HALVINGS - 1) & (tops > 0)).tolist():
+            whole = self._table[rows[j], self.pieces.line == self.pieces.line[piece[j]]]
+            if tops[j] > ENDLESS * np.abs(np.nanmedian(whole)):
+                tops[j] = np.inf
+        return chebyshev.NODES[k], tops
+
+    def _poles(self, rows: Ints, sign: Floats) -> tuple[Ints, Ints, Floats, Floats]:
+        """Places at which functions times a sign run to plus infinity: lane, piece, place in it, infinity."""
         found: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
         for k in np.flatnonzero(self._poled[rows]).tolist():
             product, divisor = (chebyshev.series(table[rows[k]]) for table in (self._table, self._divisor))
             sizes = self._scale[rows[k], self.pieces.line], self._divisor_scale[rows[k], self.pieces.line]
-            piece, x = chebyshev.zeros(divisor)
-            turned, place, level = chebyshev.turning_points(divisor)
+            turned, place, level = turning = chebyshev.turning_points(divisor)
+            piece, x = chebyshev.zeros(divisor, turning)
             flat = np.abs(level) <= ZERO * sizes[1][turned]
             dead = np.stack([self.pieces.fold < 0, self.pieces.fold > 0], axis=1)
             least = np.where(dead, ZERO_AT_FOLD, ZERO) * sizes[1][:, None]
@@ -360,35 +301,41 @@ class Functions:
             # From either side the divisor has its sign a little before the place.
             beside = np.stack([x - 1e-4, x + 1e-4])
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
-            up = ((sign * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
+            up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
             found.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
-        return tuple(np.concatenate(part) for part in zip(*found, strict=True))  # type: ignore[return-value]
+        lane, piece, x = (np.concatenate(part) for part in zip(*found, strict=True))
+        return lane, piece, x, np.full(len(x), np.inf)
 
     def zeros(self, names: Sequence[str], touching: float) -> Zeros:
         """Places at which some functions cross zero, or come nearer to it than `touching` and turn back or end."""
-        rows = np.array([self.names[name] for name in names], dtype=np.intp)
+        rows = self._rows(names)
         count = len(self.pieces.line)
-        if not len(rows) or not count:
-            none = np.empty(0, dtype=np.intp)
-            return Zeros(none, none, np.empty(0))
         series = chebyshev.series(self._table[rows]).reshape(-1, chebyshev.COUNT)
-        which, x = chebyshev.zeros(series)
-        turned, place, least = chebyshev.turning_points(series)
-        near = np.abs(least) <= touching
+        table = chebyshev.at_places(series)
         # Where the motion goes on, a function that crosses zero at the very end of a piece is zero there.
         goes_on = self.pieces.joined_to_next
-        rims = np.stack([np.append(False, goes_on), np.append(goes_on, False)], axis=1)
+        rims = np.stack([np.append(False, goes_on), np.append(goes_on, False)], axis=1)[:count]
         rims = np.tile(np.where(rims, EXACT, touching), (len(rows), 1))
-        rim, side = np.nonzero(np.abs(chebyshev.at_places(series)[:, [0, -1]]) <= rims)
-        which = np.concatenate([which, turned[near], rim])
-        x = np.concatenate([x, place[near], 2.0 * side - 1.0])
+        rim, side = np.nonzero(np.abs(table[:, [0, -1]]) <= rims)
+        # Between its places a series moves by less than it does elsewhere.
+        near = np.abs(table).min(axis=1, initial=np.inf) <= np.abs(np.diff(table, axis=1)).max(axis=1) + touching
+        some = np.flatnonzero(near)
+        turned, place, least = turning = chebyshev.turning_points(series[some])
+        which, x = chebyshev.zeros(series[some], turning)
+        touched = np.abs(least) <= touching
+        which = np.concatenate([some[which], some[turned[touched]], rim])
+        x = np.concatenate([x, place[touched], 2.0 * side - 1.0])
+        if not len(x):
+            return Zeros(which, which, x)
         function, piece = which // count, which % count
         places = self.pieces.take(piece).places(x)
         # Where a function only touches zero a pose that is as near to zero as the place beside it is that place.
-        flat = np.arange(len(x)) >= len(x) - len(rim) - np.count_nonzero(near)
+        flat = np.arange(len(x)) >= len(x) - len(rim) - np.count_nonzero(touched)
         row = np.round(places)
         lanes = np.flatnonzero(flat & (np.abs(row - places) <= BESIDE_ROW))
-        own, line = rows[function[lanes]], self.pieces.line[piece[lanes]]
-        one, two = (np.abs(self.at(line, s[lanes])[own, np.arange(len(lanes))]) for s in (row, places))
-        places[lanes] = np.where(one <= two + EXACT, row[lanes], places[lanes])
+        if len(lanes):
+            line, both = np.tile(self.pieces.line[piece[lanes]], 2), np.concatenate([row[lanes], places[lanes]])
+            values = np.abs(self.at(line, both)[np.tile(rows[function[lanes]], 2), np.arange(len(both))])
+            one, two = values.reshape(2, -1)
+            places[lanes] = np.where(one <= two + EXACT, row[lanes], places[lanes])
         return Zeros(function, self.pieces.line[piece], places)

@@ -7,7 +7,7 @@ last coordinate are such curves, of one design or several; each has a line of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,10 +15,10 @@ import numpy as np
 from mechdesign.curve.pieces import Pieces, Search
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import TURN, Value
-from mechdesign.mechanism.change_points import TOUCHING
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.margins import ZERO_LENGTH, Cause, Margins, turning_point
+from mechdesign.mechanism.geometry import Vectors
+from mechdesign.mechanism.margins import Margins, turning_point
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
@@ -37,41 +37,12 @@ ANCHORS = 721
 # So far beyond the first and the last pose, as a part of the motion, it must go on: else its end is a limit. What ends
 # it is looked for as far beyond other ends.
 BEYOND = 1e-9
-# Margins are looked at so far beside the end of a piece, as a part of it.
-BESIDE = 1e-6
 # An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
 ON_THE_CUT = 1e-9
 # Links that come into line are looked for within so many last digits of a dead centre.
 STRAIGHT = 128
 # A place at an end of a motion is taken so far inside, as a part of the motion.
 INSET = 1e-9
-# Slides that become parallel are so within this part of their sine's size, and a leg has no length within this part of
-# the mechanism's.
-PARALLEL, ZERO_LEG = 1e-9, 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class End:
-    """Where a motion ends, `before` or behind a piece of it; both where it goes to infinity between two pieces.
-
-    Parameters
-    ----------
-    line : int
-    place : float
-        Along the line, in rows.
-    cause : Cause
-    piece : int
-        The piece at whose end (`x` 1) or begin (-1) it lies.
-    endless : bool
-        Whether the motion goes on behind it, through infinity.
-    """
-
-    line: int
-    place: float
-    cause: Cause
-    piece: int
-    x: int
-    endless: bool = False
 
 
 def units_of(study: Study, coordinates: Sequence[Coordinate]) -> list[float]:
@@ -112,13 +83,13 @@ class Curve:
         closed = len(self.margins.causes) - self.margins.limited
         crossing = self.plan.change_points is None
         search = Search(self._look, self._fold, self.margins.causes[:closed], BUDGET, crossing, self.spent)
-        self._closed = search.pieces(first)
+        self._closed, self._seen = search.pieces(first)
         self.pieces = self._closed
         if self.margins.limited:
             search = Search(
                 self._look_at_limits, self._fold, self.margins.causes[closed:], BUDGET, crossing, self.spent
             )
-            self.pieces = search.pieces(self._closed)
+            self.pieces, _ = search.pieces(self._closed)
 
     def given(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
         """Poses at places of lines, and what they give (radians, lengths)."""
@@ -126,39 +97,49 @@ class Curve:
         columns = zip(poses.groups[0].columns(), self._units, strict=True)
         return poses, [np.asarray(column * unit, dtype=float) for column, unit in columns]
 
-    def solve(self, line: Ints, s: Floats, *, judged: bool = True) -> tuple[Poses, Configuration]:
-        """Poses at places of lines, shape (n,); `judged` by the stated limits."""
+    def solve(
+        self, line: Ints, s: Floats, *, judged: bool = True, turning: bool = True
+    ) -> tuple[Poses, Configuration]:  # fmt: skip
+        """Poses at places of lines, shape (n,); `judged` by the stated limits, `turning` with the turns of angles."""
         poses, given = self.given(line, s)
-        configuration = self.with_turns(line, s, self._solved(line, s, poses, given))
+        configuration = self._solved(line, s, poses, given)
+        if turning:
+            configuration = self.with_turns(line, s, configuration)
         if judged:
             self.plan.judge(configuration)
         return poses, configuration
 
     def with_turns(self, line: Ints, s: Floats, configuration: Configuration) -> Configuration:
         """Solved poses, their angles in the turn of the motion."""
-        near: dict[str, Value] = dict(zip((angle.name for angle in self.angles), self.turned(line, s), strict=True))
+        near: dict[str, Value] = dict(zip((angle.name for angle in self.angles), self.beside(line, s), strict=True))
         if not self._turning:
             near |= self.mechanism.drawn_angles() | self.mechanism.turns({})
             return replace(configuration, near={**configuration.near, **near}, counted=frozenset())
         return replace(configuration, near={**configuration.near, **near}, counted=configuration.counted | near.keys())
 
     def turned(self, line: Ints, s: Floats) -> Floats:
-        """The angles followed at places of lines (radians), shape (angles, n), without jumps.
-
-        They hold to a few digits only: enough to tell the turn of an angle.
-        """
-        if not self.angles:
-            return np.empty((0, len(s)))
-        pieces, coefficients = self._turns
-        if not len(pieces.line):
+        """The angles followed at places of lines (radians), shape (angles, n), without jumps."""
+        if not len(self._closed.line):
             return np.full((len(self.angles), len(s)), np.nan)
-        k = self.piece_at(line, s, pieces)
-        x = pieces.take(k).within(s)
+        k, x = self._within(line, s)
         values = [
             chebyshev.value(row[k], x) * (angle.turn / TURN)
-            for row, angle in zip(coefficients, self.angles, strict=True)
+            for row, angle in zip(self._turns, self.angles, strict=True)
         ]
-        return np.stack(values)
+        return np.array(values).reshape(len(self.angles), len(s))
+
+    def beside(self, line: Ints, s: Floats) -> Floats:
+        """The same at nodes near to the places: from there the angles turn by less than half of what tells turns."""
+        if not len(self._closed.line):
+            return np.full((len(self.angles), len(s)), np.nan)
+        k, x = self._within(line, s)
+        scale = np.array([angle.turn / TURN for angle in self.angles])
+        return np.asarray(self._turns_at_nodes[:, k, chebyshev.nearest_node(x)] * scale[:, None])
+
+    def _within(self, line: Ints, s: Floats) -> tuple[Ints, Floats]:
+        """The pieces on which the mechanism assembles at places of lines, and the places in these."""
+        k = self.piece_at(line, s, self._closed)
+        return k, self._closed.take(k).within(s)
 
     def piece_at(self, line: Ints, s: Floats, pieces: Pieces | None = None) -> Ints:
         """The piece of each place, or the nearest before it; the line's first where there is none before."""
@@ -168,12 +149,13 @@ class Curve:
         first = np.searchsorted(pieces.line, line)
         return np.clip(np.maximum(k, first), 0, len(pieces.line) - 1)
 
-    def holds(self, line: Ints, s: Floats) -> Flags:
-        """Whether the mechanism assembles within its limits at places of lines, as the pieces have it."""
+    def holds(self, line: Ints, s: Floats, beyond: float = 0.0) -> Flags:
+        """Whether places of lines lie in the pieces, in which the mechanism can move, or so far beyond."""
         if not len(self.pieces.line):
             return np.zeros(len(s), dtype=bool)
-        k = self.piece_at(line, s)
-        return np.asarray((self.pieces.line[k] == line) & (s >= self.pieces.begin[k]) & (s <= self.pieces.end[k]))
+        k = self.piece_at(line, s + beyond)
+        begin, end = self.pieces.begin[k] - beyond, self.pieces.end[k] + beyond
+        return np.asarray((self.pieces.line[k] == line) & (s >= begin) & (s <= end))
 
     def inside(self, line: Ints, s: Floats) -> Floats:
         """Places of lines at which poses assemble: those at ends of motions or beyond are taken a little inside.
@@ -231,7 +213,14 @@ class Curve:
 
     def _solved(self, line: Ints, s: Floats, poses: Poses, given: Sequence[Floats]) -> Configuration:
         start = None if self._anchors is None else self._anchors.take(self._anchor_of(line, s))
-        return self.plan.solve(given, poses.places, start=start, limits=False)
+        vectors = self._vectors.take(line) if poses.places else None
+        return self.plan.solve(given, poses.places, vectors=vectors, start=start, limits=False)
+
+    @cached_property
+    def _vectors(self) -> Vectors:
+        """Edges of the mechanism, of each line."""
+        first = self.poses.line * np.arange(self.lines)
+        return self.mechanism.geometry.vectors({name: place[first] for name, place in self.poses.places.items()})
 
     @cached_property
     def _anchors(self) -> Configuration | None:
@@ -303,23 +292,22 @@ class Curve:
         return np.concatenate(parts, axis=1), np.empty((0, len(s)))
 
     @cached_property
-    def _turns(self) -> tuple[Pieces, Floats]:
+    def _turns(self) -> Floats:
         """Series of the angles followed on the pieces, shape (angles, pieces, nodes), one after the other."""
-        pieces = self._closed
-        if not len(pieces.line):
-            return pieces, np.empty((len(self.angles), 0, chebyshev.COUNT))
-        s = pieces.nodes
-        angles = self._look(np.repeat(pieces.line, s.shape[1]), s.ravel())[1]
-        values = np.unwrap(angles.reshape(len(angles), *s.shape), axis=2)
+        pieces, values = self._closed, np.unwrap(self._seen, axis=2)
         jumps = values[:, 1:, 0] - values[:, :-1, -1]
         new = np.append(True, pieces.line[1:] != pieces.line[:-1])
         turns = np.zeros(values.shape[:2])
         turns[:, 1:] = -np.round(jumps / TURN)
         turns = np.cumsum(turns, axis=1)
-        turns -= turns[:, np.maximum.accumulate(np.where(new, np.arange(len(new)), 0))] if len(new) else 0.0
+        turns -= turns[:, np.maximum.accumulate(np.where(new, np.arange(len(new)), 0))]
         coefficients = chebyshev.series(values + TURN * turns[..., None])
         self._begin_turns(pieces, coefficients)
-        return pieces, coefficients
+        return coefficients
+
+    @cached_property
+    def _turns_at_nodes(self) -> Floats:
+        return chebyshev.at_nodes(self._turns)
 
     def _begin_turns(self, pieces: Pieces, coefficients: Floats) -> None:
         """Begin each line's angles in (-180, 180] deg at its first valid pose, a drive's so that its limits hold it."""
@@ -344,10 +332,12 @@ class Curve:
 
     def _fold(self, line: int, good: float, bad: float) -> float | None:
         """Where a group without a closed form turns back between a place at which it closes and one where not."""
-        fold = self._turning_point(line, good, abs(bad - good))
+        fold = self.turning_point(line, good, abs(bad - good))
         return None if fold is None else fold[0]
 
-    def _turning_point(self, line: int, place: float, reach: float) -> tuple[float, Configuration, int] | None:
+    def turning_point(self, line: int, place: float, reach: float) -> tuple[float, Configuration, int] | None:
+        """Where a group without a closed form turns back near to a place; see there."""
+
         def given(s: float) -> list[float]:
             return [float(v[0]) for v in self.given(np.array([line]), np.array([s]))[1]]
 
@@ -355,116 +345,12 @@ class Curve:
         near = self._solved(*at, *self.given(*at)).take(0)
         return turning_point(self.plan, given, place, reach, near) if near.valid else None
 
-    @cached_property
-    def _sizes(self) -> Floats:
-        """Size of every margin along each line, shape (causes, lines)."""
-        s, line = self.pieces.nodes, self.pieces.line
-        table = np.abs(self._margins(np.repeat(line, s.shape[1]), s.ravel()))
-        table = table.reshape(len(table), *s.shape)
-        sizes = np.zeros((len(table), self.lines))
-        for row, size in zip(np.where(np.isfinite(table), table, 0.0), sizes, strict=True):
-            np.maximum.at(size, line, row.max(axis=1, initial=0.0))
-        return np.where(sizes > 0, sizes, 1.0)
-
-    def _margins(self, line: Ints, s: Floats) -> Floats:
+    def margins_at(self, line: Ints, s: Floats) -> Floats:
         """All margins at places of lines, shape (causes, n)."""
         rows = [self._look(line, s)[0]]
         if self.margins.limited:
             rows.append(self._look_at_limits(line, s)[0])
         return np.concatenate(rows)
-
-    @cached_property
-    def ends(self) -> tuple[End, ...]:
-        """Where the motions end and where they go to infinity, in order along the lines."""
-        pieces, found = self.pieces, list[End]()
-        joined = pieces.joined_to_next
-        if not len(pieces.line):
-            return ()
-        for x, open_ in ((-1, np.append(True, ~joined)), (1, np.append(~joined, True))):
-            place, beyond = (pieces.end, BEYOND) if x > 0 else (pieces.begin, -BEYOND)
-            piece = np.flatnonzero(open_)
-            outer = place[piece] == (self.poses.end if x > 0 else 0.0)
-            outside = place[piece] + beyond * self.poses.end
-            held = np.zeros(len(piece), dtype=bool)
-            if outer.any() and not self.poses.closed:
-                # The motion ends with its poses only where it cannot go on.
-                held[outer] = self.solve(pieces.line[piece[outer]], outside[outer])[1].valid
-            held |= outer & self.poses.closed
-            piece, outside = piece[~held], outside[~held]
-            causes = self._causes(pieces.line[piece], outside)
-            found += [
-                End(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
-                for k, cause in zip(piece.tolist(), causes, strict=True)
-            ]
-        found += [
-            End(int(pieces.line[k]), float(pieces.end[k]), self.margins.causes[number], k, 1, endless=True)
-            for k, number in self._at_joints("across", PARALLEL)
-        ]
-        return tuple(sorted(found, key=lambda end: (end.line, end.place, end.x)))
-
-    def changes(self) -> list[tuple[int, float, Cause]]:
-        """Where two assemblies meet and a motion goes on: line, place, cause; the first and last pose count."""
-        pieces = self.pieces
-        inner = [
-            (int(pieces.line[k]), float(pieces.end[k]), self.margins.causes[number])
-            for k, number in self._at_joints("closure", TOUCHING)
-        ]
-        ended = {(end.line, end.place) for end in self.ends}
-        outer = (pieces.begin == 0.0) | (pieces.end == self.poses.end)
-        line, place = pieces.line[outer], np.where(pieces.begin[outer] == 0.0, 0.0, float(self.poses.end))
-        small = self._small("closure", TOUCHING, line, place, pieces.end[outer] - pieces.begin[outer])
-        rims = [
-            (int(line[k]), float(place[k]), self.margins.causes[number])
-            for number, k in np.argwhere(small).tolist()
-            if (int(line[k]), float(place[k])) not in ended
-        ]
-        return sorted(inner + rims, key=lambda change: change[:2])
-
-    def _at_joints(self, role: str, least: float) -> list[tuple[int, int]]:
-        """Pieces at whose end, where the motion goes on, a margin of a role is zero, and the number of its cause."""
-        pieces = self.pieces
-        piece = np.flatnonzero(pieces.joined_to_next)
-        length = pieces.end[piece] - pieces.begin[piece]
-        small = self._small(role, least, pieces.line[piece], pieces.end[piece], length)
-        return [(int(piece[k]), number) for number, k in np.argwhere(small).tolist()]
-
-    def _small(self, role: str, least: float, line: Ints, s: Floats, length: Floats) -> Flags:
-        """Which margins of a role are zero at ends of pieces of some length, shape (causes, n)."""
-        own = np.array([cause.role == role for cause in self.margins.causes], dtype=bool)
-        if not own.any() or not len(line):
-            return np.zeros((len(own), len(line)), dtype=bool)
-        # At the place itself rounding may end the motion before later margins are known.
-        sides = [self._margins(line, s + step * length) for step in (-BESIDE, 0.0, BESIDE)]
-        smallest = np.fmin(np.fmin(np.abs(sides[0]), np.abs(sides[1])), np.abs(sides[2]))
-        with np.errstate(invalid="ignore"):
-            return np.asarray(own[:, None] & (smallest <= least * self._sizes[:, line]))
-
-    def _causes(self, line: Ints, outside: Floats) -> list[Cause]:
-        """What ends motions right before some places: the margin that is farthest below zero there."""
-        if not len(line):
-            return []
-        values = self._margins(line, outside) / self._sizes[:, line]
-        across = np.array([cause.role == "across" for cause in self.margins.causes], dtype=bool)
-        values = np.where(np.isnan(values) | across[:, None], np.inf, values)
-        return [self.margins.causes[k] for k in values.argmin(axis=0).tolist()]
-
-    def _named(self, piece: int, x: int, cause: Cause) -> Cause:
-        """The cause, of a group without a closed form by the group that turns back, or why it does not."""
-        if cause.role != "reached":
-            return cause
-        graph, pieces = self.mechanism.graph, self.pieces.take(np.array([piece]))
-        place = pieces.end[0] if x > 0 else pieces.begin[0]
-        inside = pieces.places(np.array([x * 0.9]))[0]
-        fold = self._turning_point(int(pieces.line[0]), float(inside), 2 * abs(float(place - inside)))
-        if fold is not None:
-            group = self.plan.structure.groups[fold[2]]
-            return replace(cause, joint=" ".join(graph.joined(group.edges)), group=fold[2])
-        pose = self.solve(pieces.line, np.array([inside]))[1]
-        for slide in self.margins.legs:
-            leg = graph.slides[slide]
-            if abs(float(np.ravel(pose.slides[slide])[0])) <= ZERO_LEG * self.mechanism.size:
-                return Cause(ZERO_LENGTH, leg, leg, -1, "leg")
-        return replace(cause, kind=Reason.OTHER_ASSEMBLY.text)
 
 
 def drive_turns(

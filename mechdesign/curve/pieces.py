@@ -86,14 +86,23 @@ class Pieces(Lanes):
         first = Pieces(self.line, self.begin, middle, np.minimum(self.fold, 0), self.depth + 1)
         return Pieces.joined([first, Pieces(self.line, middle, self.end, np.maximum(self.fold, 0), self.depth + 1)])
 
-    def in_order(self) -> Pieces:
-        """The pieces along the lines, one line after the other."""
-        return self.take(np.lexsort((self.begin, self.line)))
+    def divided(self, owner: Ints, marks: Floats) -> Pieces:
+        """The pieces in order, each divided at the places in it that are marked, shape (n,): its number, and where."""
+        of, low, high = between_marks(owner, marks, np.arange(len(self.line)))
+        nowhere = np.zeros(len(of), dtype=bool)
+        parts = _parts(self.take(of), low, high, nowhere, nowhere)
+        return parts.take(np.lexsort((parts.begin, parts.line)))
 
     @property
     def joined_to_next(self) -> Flags:
         """Whether the motion goes on in the next piece, of pieces in order; shape (pieces - 1,)."""
         return np.asarray((self.line[1:] == self.line[:-1]) & (self.begin[1:] == self.end[:-1]))
+
+
+def largest(best: Floats, line: Ints, values: Floats) -> None:
+    """Raise the largest values of lines, shape (n, lines), by those of some pieces, shape (n, pieces)."""
+    lanes = np.arange(len(best))[:, None] * best.shape[1] + line
+    np.maximum.at(best.reshape(-1), lanes.ravel(), values.ravel())
 
 
 # Margins of shape (causes, n), nan where an earlier one is negative, and angles of shape (angles, n), at places s of
@@ -118,26 +127,30 @@ class Search:
     crossing: bool
     spent: Flags  # shape (lines,)
 
-    def pieces(self, begin: Pieces) -> Pieces:
-        """The pieces in order along the lines."""
-        lines, valid, pending = len(self.spent), [begin.take(np.empty(0, dtype=np.intp))], begin
+    def pieces(self, begin: Pieces) -> tuple[Pieces, Floats]:
+        """The pieces in order along the lines, and the angles at their nodes, shape (angles, pieces, nodes)."""
+        lines, pending = len(self.spent), begin
         nodes, sizes = np.zeros(lines), np.zeros((len(self.causes), lines))
-        while len(pending.line):
+        valid, turned = [begin.take(np.empty(0, dtype=np.intp))], list[Floats]()
+        while len(pending.line) or not turned:
             nodes += chebyshev.COUNT * np.bincount(pending.line, minlength=lines)
             self.spent |= nodes > self.budget
             pending = pending.take(~self.spent[pending.line])
             s = pending.nodes
             margins, angles = self.look(np.repeat(pending.line, s.shape[1]), s.ravel())
             margins, angles = (table.reshape(len(table), *s.shape) for table in (margins, angles))
-            for row, size in zip(np.abs(margins), sizes, strict=True):
-                np.maximum.at(size, pending.line, np.where(np.isfinite(row), row, 0.0).max(axis=1, initial=0.0))
+            finite = np.where(np.isfinite(margins), np.abs(margins), 0.0)
+            largest(sizes, pending.line, finite.max(axis=2, initial=0.0))
             good, halved, parts = self._judged(pending, margins, sizes)
             turns = np.abs((np.diff(angles, axis=2) + np.pi) % (2 * np.pi) - np.pi)
             far = good & (turns >= SURE_TURN).any(axis=(0, 2)) & (pending.depth < MOST_HALVINGS)
             valid.append(pending.take(good & ~far))
+            turned.append(angles[:, good & ~far])
             pending = Pieces.joined([*parts, pending.take(halved | far).halves()])
         pieces = Pieces.joined(valid)
-        return pieces.take(~self.spent[pieces.line]).in_order()
+        order = np.lexsort((pieces.begin, pieces.line))
+        order = order[~self.spent[pieces.line[order]]]
+        return pieces.take(order), np.concatenate(turned, axis=1)[:, order]
 
     def _judged(self, pieces: Pieces, margins: Floats, sizes: Floats) -> tuple[Flags, Flags, list[Pieces]]:
         """Pieces in which all margins are positive, those to be halved, and the positive parts of those with zeros."""
@@ -199,10 +212,10 @@ class Search:
         table = chebyshev.at_places(coefficients)
         suspect = np.flatnonzero(table.min(axis=1) <= np.abs(np.diff(table, axis=1)).max(axis=1) + TOUCHING * scale)
         coefficients, scale, some = coefficients[suspect], scale[suspect], pieces.take(suspect)
-        which, x = chebyshev.zeros(coefficients)
+        touched, place, value = turning = chebyshev.turning_points(coefficients)
+        which, x = chebyshev.zeros(coefficients, turning)
         owner, marks, dead = which, x, np.full(len(x), role == "closure")
         if role != "across":
-            touched, place, value = chebyshev.turning_points(coefficients)
             steep = np.abs(chebyshev.slopes_at_places(coefficients)[:, [0, -1]].T) > STEEP * scale
             flat, level = np.nonzero(~steep)
             touched, place = np.concatenate([touched, level]), np.concatenate([place, 2.0 * flat - 1.0])
@@ -234,11 +247,7 @@ class Search:
             owner, marks = np.concatenate([owner, piece]), np.concatenate([marks, 2.0 * end - 1.0])
             dead = np.concatenate([dead, np.ones(len(piece), dtype=bool)])
         cut = np.unique(owner)
-        owners, places = np.concatenate([owner, cut, cut]), np.concatenate([marks, 0.0 * cut - 1.0, 0.0 * cut + 1.0])
-        order = np.lexsort((places, owners))
-        owners, places = owners[order], places[order]
-        beside = (owners[1:] == owners[:-1]) & (places[1:] > places[:-1])
-        of, low, high = owners[:-1][beside], places[:-1][beside], places[1:][beside]
+        of, low, high = between_marks(owner, marks, cut)
         keep = (chebyshev.value(coefficients[of], (low + high) / 2) >= 0) | (role == "across")
         of, low, high = of[keep], low[keep], high[keep]
         owner, marks = owner[dead], marks[dead]
@@ -253,6 +262,15 @@ class Search:
         with np.errstate(divide="ignore", invalid="ignore"):
             moved = x - value / chebyshev.slope(coefficients, x)
         return np.where(np.abs(moved - x) < BESIDE, np.clip(moved, -1.0, 1.0), x)
+
+
+def between_marks(owner: Ints, marks: Floats, some: Ints) -> tuple[Ints, Floats, Floats]:
+    """Intervals of some pieces from -1 to 1 between the places in them that are marked: the piece, both ends."""
+    owners, places = np.concatenate([owner, some, some]), np.concatenate([marks, 0.0 * some - 1.0, 0.0 * some + 1.0])
+    order = np.lexsort((places, owners))
+    owners, places = owners[order], places[order]
+    beside = (owners[1:] == owners[:-1]) & (places[1:] > places[:-1])
+    return owners[:-1][beside], places[:-1][beside], places[1:][beside]
 
 
 def _parts(pieces: Pieces, low: Floats, high: Floats, dead_low: Flags, dead_high: Flags) -> Pieces:

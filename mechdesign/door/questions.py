@@ -315,7 +315,8 @@ def sweep(
     -------
     Answer
         Table ``sweep``: the values that vary, each requirement's value and whether it is met, the results that the
-        matrix names, and why a case failed. A case that cannot be loaded or answered is a row of nan with its reason;
+        matrix names, why a case failed, and where the matrix says what is ``best`` the rank of each case and whether it
+        is on the Pareto front. A case that cannot be loaded or answered is a row of nan with its reason;
         ``failed`` counts those.
 
     Raises

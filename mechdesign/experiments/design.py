@@ -1,24 +1,128 @@
-"""Designs of experiments: which cases a matrix asks for."""
+"""Designs of experiments: which cases a matrix asks for, made one by one when they are needed."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mechdesign.errors import Problem, StudyError
-from mechdesign.experiments.cases import Case, variant
+from mechdesign.errors import StudyError
+from mechdesign.experiments.cases import Case
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
 from mechdesign.study.schema.matrix import GRID, Values
-from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import dotted, in_yaml
+from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
+from mechdesign.study.variants import faults
 
 
-def cases_of(study: Study) -> list[Case]:
+class Design(Sequence[Case]):
+    """The cases of a matrix in their order."""
+
+    names: tuple[str, ...]
+
+    @abstractmethod
+    def row(self, k: int) -> tuple[Any, ...]:
+        """The values of a case."""
+
+    @abstractmethod
+    def distinct(self, place: int) -> Iterable[Any]:
+        """The values that an entry takes, each at least once."""
+
+    @abstractmethod
+    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
+        """What an entry is in the first cases, as an array that `convert` makes of values."""
+
+    @overload
+    def __getitem__(self, k: int) -> Case: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[Case]: ...
+    def __getitem__(self, k: int | slice) -> Case | list[Case]:
+        if isinstance(k, slice):
+            return [self[each] for each in range(*k.indices(len(self)))]
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        return Case(tuple(zip(self.names, self.row(k), strict=True)))
+
+
+@dataclass(frozen=True, eq=False)
+class Grid(Design):
+    """Every combination of values, the last entry fastest."""
+
+    names: tuple[str, ...]
+    values: tuple[tuple[Any, ...], ...]
+
+    def __len__(self) -> int:
+        return math.prod(map(len, self.values))
+
+    def row(self, k: int) -> tuple[Any, ...]:
+        found = []
+        for values in reversed(self.values):
+            k, place = divmod(k, len(values))
+            found.append(values[place])
+        return tuple(reversed(found))
+
+    def distinct(self, place: int) -> Iterable[Any]:
+        return self.values[place]
+
+    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
+        each = math.prod(map(len, self.values[place + 1 :]))
+        return convert(self.values[place])[np.arange(count) // each % len(self.values[place])]
+
+
+@dataclass(frozen=True, eq=False)
+class Spread(Design):
+    """Values at points of the unit cube, shape (cases, entries)."""
+
+    vary: Mapping[str, Values]
+    cube: Floats
+
+    @property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The entries that vary."""
+        return tuple(self.vary)
+
+    def __len__(self) -> int:
+        return len(self.cube)
+
+    def row(self, k: int) -> tuple[Any, ...]:
+        return tuple(values.at(share) for values, share in zip(self.vary.values(), self.cube[k].tolist(), strict=True))
+
+    def distinct(self, place: int) -> Iterable[Any]:
+        values = [*self.vary.values()][place]
+        return values.values if values.values is not None else (values.from_, values.to)
+
+    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
+        values = [*self.vary.values()][place]
+        return convert([values.at(share) for share in self.cube[:count, place].tolist()])
+
+
+@dataclass(frozen=True, eq=False)
+class Listed(Design):
+    """The rows of a file."""
+
+    names: tuple[str, ...]
+    rows: Sequence[tuple[Any, ...]]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def row(self, k: int) -> tuple[Any, ...]:
+        return self.rows[k]
+
+    def distinct(self, place: int) -> Iterable[Any]:
+        return (row[place] for row in self.rows)
+
+    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
+        return convert([row[place] for row in self.rows[:count]])
+
+
+def cases_of(study: Study) -> Design:
     """The cases of a study's matrix, in the order of the grid (the last entry fastest), the sequence or the file.
 
     Raises
@@ -28,20 +132,19 @@ def cases_of(study: Study) -> list[Case]:
     """
     matrix = study.matrix
     assert matrix is not None
+    design: Design
     if matrix.vary is None:
-        names, rows = matrix.table(study.folder)
+        design = Listed(*matrix.table(study.folder))
     elif matrix.method == GRID:
-        names = tuple(matrix.vary)
-        rows = tuple(itertools.product(*(values.on_grid() for values in matrix.vary.values())))
+        design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()))
     else:
-        names = tuple(matrix.vary)
         assert matrix.samples is not None
-        rows = _spread(matrix.vary, _cube(matrix.method, len(names), matrix.samples, study.seed))
-    for name, column in zip(names, zip(*rows, strict=True), strict=True):
+        design = Spread(matrix.vary, _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed))
+    for place, name in enumerate(design.names):
         # Quantities as they are written, for their units must fit.
         written = study.resolved["matrix"]["vary"][name] if matrix.vary is not None else ()
-        _try(study, name, [*column, *_parts(written)])
-    return [Case(tuple(zip(names, row, strict=True))) for row in rows]
+        _try(study, name, [*design.distinct(place), *_parts(written)])
+    return design
 
 
 def _parts(written: Any) -> Iterable[Any]:
@@ -49,12 +152,6 @@ def _parts(written: Any) -> Iterable[Any]:
     if isinstance(written, str):
         return [part.strip() for part in written.split(":")]
     return written.values() if isinstance(written, dict) else written
-
-
-def _spread(vary: Mapping[str, Values], cube: Floats) -> tuple[tuple[Any, ...], ...]:
-    return tuple(
-        tuple(values.at(share) for values, share in zip(vary.values(), row, strict=True)) for row in cube.tolist()
-    )
 
 
 def _cube(method: str, dimensions: int, samples: int, seed: int) -> Floats:
@@ -81,19 +178,12 @@ def _try(study: Study, name: str, values: Sequence[Any]) -> None:
     StudyError
         Where the entry itself is wrong then; what is wrong only together with others is found in its case.
     """
-    place = dotted(entry(study.resolved, name))
-    problems: list[Problem] = []
+    words = [value for value in values if not isinstance(value, int | float) or isinstance(value, bool)]
     # Of quantities one of each unit.
-    tried = {(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in values}
-    for value in tried.values():
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            continue
-        text = in_yaml(value)
-        try:
-            variant(study, Case.of({name: value}))
-        except StudyError as error:
-            wrong = [each.message for each in error.problems if each.key == place]
-            keys = ("matrix", "vary", name) if study.matrix and study.matrix.vary is not None else ("matrix", "cases")
-            problems += [study.problem(f"{name}={text}: {message}", *keys) for message in wrong]
+    tried = [*{(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}.values()]
+    keys = ("matrix", "vary", name) if study.matrix and study.matrix.vary is not None else ("matrix", "cases")
+    problems = [
+        study.problem(f"{name}={in_yaml(tried[k])}: {message}", *keys) for k, message in faults(study, name, tried)
+    ]  # fmt: skip
     if problems:
         raise StudyError(problems)

@@ -12,8 +12,9 @@ from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
-from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, seeded, wanted_in
-from mechdesign.experiments.sweep import unit_of
+from mechdesign.experiments.cases import Case, answers, foresee, seeded
+from mechdesign.experiments.tally import Tally
+from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.parallel import one_thread
@@ -26,6 +27,7 @@ from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted, has
 from mechdesign.study.text.fields import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
+from mechdesign.study.variants import entry_unit
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
@@ -93,16 +95,16 @@ def _changing(study: Study, each: Changed) -> Changing:
         raise StudyError(f"{given} is {shown(raw)}, and only a number can change a little") from None
     if number.expression is not None:
         raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
-    if each.step is None and number.nominal == 0:
+    if each.step is None and not number:
         raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
     name = dotted(path)
-    unit = unit_of(study, name)
+    unit = entry_unit(study, name)
     try:
         given_step = Amount.of(each.step or 0.0)
-        step = (given_step.within(unit) if unit else given_step) or _PART * abs(number.nominal)
+        step = (given_step.within(unit) if unit else given_step) or _PART * abs(number)
     except QuantityError as error:
         raise StudyError(f"{given}: {error}") from None
-    return Changing(given, name, number.nominal, step, unit)
+    return Changing(given, name, number, step, unit)
 
 
 @one_thread()
@@ -114,17 +116,18 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     plain = replace(study, requirements=(), resolved=judged_by_none)
     cases = [Case(()), *(case for each in numbers for case in each.cases())]
     progress.start(len(cases), "cases")
-    found: list[Answered] = []
+    tally = Tally(cases, len(wanted), 0)
     for answered in answers(plain, cases, wanted, jobs=jobs):
-        found.append(answered)
-        progress.update(1)
-    rows = list(_rows(wanted, numbers, found))
-    table = _table(rows, [each.unit for each in found[0].numbers], numbers)
+        tally.add(answered)
+        progress.update(len(answered.table))
+    rows = list(_rows(wanted, numbers, tally))
+    table = _table(rows, [tally.result(k)[1] for k in range(len(wanted))], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
-    failed = f"the study itself has no answer: {found[0].failed}" if found[0].failed else ""
+    failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
     told = [f"{row.result} by {row.parameter}: {row.doubt}" for row in rows if row.doubt]
-    if warned := [each.warnings[0] for each in found if each.warnings]:
-        told.append(f"{len(warned)} of {counted(len(found), 'case')} have warnings; the first: {warned[0]}")
+    if tally.warned is not None:
+        warned = int((tally.table[:, 1] > 0).sum())
+        told.append(f"{warned} of {counted(len(tally), 'case')} have warnings; the first: {tally.warned[1]}")
     return Result(SENSITIVITIES.name, {table.name: table}, told, counts, failed)
 
 
@@ -148,12 +151,12 @@ class Row:
         return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
 
 
-def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence[Answered]) -> Iterator[Row]:
-    values = np.array([[number.value for number in each.numbers] for each in found])
+def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
+    values = np.column_stack([tally.result(k)[0] for k in range(len(wanted))])
     middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(wanted))
     slopes = [slope(middle, pair[0], pair[1], each.step) for each, pair in zip(numbers, sides, strict=True)]
     count = 2 * len(STEPS)
-    reasons = [next((one.failed for one in found[1 + k * count :][:count] if one.failed), "")
+    reasons = [next(filter(None, map(tally.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
                for k in range(len(numbers))]  # fmt: skip
     for k, result in enumerate(wanted):
         for each, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
@@ -163,7 +166,7 @@ def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], found: Sequence
             if not math.isnan(below):
                 doubt = f"has a kink here; its slope is {below:.6g} below {each.value:g} and {above:.6g} above"
             elif math.isnan(value):
-                doubt = f"is not known near {each.value:g}: {reason or found[0].failed or 'it is nan there'}"
+                doubt = f"is not known near {each.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
                 # Roughness wants longer steps, a curve that bends within them shorter ones.
                 other = each.step * 10 if each.step <= _PART * abs(each.value) else each.step / 10

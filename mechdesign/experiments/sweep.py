@@ -3,66 +3,35 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import Interrupted, StudyError, counted
-from mechdesign.experiments.cases import (
-    IMPOSSIBLE,
-    Answered,
-    Case,
-    Number,
-    Wanted,
-    answers,
-    commands_of,
-    foresee,
-    seeded,
-    wanted_in,
-)
-from mechdesign.experiments.design import cases_of
-from mechdesign.journal import Journal, digest
+from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
+from mechdesign.experiments.design import Design, Listed, cases_of
+from mechdesign.experiments.ranking import Ranking, goals_of
+from mechdesign.experiments.tally import Tally
+from mechdesign.experiments.wanted import Wanted, wanted_in
+from mechdesign.journal import Journal
+from mechdesign.numerics.arrays import Flags
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
-from mechdesign.report.requirements import Verdict, in_words
+from mechdesign.report.cases import text_of
+from mechdesign.report.requirements import in_words
 from mechdesign.results import VARIED, Column, Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.study_file import entry, kinds_of
-from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY, Units
+from mechdesign.study.variants import entry_unit
 
 _SECTION = "matrix"
 
 
-@dataclass(frozen=True, eq=False)
-class Cases:
-    """Cases of a study and what came of them, in their order."""
-
-    cases: Sequence[Case]
-    answers: Sequence[Answered]
-    wanted: Sequence[Wanted]
-
-    @property
-    def verdicts(self) -> list[dict[str, Verdict]]:
-        """Of each requirement the verdicts by the cases in words."""
-        count = len(self.answers[0].verdicts)
-        return [{self.named(k): each.verdicts[i] for k, each in enumerate(self.answers)} for i in range(count)]
-
-    def named(self, k: int) -> str:
-        """A case in words: its number, from 1, and its values."""
-        values = ", ".join(f"{short(name)} {_text(value)}" for name, value in self.cases[k].changes)
-        return f"case {k + 1} ({values})"
-
-
-def short(name: str) -> str:
-    """An entry's name without what goes without saying."""
-    return name.removeprefix("mechanism.parameters.").removeprefix("mechanism.")
-
-
-def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
+def prepared(study: Study) -> tuple[Design, list[Wanted]]:
     """The cases of a study and what is wanted of each; nothing is computed but a look at the study itself.
 
     Raises
@@ -75,7 +44,8 @@ def prepared(study: Study) -> tuple[list[Case], list[Wanted]]:
         raise StudyError(
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
-    wanted = wanted_in(_SECTION, matrix.results)
+    goals = {each.title: each for each in goals_of(matrix.best)}
+    wanted = [*({each.title: each for each in wanted_in(_SECTION, matrix.results)} | goals).values()]
     if not commands_of(study, wanted):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
@@ -95,118 +65,92 @@ def sweep(
     study = seeded(study, seed)
     cases, wanted = prepared(study)
     progress.start(len(cases), "cases")
-    found: list[Answered] = []
+    tally = Tally(cases, len(wanted), len(study.requirements))
+    if journal is not None:
+        tally.recall(journal)
+        progress.update(len(tally))
     try:
-        for answered in _found(study, cases, wanted, jobs, journal):
-            found.append(answered)
-            progress.update(1)
+        for answered in answers(study, cases, wanted, begin=len(tally), jobs=jobs):
+            tally.add(answered)
+            progress.update(len(answered.table))
+            if journal is not None:
+                tally.note(journal)
     except KeyboardInterrupt:
         if journal is not None:
+            tally.note(journal, last=True)
             journal.save()
-        if not found:
+        if not len(tally):
             raise
-        raise Interrupted(_result(study, Cases(cases, found, wanted))) from None
-    return _result(study, Cases(cases, found, wanted))
+        raise Interrupted(_result(study, cases, tally, wanted)) from None
+    return _result(study, cases, tally, wanted)
 
 
-def _found(
-    study: Study, cases: Sequence[Case], wanted: Sequence[Wanted], jobs: int | None, journal: Journal | None
-) -> Iterator[Answered]:
-    """What comes of the cases in their order; what a journal holds is not computed again."""
-    words: list[str] = []
-
-    def kept(answered: Answered) -> Answered:
-        k = len(words)
-        words.append(json.dumps(asdict(answered)))
-        if journal is not None:
-            journal.add(_key(cases[k]), np.array([[float(k)]]), words)
-        return answered
-
-    before = list(journal.words) if journal is not None else []
-    for case, told in zip(cases, before, strict=False):
-        if journal is None or journal.recall(_key(case)) is None:
-            break
-        yield kept(_recalled(json.loads(told)))
-    for answered in answers(study, cases[len(words) :], wanted, jobs=jobs):
-        yield kept(answered)
-
-
-def _key(case: Case) -> bytes:
-    return digest([np.frombuffer(json.dumps(case.changes).encode(), dtype=np.uint8).astype(float)])
-
-
-def _recalled(content: Mapping[str, Any]) -> Answered:
-    numbers = tuple(Number(*each) for each in content["numbers"])
-    verdicts = tuple(Verdict(**each) for each in content["verdicts"])
-    return Answered(numbers, verdicts, tuple(content["warnings"]), content["exit_code"], content["failed"])
-
-
-def _result(study: Study, found: Cases) -> Result:
+def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Result:
     """The table of the cases that were answered."""
-    answered, asked = found.answers, len(found.cases)
-    failed = [k for k, each in enumerate(answered) if each.exit_code >= IMPOSSIBLE]
-    counts = {
-        "cases": len(answered),
-        "not_met": sum(each.exit_code == 1 for each in answered),
-        "failed": len(failed),
-    }
+    count, asked, failed = len(tally), len(cases), tally.failed
+    counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
     told = ""
     if failed:
-        first = f"{found.named(failed[0])}: {answered[failed[0]].failed}"
-        told = f"{len(failed)} of {counted(len(answered), 'case')} failed; the first, {first}"
-    part = f"{len(answered)} of {asked} cases were answered; this is what they are" if len(answered) < asked else ""
+        first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
+        told = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
+    part = f"{count} of {asked} cases were answered; this is what they are" if count < asked else ""
+    table = Table("sweep", tuple(_columns(study, cases, tally, wanted)), "what becomes of each case of the matrix")
+    ranked = None
+    if goals := _goals(study):
+        ranking = Ranking.of(goals, {name: table[name] for name in goals}, table["exit_code"] == 0)
+        ranked = np.isfinite(ranking.rank)
+        table = replace(table, columns=(*table.columns, *ranking.columns()))
+        if study.matrix and study.matrix.best and study.matrix.best.sort:
+            table = table.take(np.argsort(ranking.rank, kind="stable"))
     return Result(
-        "sweep", {"sweep": Table("sweep", tuple(_columns(study, found)), "what becomes of each case of the matrix")},
-        tuple(_warnings(study, found)), counts, told, interrupted=part, drawn=_drawn(study, found),
+        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, told, interrupted=part,
+        drawn=_drawn(study, tally, wanted),
     )  # fmt: skip
 
 
-def _drawn(study: Study, found: Cases) -> dict[str, Any]:
-    """What pictures show: the entries that vary, and the results with what is required of them."""
+def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, Any]:
+    """What pictures show: the entries that vary, the results with what is required of them, and which are goals."""
     bounds = [(each.at_least, each.at_most) for each in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
-    results = limits | {each.title: (None, None) for each in found.wanted}
-    return {"cases": found, "entries": [name for name, _ in found.cases[0].changes], "results": results}
+    results = limits | {each.title: (None, None) for each in wanted}
+    entries = [name for name, _ in tally.cases[0].changes]
+    return {"cases": tally, "entries": entries, "results": results, "goals": _goals(study)}
 
 
-def _columns(study: Study, found: Cases) -> Iterator[Column]:
+def _goals(study: Study) -> dict[str, int]:
+    """Columns of the goals: 1 where one is to be small, -1 where it is to be large."""
+    best = study.matrix.best if study.matrix is not None else None
+    return {each.title: sign for each, sign in goals_of(best).items()}
+
+
+def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
     """The number of the case and how it ended, what varies, the requirements, the results, and why it failed."""
-    count, answered = len(found.answers), found.answers
+    count, table = len(tally), tally.table
     yield Column("case", np.arange(1, count + 1), "", "number of the case")
-    codes = np.array([each.exit_code for each in answered])
+    codes = table[:, 0].astype(np.intp)
     yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
-    for place, name in enumerate(name for name, _ in found.cases[0].changes):
-        values = [case.changes[place][1] for case in found.cases[:count]]
-        yield Column(name, _array(values, study.units), unit_of(study, name), VARIED)
+    for place, name in enumerate(cases.names):
+        values = cases.column(place, count, partial(_array, study.units))
+        yield Column(name, values, entry_unit(study, name), VARIED)
     for k, name in enumerate(requirement_names(study)):
-        verdicts = [each.verdicts[k] for each in answered]
-        unit = next((each.unit for each in verdicts if each.unit), "")
-        worst = np.array([each.worst for each in verdicts])
-        yield Column(name, worst, unit, f"worst row; required is {verdicts[0].requirement}")
-        yield Column(f"{name}_met", np.array([each.met for each in verdicts]), "", "1 where the requirement is met")
-    for k, wanted in enumerate(found.wanted):
-        numbers = [each.numbers[k] for each in answered]
-        unit = next((each.unit for each in numbers if each.unit), "")
-        yield Column(wanted.title, np.array([each.value for each in numbers]), unit, "chosen result")
-    yield Column("warnings", np.array([len(each.warnings) for each in answered]), "", "number of warnings")
-    yield Column("reason", np.array([each.failed for each in answered]), "", "why the case failed")
+        worst, met, unit = tally.required(k)
+        yield Column(name, worst, unit, f"worst row; required is {tally.worst[k].verdict.requirement}")
+        yield Column(f"{name}_met", met == 1, "", "1 where the requirement is met")
+    for k, each in enumerate(wanted):
+        yield Column(each.title, *tally.result(k), "chosen result")
+    yield Column("warnings", table[:, 1].astype(np.intp), "", "number of warnings")
+    reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
+    yield Column("reason", reasons, "", "why the case failed")
 
 
-def _array(values: Sequence[Any], units: Units) -> NDArray[Any]:
+def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:
     """Values as numbers, in these units, where each is one; else as words."""
     numbers = [
         units.convert(value) if isinstance(value, str) and QUANTITY.fullmatch(value) else value for value in values
     ]
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in numbers):
         return np.array(numbers, dtype=float)
-    return np.array([_text(value) for value in values])
-
-
-def _text(value: Any) -> str:
-    """A value in words."""
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return value if isinstance(value, str) else in_yaml(value)
+    return np.array([text_of(value) for value in values])
 
 
 def requirement_names(study: Study) -> list[str]:
@@ -218,52 +162,28 @@ def requirement_names(study: Study) -> list[str]:
     ]  # fmt: skip
 
 
-def unit_of(study: Study, name: str) -> str:
-    """Unit of an entry, as far as the study or its format tell it."""
-    keys = entry(study.resolved, name)
-    for k in range(len(keys), 0, -1):
-        if keys[:k] in study.kinds:
-            return study.units.label(study.kinds[keys[:k]])
-    # What a short form stands for lies below it.
-    kinds = kinds_of(keys) | {kind for path, kind in study.kinds.items() if path[:-1] == keys}
-    if len(kinds) == 1:
-        return study.units.label(*kinds)
-    section, *path = keys
-    if keys[:2] == ("reliability", "dimensions"):
-        return study.unit_of(str(keys[2])) or ""
-    if section != "mechanism" or len(path) < 2:
-        return ""
-    kind, owner, *rest = path
-    if kind == "parameters":
-        return study.unit_of(str(owner)) or ""
-    if kind == "links" and rest:
-        rest = ["length"] if rest == [2] else [each for each in rest if each != "points"]
-        rest[-1] = "x" if rest[-1] == 0 else "y" if rest[-1] == 1 else rest[-1]
-    places = study.mechanism.description.places
-    place = ".".join(map(str, ([kind] if kind == "limits" else []) + [owner, *rest]))
-    return study.unit_of(place) or "" if place in places else ""
-
-
-def _warnings(study: Study, found: Cases) -> Iterator[str]:
-    matrix, cases = study.matrix, found.cases
+def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[str]:
+    matrix, cases = study.matrix, tally.cases
     assert matrix is not None
     samples = len(cases)
     if matrix.method == "sobol" and matrix.vary is not None and samples & (samples - 1):
         near = 1 << samples.bit_length()
         yield f"{samples} samples of a Sobol' sequence are less even than a power of two: {near // 2} or {near}"
-    first: dict[str, int] = {}
-    twice = []
-    for k, case in enumerate(cases):
-        if (seen := first.setdefault(json.dumps(case.changes), k)) != k:
-            twice.append((k, seen))
-    if twice:
-        k, seen = twice[0]
-        yield f"{len(twice)} of {len(cases)} cases are repeated; {found.named(k)} is case {seen + 1} once more"
-    warned = [k for k, each in enumerate(found.answers) if each.warnings]
-    if warned:
-        k = warned[0]
-        more = f" (and {len(found.answers[k].warnings) - 1} more)" if len(found.answers[k].warnings) > 1 else ""
-        yield (
-            f"{len(warned)} of {counted(len(found.answers), 'case')} have warnings; the first, {found.named(k)}: "
-            f"{found.answers[k].warnings[0]}{more}"
-        )
+    if isinstance(cases, Listed):
+        first: dict[str, int] = {}
+        twice = [(k, seen) for k, row in enumerate(cases.rows) if (seen := first.setdefault(json.dumps(row), k)) != k]
+        if twice:
+            k, seen = twice[0]
+            yield f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {seen + 1} once more"
+    if tally.warned is not None:
+        k, warning, number = tally.warned
+        more = f" (and {number - 1} more)" if number > 1 else ""
+        warned = int((tally.table[:, 1] > 0).sum())
+        yield f"{warned} of {counted(len(tally), 'case')} have warnings; the first, {tally.named(k)}: {warning}{more}"
+    met = tally.table[:, 0] == 0
+    if ranked is not None and len(without := np.flatnonzero(met & ~ranked)):
+        answered = counted(int(met.sum()), "case")
+        yield (f"{len(without)} of {answered} that meet every requirement have no rank: a goal is no finite number, or "
+               f"part of the motion is missing; the first is {tally.named(int(without[0]))}")  # fmt: skip
+    elif ranked is not None and not met.any():
+        yield "no case is ranked: none was answered and meets every requirement"

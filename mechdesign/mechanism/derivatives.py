@@ -72,6 +72,22 @@ class Linearization(State):
             self._columns[index] = [columns(self, group, loop.edges)[1] for loop in group.loops]
         return self._columns[index]
 
+    @cached_property
+    @quiet
+    def conditionings(self) -> dict[int, Value]:
+        """Per group of the drives' structure, by its index, how far from a singularity: from -1 to 1, zero at one.
+
+        The determinant of its loop equations over the product of the lengths of its columns; for two links that meet
+        it is the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
+        """
+        groups = [(k, group) for k, group in enumerate(self.structure.groups) if group.form != "place"]
+        signed = {}
+        for (index, group), determinant in zip(groups, determinants(self), strict=True):
+            lines = self.loop_columns(index, group)
+            sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
+            signed[index] = determinant / np.sqrt(math.prod(sizes))
+        return signed
+
     def _solve_group(self, index: int, group: Group, right: list[Value]) -> list[Value]:
         lines = self.loop_columns(index, group)
         if len(lines) > 1:
@@ -136,6 +152,12 @@ class Linearization(State):
     def velocity(self, rates: Sequence[Value]) -> Rates:
         """Velocities for given drive rates (radians and lengths per time), or derivatives along any change of them."""
         return self._solve(rates, [0.0] * len(self.structure.edges))
+
+    @cached_property
+    def by_drives(self) -> list[Rates]:
+        """Derivatives of all positions by each drive, per radian."""
+        count = len(self.structure.given)
+        return [self.velocity([float(j == k) for j in range(count)]) for k in range(count)]
 
     @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
@@ -275,25 +297,9 @@ def determinants(linearization: Linearization) -> list[Value]:
     return found
 
 
-@quiet
-def conditionings(linearization: Linearization) -> dict[int, Value]:
-    """Per group of the drives' structure, by its index, how far from a singularity it is: from -1 to 1, zero at one.
-
-    The determinant of its loop equations over the product of the lengths of its columns; for two links that meet it is
-    the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
-    """
-    groups = [(k, group) for k, group in enumerate(linearization.structure.groups) if group.form != "place"]
-    signed = {}
-    for (index, group), determinant in zip(groups, determinants(linearization), strict=True):
-        lines = linearization.loop_columns(index, group)
-        sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
-        signed[index] = determinant / np.sqrt(math.prod(sizes))
-    return signed
-
-
 def regularity(linearization: Linearization) -> Value:
     """How far the drives are from a singularity, for each pose: 0 at one, at most 1; the smallest over the groups."""
-    return reduce(np.minimum, map(np.abs, conditionings(linearization).values()), 1.0)
+    return reduce(np.minimum, map(np.abs, linearization.conditionings.values()), 1.0)
 
 
 def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:
@@ -314,11 +320,10 @@ class Jacobian:
 
     @staticmethod
     @quiet
-    def of(linear: Linearization, rows: Sequence[Coordinate], length: float | None = None) -> Jacobian:
+    def of(linear: Linearization, rows: Sequence[Coordinate], length: Value | None = None) -> Jacobian:
         """The Jacobian at configurations; with `length`, the arc of one radian, angles count as lengths."""
         drives = linear.structure.given
-        columns = [linear.velocity([float(j == k) for j in range(len(drives))]) for k in range(len(drives))]
-        entries = [[first(linear.configuration, row, rates) for rates in columns] for row in rows]
+        entries = [[first(linear.configuration, row, rates) for rates in linear.by_drives] for row in rows]
         if length is None:
             return Jacobian(entries, entries, linear.configuration.shape)
         up, down = ([length if c.quantity == "angle" else 1.0 for c in side] for side in (rows, drives))
@@ -355,9 +360,9 @@ class Jacobian:
             # ||J||_F^2 / |det J| is s = sigma_max/sigma_min and its inverse added [S1, eq. 8], 2 at isotropy.
             (a, b), (c, d) = self.homogeneous
             size = self.determinant if self.homogeneous is self.entries else self._determinant(self.homogeneous)
-            twice = (a * a + b * b + c * c + d * d) / np.abs(size)
-            # (s - 2)(s + 2) rather than s^2 - 4 keeps the digits near isotropy; rounding may leave s just below 2.
-            return 2 / (twice + np.sqrt(np.maximum(twice - 2, 0) * (twice + 2)))
+            # What it has above 2, by the squares whose sum it is: it keeps its digits near isotropy.
+            more = np.where(size > 0, (a - d) ** 2 + (b + c) ** 2, (a + d) ** 2 + (b - c) ** 2) / np.abs(size)
+            return 2 / (2 + more + np.sqrt(more * (more + 4)))
         least, largest = self.singular_values
         return np.where(largest > 0, least / largest, 0.0 * largest)
 
@@ -369,9 +374,10 @@ class Jacobian:
             return np.abs(self.homogeneous[0][0]), np.abs(self.homogeneous[0][0])
         if len(self.homogeneous) == 2:
             (a, b), (c, d) = self.homogeneous
-            size = np.abs(a * d - b * c)
-            square = a * a + b * b + c * c + d * d
-            largest = 0.5 * (np.sqrt(square + 2 * size) + np.sqrt(np.maximum(square - 2 * size, 0.0)))
+            size = a * d - b * c
+            # The sum of the squared entries less and more twice the determinant's size, as sums of squares.
+            one, two = np.sqrt((a - d) ** 2 + (b + c) ** 2), np.sqrt((a + d) ** 2 + (b - c) ** 2)
+            largest, size = 0.5 * (one + two), np.abs(size)
             return size / largest, largest
         matrix = _matrix(self.homogeneous, self.shape)
         finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))

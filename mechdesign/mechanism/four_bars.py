@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -64,7 +64,7 @@ class FourBar:
             return "four-bar"
         return "slider-crank" if self.slide in (0, 3) else "inverted slider-crank"
 
-    @property
+    @cached_property
     def excess(self) -> float:
         """What decides whether a link turns fully: positive where one does, zero at a change point.
 
@@ -118,6 +118,25 @@ class FourBar:
         """``ground-crank-rod-rocker (O A B D)``."""
         return f"{'-'.join(self.links)} ({' '.join(joint.name for joint in self.joints)})"
 
+    def whole(self, size: float) -> bool:
+        """Whether none of its links is a point, in a mechanism of this size."""
+        return not any(length <= EQUAL_LENGTHS * size for length in self.lengths)
+
+    def measured(self, poses: Configuration, size: float) -> list[FourBar]:
+        """The chain in mechanisms of other dimensions, of a size, each with a pose of a flat batch."""
+        joints, nothing = self.joints, np.full(poses.shape, math.nan)
+        lengths = [
+            nothing if min(a.node, b.node) < 0 else np.abs(poses.nodes[b.node] - poses.nodes[a.node])
+            for a, b in zip([joints[3], *joints[:3]], joints, strict=True)
+        ]
+        offset = nothing
+        if self.slide >= 0:
+            span = poses.nodes[joints[(self.slide + 1) % 4].node] - poses.nodes[joints[self.slide - 1].node]
+            offset = np.abs(cross(np.asarray(_along(poses, joints[self.slide])), np.asarray(span)))
+            offset = np.where(offset > EQUAL_LENGTHS * size, offset, 0.0)
+        table = np.stack([np.broadcast_to(part, poses.shape) for part in (*lengths, offset)], axis=1)
+        return [replace(self, lengths=(*row[:4],), offset=row[4]) for row in table.tolist()]
+
     def _line(self, end: int | None) -> tuple[int, int]:
         """Joints that the coupler's action leads from and to, or the arm of the input (`end` 0) or output (3).
 
@@ -165,15 +184,21 @@ class FourBar:
 
 def four_bars(mechanism: Mechanism) -> tuple[FourBar, ...]:
     """Every four-bar and slider-crank of a mechanism that is not rigid in itself, those on the ground first."""
+    sketch, size = mechanism.sketch_configuration, mechanism.size
+    flat = replace(sketch, shape=(1,), reason=sketch.reason.reshape(1))
+    measured = [chain.measured(flat, size)[0] for chain in chains(mechanism)]
+    return tuple(chain for chain in measured if chain.whole(size))
+
+
+def chains(mechanism: Mechanism) -> tuple[FourBar, ...]:
+    """Every four-bar and slider-crank by the joints alone, without lengths; some of its links may be points."""
     bodies = _Bodies(mechanism)
     found: dict[frozenset[tuple[str, int, int]], FourBar] = {}
     for links, joints in _rings(bodies):
         key = frozenset((joint.name, joint.node, joint.edge) for joint in joints)
         if key not in found:
             found[key] = bodies.four_bar(links, joints)
-    size = mechanism.size
-    whole = [loop for loop in found.values() if not any(length <= EQUAL_LENGTHS * size for length in loop.lengths)]
-    return tuple(sorted(whole, key=lambda loop: bodies.ground not in loop.links))
+    return tuple(sorted(found.values(), key=lambda chain: bodies.ground not in chain.links))
 
 
 def describe_loops(mechanism: Mechanism) -> list[str]:
@@ -229,21 +254,7 @@ class _Bodies:
         links, joints = [*links[k:], *links[:k]], [*joints[k:], *joints[:k]]
         if self._known(links[3], joints[3]) < self._known(links[1], joints[0]):
             links, joints = [links[0], *links[:0:-1]], joints[::-1]
-        pose = self.mechanism.sketch_configuration
-        lengths = [
-            math.nan if min(a.node, b.node) < 0 else float(abs(pose.nodes[b.node] - pose.nodes[a.node]))
-            for a, b in zip([joints[3], *joints[:3]], joints, strict=True)
-        ]
-        names = tuple(link.replace(":", " ") for link in links)
-        return FourBar(names, tuple(joints), tuple(lengths), self._offset(joints, pose))
-
-    def _offset(self, joints: Sequence[Joint], pose: Configuration) -> float:
-        k = next((k for k, joint in enumerate(joints) if joint.edge >= 0), -1)
-        if k < 0:
-            return math.nan
-        span = pose.nodes[joints[(k + 1) % 4].node] - pose.nodes[joints[k - 1].node]
-        offset = abs(float(cross(np.asarray(_along(pose, joints[k])), np.asarray(span))))
-        return offset if offset > EQUAL_LENGTHS * self.mechanism.size else 0.0
+        return FourBar(tuple(link.replace(":", " ") for link in links), tuple(joints), (math.nan,) * 4, math.nan)
 
     def _frame(self, links: Sequence[str]) -> int:
         """Which link of a ring is fixed: the ground, else what a drive is measured from, else the first named."""

@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, cross, norm2, plus, rotation, vector
 from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import MEASURED, Place, Term
+from mechdesign.numerics.arrays import Ints
 
 
 def offset_names(body: str, point: str) -> tuple[str, str]:
@@ -35,6 +36,15 @@ class Vectors:
     d: Sequence[Value]
     offsets: Mapping[str, Value]
     parameters: Mapping[str, Value]
+
+    def take(self, index: Ints | slice) -> Vectors:
+        """Those of some dimensions of a flat batch; what is the same for all stays a number."""
+
+        def pick(value: Value) -> Value:
+            return value[index] if np.ndim(value) else value
+
+        offsets, parameters = ({name: pick(v) for name, v in part.items()} for part in (self.offsets, self.parameters))
+        return Vectors([pick(w) for w in self.w], [pick(d) for d in self.d], offsets, parameters)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -70,15 +70,23 @@ class Mechanism(Core):
         """Kind of a coordinate: ``length``, ``angle`` or ``none``."""
         return self.coordinate(name).quantity
 
-    def _check_ties(self) -> None:
-        offsets = self.geometry.nominal.offsets
+    def contradictions(self, places: Mapping[str, Value]) -> Iterator[tuple[str, str, Floats]]:
+        """Bodies whose angle follows in two ways from those of slides and clamps, and by how much these differ.
+
+        Radians, for other dimensions where these are given, of their shape; 0 where they agree.
+        """
+        offsets = self.geometry.vectors(places).offsets
         for a, b, turns in self.graph.ties:
-            gap = float(np.angle(offsets[a] * rotation(self.geometry.angle(turns, {})) / offsets[b]))
-            if abs(gap) > TIE_ROUNDING:
+            gap = np.abs(np.angle(offsets[a] * rotation(self.geometry.angle(turns, places)) / offsets[b]))
+            yield a, b, np.where(gap > TIE_ROUNDING, gap, 0.0)
+
+    def _check_ties(self) -> None:
+        for a, b, gap in self.contradictions({}):
+            if gap:
                 raise MechanismError(
                     f"the angles of the slides and clamps contradict each other: those between '{a}' and '{b}' are "
-                    f"{abs(gap) / self.description.angle_unit:.6g} apart on the two ways round; change one, or leave a "
-                    "joint out",
+                    f"{float(gap) / self.description.angle_unit:.6g} apart on the two ways round; change one, or leave "
+                    "a joint out",
                     "mechanism.joints",
                 )
 

@@ -114,6 +114,7 @@ class Plan:
         given: Sequence[ArrayLike],
         places: Mapping[str, ArrayLike] | None = None,
         *,
+        vectors: Vectors | None = None,
         start: Configuration | None = None,
         limits: bool = True,
         jobs: int | None = 1,
@@ -126,6 +127,8 @@ class Plan:
             Values of the plan's coordinates in its order (angles in radians); they broadcast to the batch.
         places : mapping of str to array_like, optional
             Dimensions that differ from the nominal ones, by place name; they broadcast against `given`.
+        vectors : Vectors, optional
+            The edges for these dimensions, of a flat batch, where they are known.
         start : Configuration, optional
             Solved pose (of batch shape or single) that groups without a closed form are continued from; the sketch
             where left out.
@@ -146,7 +149,7 @@ class Plan:
         shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
         count = int(np.prod(shape, dtype=np.int64))
         if count <= CHUNK:
-            return self._at_once(values, dims, shape, start, limits)
+            return self._at_once(values, dims, shape, vectors, start, limits)
         # By chunks that stay in the processor's cache, on one or more threads.
         keep_freed_memory()
         if self.change_points is not None:
@@ -165,11 +168,12 @@ class Plan:
             if start is not None and starts is not None:
                 begun = start.take(np.unravel_index(starts[begin : begin + length], start.shape))
             dimensions = {name: some(v) for name, v in places.items()}
-            return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), begun, limits)
+            own = None if vectors is None else vectors.take(slice(begin, begin + length))
+            return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
         parts = [*parts] if self.angles else parts
-        whole = joined(parts, shape, self.core.geometry.vectors(dims), dims)
+        whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
             angle.name: np.concatenate([np.broadcast_to(some.near[angle.name], some.shape) for some in parts]).reshape(
                 shape
@@ -183,6 +187,7 @@ class Plan:
         values: Sequence[Value],
         dims: Mapping[str, Value],
         shape: tuple[int, ...],
+        vectors: Vectors | None,
         start: Configuration | None,
         limits: bool,
     ) -> Configuration:
@@ -193,7 +198,8 @@ class Plan:
         if self.iterative:
             begin = self.start(start)
             guess, reached, turns = self._follow(values, dims, shape, begin)
-        state = self.run(values, self.core.geometry.vectors(dims), guess, self.modes_at(values), turns=turns)
+        vectors = vectors or self.core.geometry.vectors(dims)
+        state = self.run(values, vectors, guess, self.modes_at(values), turns=turns)
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)

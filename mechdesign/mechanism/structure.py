@@ -90,6 +90,45 @@ class Structure:
                 found[index] = slice(begin, end)
         return found
 
+    def behind(self, coordinate: Coordinate, graph: Graph) -> frozenset[int]:
+        """Groups that a coordinate follows from, by their indices."""
+        if coordinate.parts:
+            return frozenset[int]().union(*(self.behind(part, graph) for part in coordinate.parts))
+        nodes, roots, slides = self._owners
+        if coordinate.kind == "angle":
+            frames = [graph.bodies[body][0] for body in (coordinate.body, coordinate.reference)]
+            owners = [roots.get(self.ties[frame].root) for frame in frames]
+        elif coordinate.kind == "slide":
+            owners = [slides.get(coordinate.slide)]
+        else:
+            owners = [nodes.get(node) for node in (coordinate.node, coordinate.other)]
+        return frozenset[int]().union(*(self._chains[k] for k in owners if k is not None))
+
+    @cached_property
+    def _owners(self) -> tuple[dict[int, int], dict[int, int], dict[int, int]]:
+        """The group that places each node, and of which each angle's root and each slide is an unknown."""
+        nodes: dict[int, int] = {}
+        for k, group in enumerate(self.groups):
+            placed = [self.edges[edge].head if sign > 0 else self.edges[edge].tail for edge, sign in group.tree]
+            nodes |= {node: k for node in (*group.bases, *placed) if node not in nodes}
+        roots = {root: k for k, group in enumerate(self.groups) for root in group.angles}
+        return nodes, roots, {slide: k for k, group in enumerate(self.groups) for slide in group.slides}
+
+    @cached_property
+    def _chains(self) -> list[frozenset[int]]:
+        """Each group with all those before it that its equations and the places of its nodes take."""
+        nodes, roots, slides = self._owners
+        chains: list[frozenset[int]] = []
+        for k, group in enumerate(self.groups):
+            taken = [nodes.get(node) for loop in group.loops for node in (loop.start, loop.end)]
+            for edge in (self.edges[number] for number in (*group.edges, *(number for number, _ in group.tree))):
+                taken += [nodes.get(edge.tail), nodes.get(edge.head), roots.get(self.ties[edge.frame].root)]
+                taken += [] if edge.slide is None else [slides.get(edge.slide)]
+            # What conditions take is not followed up.
+            before = range(k) if group.conditions else {other for other in taken if other is not None and other < k}
+            chains.append(frozenset([k]).union(*(chains[other] for other in before)))
+        return chains
+
 
 class Undetermined(MechanismError):
     """The given coordinates are too many, too few, or contradict each other."""

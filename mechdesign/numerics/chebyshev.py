@@ -25,9 +25,17 @@ WEIGHTS = _TO_SERIES @ np.where(_ORDERS % 2 == 0, 2.0 / (1.0 - _ORDERS**2.0 + (_
 _LAST_STEP, _STEPS = 1e-8, 60
 
 
-def _basis(x: Floats) -> Floats:
-    """T_k at places, shape (..., COUNT)."""
-    return np.cos(np.arccos(np.clip(x, -1.0, 1.0))[..., None] * _ORDERS)
+def basis(x: Floats) -> Floats:
+    """T_k at places in [-1, 1], shape (COUNT, ...), by T_{m + n} = 2 T_m T_n - T_{m - n}."""
+    table = np.empty((COUNT, *np.shape(x)))
+    table[0], table[1] = 1.0, x
+    m = 1
+    while m < COUNT - 1:
+        last = min(2 * m, COUNT - 1)
+        np.multiply(table[1 : last - m + 1], 2.0 * table[m], out=table[m + 1 : last + 1])
+        table[m + 1 : last + 1] -= table[m - 1 : 2 * m - last - 1 if last < 2 * m else None : -1]
+        m = last
+    return table
 
 
 def _slope_basis(x: Floats) -> Floats:
@@ -40,7 +48,7 @@ def _slope_basis(x: Floats) -> Floats:
     return table
 
 
-_AT_PLACES, _SLOPES_AT_PLACES = _basis(PLACES).T, _slope_basis(PLACES).T
+_AT_NODES, _AT_PLACES, _SLOPES_AT_PLACES = basis(NODES), basis(PLACES), _slope_basis(PLACES).T
 # From the coefficients of series to those of their slopes.
 _DERIVATIVE = _slope_basis(NODES).T @ _TO_SERIES
 
@@ -65,6 +73,17 @@ def at_places(coefficients: Floats) -> Floats:
     return np.asarray(coefficients @ _AT_PLACES)
 
 
+def at_nodes(coefficients: Floats) -> Floats:
+    """Values at the nodes, shape (..., COUNT)."""
+    return np.asarray(coefficients @ _AT_NODES)
+
+
+def nearest_node(x: Floats) -> Ints:
+    """The node that is nearest to each place in [-1, 1] by its angle arccos x."""
+    node: Ints = (COUNT - 1 - np.floor(np.arccos(x) * (COUNT / np.pi))).astype(np.intp)
+    return np.maximum(node, 0)
+
+
 def slopes_at_places(coefficients: Floats) -> Floats:
     """Slopes at `PLACES`, shape (..., places)."""
     return np.asarray(coefficients @ _SLOPES_AT_PLACES)
@@ -72,7 +91,12 @@ def slopes_at_places(coefficients: Floats) -> Floats:
 
 def value(coefficients: Floats, x: Floats) -> Floats:
     """Values of series of shape (n, COUNT) at a place of each, shape (n,)."""
-    return np.asarray((coefficients * _basis(x)).sum(axis=-1))
+    return total(coefficients, basis(x))
+
+
+def total(coefficients: Floats, table: Floats) -> Floats:
+    """Values of series of shape (n, COUNT) at places with the `basis` given, shape (n,)."""
+    return np.asarray(np.einsum("nk,kn->n", coefficients, table))
 
 
 def slope(coefficients: Floats, x: Floats) -> Floats:
@@ -98,14 +122,17 @@ def turning_points(coefficients: Floats) -> tuple[Ints, Floats, Floats]:
     return which, x, value(some, x)
 
 
-def zeros(coefficients: Floats) -> tuple[Ints, Floats]:
-    """Places at which series of shape (n, COUNT) change their sign: which series, and the place in [-1, 1]."""
+def zeros(coefficients: Floats, turning: tuple[Ints, Floats, Floats]) -> tuple[Ints, Floats]:
+    """Places at which series of shape (n, COUNT) change their sign: which series, and the place in [-1, 1].
+
+    `turning` are their `turning_points`.
+    """
     values = at_places(coefficients)
     which, cell = np.nonzero((values[:, 1:] >= 0) != (values[:, :-1] >= 0))
     low, high = PLACES[cell], PLACES[cell + 1]
     at_low, at_high = values[which, cell], values[which, cell + 1]
     # Between two places with values of one sign a series may turn back beyond zero.
-    turned, place, extreme = turning_points(coefficients)
+    turned, place, extreme = turning
     beside = np.clip(np.searchsorted(PLACES, place) - 1, 0, len(PLACES) - 2)
     one, two = values[turned, beside], values[turned, beside + 1]
     hidden = ((one >= 0) == (two >= 0)) & ((one >= 0) != (extreme >= 0))
@@ -125,8 +152,8 @@ def _root(coefficients: Floats, low: Floats, at_low: Floats, high: Floats, at_hi
     slopes = coefficients @ _DERIVATIVE
 
     def both(x: Floats) -> tuple[Floats, Floats]:
-        basis = _basis(x)
-        return (coefficients * basis).sum(axis=-1), (slopes * basis).sum(axis=-1)
+        table = basis(x)
+        return total(coefficients, table), total(slopes, table)
 
     return root(both, low, at_low, high, at_high)
 
@@ -161,5 +188,5 @@ def slope_series(coefficients: Floats) -> Floats:
 
 def filled(values: Floats, good: Flags) -> Floats:
     """Values at the nodes, shape (nodes,), those that are not good by the polynomial through the others."""
-    basis = np.polynomial.chebyshev.chebvander(NODES, np.count_nonzero(good) - 1)
-    return np.where(good, values, basis @ np.linalg.solve(basis[good], values[good]))
+    table = np.polynomial.chebyshev.chebvander(NODES, np.count_nonzero(good) - 1)
+    return np.where(good, values, table @ np.linalg.solve(table[good], values[good]))

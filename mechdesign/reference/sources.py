@@ -12,6 +12,7 @@ from mechdesign.expressions import CONSTANTS, FUNCTIONS, meanings
 from mechdesign.indices import FOLDER, INDEX_NAMES, REGIONAL, STATISTICS
 from mechdesign.reference import keys, synonyms, tables
 from mechdesign.reference.entries import Entry
+from mechdesign.statistics import STATISTICS as WORDS
 from mechdesign.study.text.fields import quoted
 from mechdesign.study.text.forms import TERMS
 from mechdesign.study.text.units import listed
@@ -45,6 +46,11 @@ def results() -> Iterator[Entry]:
         if name == "min":
             text += "; 0 wherever the region ends at a singularity, of an index that is 0 there, as inverse_condition"
         yield Entry(f"*_{name}", "result of workspace", text, where=where)
+    for name, statistic in WORDS.items():
+        text = (
+            f"{statistic.meaning} of a column, after its name: kinematics.C.x.{name}; along a motion between the rows"
+        )
+        yield Entry(name, "statistic", text, where=where)
 
 
 def expressions() -> Iterator[Entry]:

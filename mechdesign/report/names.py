@@ -13,7 +13,7 @@ ANIMATION = "motion.gif"
 _TABLES = {
     "kinematics": "motion instant_centres extremes jacobian limits loops toggles targets modes",
     "workspace": "indices path totals pieces boundary local singularities",
-    "optimize": "optimum designs bounds best sensitivity pareto",
+    "optimize": "optimum designs bounds best sensitivity pareto nearest",
     "reliability": "moments reliability capability contributions density histogram convergence estimate allocation "
     "confirmation",
     "stiffness": "stiffness compliance eigen springs deflections displacements forces",
@@ -27,11 +27,14 @@ _PICTURES = {
     "reliability": "bands means deviations difference deviation_map failure_map reliability density density_contours "
     "histogram convergence estimate contributions allocation",
     "stiffness": "springs deflections free directions stiffness joint_forces force_hodographs",
-    SWEEP.name: "main_effects scatter",
+    SWEEP.name: "main_effects scatter response",
     SENSITIVITIES.name: "sensitivities",
 }
 # Studies, and copies of the files that they read.
-_STUDIES = {"optimize": "optimum.yaml optimum_*.yaml knee.yaml *input_*", "reliability": "allocated.yaml *input_*"}
+_STUDIES = {
+    "optimize": "optimum.yaml optimum_*.yaml knee.yaml nearest.yaml *input_*",
+    "reliability": "allocated.yaml *input_*",
+}
 
 
 def names(command: str, formats: str = "", *, animate: bool = False) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -15,9 +15,13 @@ from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.text.units import written
+from mechdesign.terms import Sum, is_plain, path_of, terms_of
+from mechdesign.terms import command_of as command_named
 
 Bounds = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
+# Where a requirement is on a part of the motion, and none of it lies there.
+_OUTSIDE = "no place of the motion"
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class Verdict:
 
 def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
-    return requirement.result.partition(".")[0]
+    return command_named(requirement.result)
 
 
 def judged_by(study: Study, command: str) -> list[int]:
@@ -53,7 +57,8 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     Parameters
     ----------
     goals : bool
-        Whether to look at the goals and conditions of `optimize` as well, which its own computation begins with.
+        Whether to look at the choices, goals and conditions of `optimize` as well, which its own computation begins
+        with.
 
     Raises
     ------
@@ -66,8 +71,10 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     judged = {command_of(requirement) for requirement in study.requirements}
     if goals and study.optimize is not None:
         from mechdesign.analyses.optimize.evaluation import Evaluator
+        from mechdesign.analyses.optimize.variables import check_choices
 
         try:
+            check_choices(study)
             with suppress(AssemblyError):
                 Evaluator(study)
         except StudyError as error:
@@ -123,7 +130,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30 (of the asked poses only)
     """
     if "cases" in result.drawn:
-        return tuple(over_cases(result.drawn["cases"].verdicts))
+        return tuple(result.drawn["cases"].verdicts)
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -146,7 +153,9 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     UnknownColumnError
         See `requirements`.
     """
-    path = requirement.result.partition(".")[2]
+    path = path_of(requirement.result)
+    if not is_plain(result, path):
+        return _of_number(terms_of(result, path, requirement.where), requirement)
     table, column, rows = located(result, path)
     found, begin = None, 0
     # A word that names the rows may be in a few blocks only.
@@ -164,14 +173,27 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
             if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
                 found = verdict
         begin += len(part)
+    chosen = replace(chosen, table=table)
+    if found is None and chosen.part and chosen.course:
+        # Between two rows.
+        found = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
+        return _over_motion(found, chosen, requirement)
     if found is None and whole and (missing := choose(result, path, requirement.where).missing):
         raise UnknownColumnError(missing)
     if found is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return _over_motion(found, requirement, bounds, table, column)
+    return found if np.isnan(found.margin) else _over_motion(found, chosen, requirement)
 
 
-def _bounds(chosen: Chosen, requirement: Requirement) -> Bounds:
+def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
+    """The verdict on one number: what is told of a column, or a sum."""
+    value = float(terms.numbers(assembled=requirement.unassembled is not None)[0])
+    value = abs(value) if requirement.abs else value
+    place = _OUTSIDE if np.isnan(value) and any(chosen.part for chosen in terms.parts) else ""
+    return _scoped(_verdict(requirement, _bounds(terms, requirement), value, place, terms.unit), terms, requirement)
+
+
+def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Bounds:
     low, high = (None if each is None else chosen.bound(each) for each in (requirement.at_least, requirement.at_most))
     return low, high
 
@@ -181,23 +203,32 @@ def _verdict(requirement: Requirement, bounds: Bounds, value: float, place: str,
     return Verdict(in_words(requirement), margin >= 0, value, place, margin, unit)
 
 
-def _over_motion(verdict: Verdict, requirement: Requirement, bounds: Bounds, table: Table, column: str) -> Verdict:
+def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> Verdict:
     """The verdict of the worst row, or of a worse place of the motion between the rows; what it does not speak of."""
-    scope = table.scope
-    if scope is None:
-        return verdict
+    bounds = _bounds(chosen, requirement)
     signs = [-1] * (requirement.at_least is not None) + [1] * (requirement.at_most is not None)
-    if scope.worst is not None and not requirement.where and not np.isnan(verdict.margin):
-        for sign in signs:
-            between = scope.worst(column, sign, requirement.abs)
-            if between is not None:
-                one = _verdict(requirement, bounds, between[0], between[1], verdict.unit)
-                verdict = one if one.margin < verdict.margin else verdict
-    notes = [POSES_ONLY] if scope.poses_only else []
-    if scope.missing:
-        verdict = verdict if requirement.unassembled else replace(verdict, met=False)
-        notes.append(scope.missing)
-    return replace(verdict, note="; ".join(notes))
+    course = chosen.course
+    for sign in signs if course is not None else ():
+        assert course is not None
+        value, place = (float(each[0]) for each in course.worst(sign, absolute=requirement.abs))
+        if np.isfinite(place):
+            between = _verdict(requirement, bounds, value, course.shown(place), verdict.unit)
+            verdict = between if not between.margin >= verdict.margin else verdict
+    return _scoped(verdict, chosen, requirement)
+
+
+def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
+    """The verdict with what it does not speak of; not met where some of the motion is missing that has to be valid."""
+    scoped = [(chosen, chosen.table.scope) for chosen in terms.parts if chosen.table.scope is not None]
+    missing = [scope.missing for _, scope in scoped if scope.missing]
+    if missing and not requirement.unassembled:
+        verdict = replace(verdict, met=False)
+    told = any(
+        scope.poses_only or (chosen.statistic and not chosen.picked and chosen.course is None)
+        for chosen, scope in scoped
+    )
+    notes = [POSES_ONLY] if told else []
+    return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
@@ -215,18 +246,15 @@ def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int 
     return int(min(ends, key=lambda row: _margin(bounds, float(values[row]))))
 
 
-def over_cases(verdicts: Iterable[Mapping[str, Verdict]]) -> Iterator[Verdict]:
-    """Verdicts on each requirement over cases, given by their names in words: the worst, and how many miss it."""
-    for cases in verdicts:
-        names = list(cases)
-        unmet = [k for k, each in enumerate(cases.values()) if not each.met]
-        margins = [-np.inf if np.isnan(each.margin) else each.margin for each in cases.values()]
-        k = int(np.argmin(margins))
-        worst = cases[names[k]]
-        place = ", ".join(filter(None, (names[k], worst.place)))
-        if unmet:
-            place += f"; {len(unmet)} of {counted(len(names), 'case')} do not meet it, the first is case {unmet[0] + 1}"
-        yield replace(worst, met=not unmet, place=place)
+def over_cases(worst: Verdict, name: str, unmet: int, count: int, first: int) -> Verdict:
+    """The verdict on a requirement over cases: that of the worst, named in words, and how many of them miss it.
+
+    `first` is the number of the first one that does, from 0.
+    """
+    place = ", ".join(filter(None, (name, worst.place)))
+    if unmet:
+        place += f"; {unmet} of {counted(count, 'case')} do not meet it, the first is case {first + 1}"
+    return replace(worst, met=not unmet, place=place)
 
 
 def _margin(bounds: Bounds, value: float) -> float:

@@ -24,27 +24,29 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
 from mechdesign.parallel import one_thread
-from mechdesign.study import poses
+from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.entries import check_variables, check_varied
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import KinematicsSection, PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.study_file import StudyFile, entry, override
+from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
-from mechdesign.study.text.units import Units, text_of
+from mechdesign.study.text.units import Units
 
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")
@@ -86,6 +88,7 @@ class Study:
     requirements: tuple[Requirement, ...]  #: in the order of the file
     targets: Mapping[str, Target]  # by the coordinate or point
     kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
+    fixed: frozenset[str]  # parameters in whole numbers, which are read once
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
     drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
@@ -94,6 +97,11 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Nominal values of the places of the geometry, lengths and radians, and of the parameters."""
+        return {**self.mechanism.nominal, **self.parameters.nominal}
 
     @property
     def label(self) -> str:
@@ -337,6 +345,7 @@ def load_document(
         requirements=parts["requirements"],
         targets=parts["targets"],
         kinds=reporter.kinds,
+        fixed=frozenset(context.fixed),
         folder=folder,
         warnings=tuple(reporter.warnings),
     )
@@ -378,8 +387,8 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
         except PydanticCustomError as error:
             reporter.report(path, error.message())
             number = LOST
-        nominal[name] = float(number.nominal)
-        if text := text_of(number.nominal):
+        nominal[name] = float(number)
+        if text := number.text:
             quantities[name] = text
         if number.expression is not None:
             formulas[name] = number.expression
@@ -414,6 +423,8 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
 
 def _checked(checker: Checker) -> dict[str, Any]:
     """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
+    if "optimize" in checker.parts:
+        checker.parts["optimize"] = check_variables(checker.parts["optimize"], checker)
     found = dict(checker.parts)
     for name in checker.parameters.kinds:
         for kind in checker.parameters.needed(name, checker.places):
@@ -423,35 +434,11 @@ def _checked(checker: Checker) -> dict[str, Any]:
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
     if "matrix" in found:
         found["matrix"].checked(checker)
-        _check_varied(found["matrix"], checker)
+        check_varied(found["matrix"], checker)
     if "sensitivities" in found:
         found["sensitivities"].checked(checker)
     found["targets"] = targets.check(checker, checker.mechanism.targets)
     return found
-
-
-def _check_varied(matrix: MatrixSection, checker: Checker) -> None:
-    """Check that the study has the entries that vary, each named once, and none inside another."""
-    at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
-    try:
-        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
-    except StudyError as error:
-        checker.report(at, str(error))
-        return
-    seen: dict[KeyPath, str] = {}
-    for name in names:
-        place = (*at, name) if matrix.vary is not None else at
-        try:
-            path = entry(checker.reporter.document.data, name)
-        except StudyError as error:
-            checker.report(place, str(error) if matrix.vary is not None else f"column {name!r}: {error}", at_key=True)
-            continue
-        if path[0] == "matrix":
-            checker.report(place, "a matrix does not vary itself", at_key=True)
-        for other, known in seen.items():
-            if path[: len(other)] == other or other[: len(path)] == path:
-                checker.report(place, f"{name} and {known} are, or hold, the same entry; vary one of them", at_key=True)
-        seen[path] = name
 
 
 def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
@@ -460,10 +447,10 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
     """
     for command in COMMANDS:
         section = parts.get(command)
-        found: poses.Poses | None = None
+        found: Poses | None = None
         if isinstance(section, PoseSection) and (key := section.source) is not None:
             try:
-                found = poses.expand(section, folder)
+                found = expansion.expand(section, folder)
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
@@ -477,7 +464,7 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                 reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
         if command == "kinematics" and parts["targets"]:
             try:
-                assumed = found or poses.default(mechanism.description)
+                assumed = found or expansion.default(mechanism.description)
             except StudyError:
                 continue
             targets.check_poses(parts["targets"], mechanism, assumed, reporter)

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from mechdesign.errors import StudyError
-from mechdesign.mechanism.model import Description
+from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.schema import paths
-from mechdesign.study.schema.paths import PointPath, Polyline, between
-from mechdesign.study.schema.poses import PoseSection, Sweep
-from mechdesign.study.text.inputs import Folder
+from mechdesign.study.point_paths import PointPath, between
+from mechdesign.study.text import fields
+from mechdesign.study.text.units import Amount
 
 MAX_POSES = 10_000_000
+_Section = TypeVar("_Section", bound=fields.Model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +59,8 @@ class Poses:
     # study's units.
     places: Mapping[str, Floats] = field(default_factory=dict)
     parameters: Mapping[str, Floats] = field(default_factory=dict)
+    nominal: Mapping[str, float] = field(default_factory=dict)  # every parameter of the study's own design
+    changed: frozenset[str] = frozenset()  # names of what is changed itself, and so follows nothing
     motion: bool = False  # whether they are passed one after the other: a sweep of one coordinate, or a path
     # Paths of points, by point. Other coordinates change evenly from pose to pose.
     paths: Mapping[str, PointPath] = field(default_factory=dict)
@@ -125,7 +124,7 @@ class Poses:
         for name in group.names:
             owner, _, axis = name.rpartition(".")
             if owner in self.paths and axis in ("x", "y"):
-                place = self.paths[owner].at(s)
+                place = self.paths[owner].at(line, s)
                 values[name] = place.real if axis == "x" else place.imag
             else:
                 rows = group.values[name].reshape(-1, self.line)
@@ -137,12 +136,25 @@ class Poses:
         )
         poses = Poses(
             (PoseGroup(group.names, values, np.arange(len(s))),), len(s), False, (len(s),), places=places,
-            parameters=parameters,
+            parameters=parameters, nominal=self.nominal,
         )  # fmt: skip
         if not self.slopes:
             return poses
-        slopes, bends = _by_length(self.groups[0], self.paths, self.closed, s)
+        slopes, bends = by_length(self, line, s)
         return replace(poses, slopes=slopes, bends=bends)
+
+    def of(self, number: float, rows: Ints | slice = slice(None)) -> Number:
+        """A number of the study at some poses: an array where it follows parameters in which designs differ."""
+        expression = number.expression if isinstance(number, Amount) else None
+        if expression is None or expression.names.isdisjoint(self.parameters):
+            return float(number)
+        env = {name: self.parameters[name][rows] if name in self.parameters else self.nominal[name]
+               for name in expression.names}  # fmt: skip
+        return expression.evaluate(env)
+
+    def section(self, section: _Section, rows: Ints | slice = slice(None)) -> _Section:
+        """A section of the study with the numbers of some poses, arrays where designs differ in them."""
+        return section.with_numbers(lambda number: self.of(number, rows)) if self.parameters else section
 
     @property
     def followed(self) -> bool:
@@ -154,17 +166,23 @@ class Poses:
         """The one coordinate that moves along a motion; None of listed poses, and where several do."""
         if self.listed:
             return None
-        moving = [name for name, values in self.values.items() if np.ptp(values) > 0]
+        moving = self.moving
         return moving[0] if len(moving) == 1 else None
+
+    @property
+    def moving(self) -> list[str]:
+        """Coordinates that change from pose to pose of a design."""
+        each = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
+        return [name for name, values in each.items() if (np.ptp(values, axis=1) > 0).any()]
 
     def pace(self, line: Ints, s: Floats) -> Floats:
         """How fast a motion passes places, shape (n,): length of a point's path a row, or change of what is swept.
 
         Means along the motion are by these; where several coordinates move without a path they are by rows.
         """
-        moving = _moving(self.paths)
+        moving = with_length(self.paths)
         if len(moving) == 1:
-            return moving[0][1].course(s)[2]
+            return moving[0][1].course(line, s)[2]
         if self.swept is None:
             return np.ones(len(s))
         rows = self.groups[0].values[self.swept].reshape(-1, self.line)
@@ -176,6 +194,24 @@ class Poses:
         if self.rows is not None:
             return self.rows.astype(float)
         return np.tile(np.arange(self.count // self.designs, dtype=float), self.designs)
+
+    def some(self, designs: Ints) -> Poses:
+        """The poses of some designs."""
+        each = self.count // self.designs
+        rows = (each * designs[:, None] + np.arange(each)).ravel()
+        first = each * np.arange(len(designs))[:, None]
+        groups = []
+        for group in self.groups:
+            values = {name: v.reshape(self.designs, -1)[designs].ravel() for name, v in group.values.items()}
+            own = group.rows[: len(group.rows) // self.designs]
+            groups.append(PoseGroup(group.names, values, (first + own).ravel()))
+        parts = (self.places, self.parameters, self.slopes, self.bends)
+        places, parameters, slopes, bends = ({name: v[rows] for name, v in part.items()} for part in parts)
+        paths = {owner: path.take(designs) for owner, path in self.paths.items()}
+        return replace(
+            self, groups=tuple(groups), count=len(rows), designs=len(designs), places=places, parameters=parameters,
+            paths=paths, slopes=slopes, bends=bends,
+        )  # fmt: skip
 
     def take(self, rows: Ints | slice) -> Poses:
         """Some poses of a motion or a grid of one design, in their order."""
@@ -192,167 +228,29 @@ class Poses:
         )  # fmt: skip
 
 
-def stacked(poses: Poses, designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> Poses:
-    """The same poses of several designs; places and parameters of shape (designs,)."""
-
-    def each(values: Mapping[str, ArrayLike]) -> dict[str, Floats]:
-        return {
-            name: np.repeat(np.broadcast_to(np.asarray(value, dtype=float), designs), poses.count)
-            for name, value in values.items()
-        }
-
-    first = poses.count * np.arange(designs)[:, None]
-    groups = tuple(
-        PoseGroup(
-            group.names, {name: np.tile(v, designs) for name, v in group.values.items()}, (first + group.rows).ravel()
-        )
-        for group in poses.groups
-    )
-    count = poses.count * designs
-    slopes, bends = ({name: np.tile(v, designs) for name, v in part.items()} for part in (poses.slopes, poses.bends))
-    return replace(
-        poses, groups=groups, count=count, designs=designs, places=each(places), parameters=each(parameters),
-        slopes=slopes, bends=bends,
-    )  # fmt: skip
-
-
-def sweep_values(sweep: Sweep) -> Floats:
-    """Values of a sweep, both ends included: ``from + k step <= to + 1e-9 step``.
-
-    Raises
-    ------
-    StudyError
-        If they are more than `MAX_POSES`.
-    """
-    if sweep.number is not None:
-        return np.linspace(sweep.from_, sweep.to, sweep.number)
-    assert sweep.step is not None
-    steps = (sweep.to - sweep.from_) / sweep.step + 1e-9
-    if not steps < MAX_POSES:
-        raise StudyError(f"a sweep of more than {MAX_POSES} poses")
-    return sweep.from_ + sweep.step * np.arange(math.floor(steps) + 1, dtype=np.float64)
-
-
-def expand(section: PoseSection, folder: Folder) -> Poses | None:
-    """Poses of a section, None where it gives none, or those of the workspace; files of paths lie in `folder`.
-
-    Raises
-    ------
-    StudyError
-        Where there are too many, or a path's file or lengths are wrong.
-    """
-    if section.poses:
-        return _listed(section.poses)
-    if section.sweep is not None:
-        return _grid({name: sweep_values(sweep) for name, sweep in section.sweep.items()})
-    if section.path is not None:
-        return _path(section.path, folder)
-    return None
-
-
-def _listed(poses: Sequence[Mapping[str, float]]) -> Poses:
-    rows: dict[frozenset[str], list[int]] = {}
-    for index, pose in enumerate(poses):
-        rows.setdefault(frozenset(pose), []).append(index)
-    groups = []
-    for members in rows.values():
-        names = tuple(poses[members[0]])
-        values = {name: np.array([poses[index][name] for index in members]) for name in names}
-        groups.append(PoseGroup(names, values, np.array(members, dtype=np.intp)))
-    return Poses(tuple(groups), len(poses), True, (len(poses),))
-
-
-def _grid(axes: Mapping[str, Floats]) -> Poses:
-    count = math.prod(len(values) for values in axes.values())
-    if count > MAX_POSES:
-        raise StudyError(f"a grid of {count} poses; at most {MAX_POSES} are possible")
-    mesh = np.meshgrid(*axes.values(), indexing="ij")
-    values = {name: points.ravel() for name, points in zip(axes, mesh, strict=True)}
-    swept = tuple(len(values) for values in axes.values() if len(values) > 1)
-    return Poses.single(values, swept or (1,))
-
-
-def _path(path: Mapping[str, paths.PathSection], folder: Folder) -> Poses:
-    if not path:
-        raise StudyError("an empty path; give its points, [[x, y], ...]")
-    columns: dict[str, Floats] = {}
-    points: dict[str, PointPath] = {}
-    for name, given in path.items():
-        course = paths.course(name, given, folder)
-        if isinstance(course, PointPath):
-            points[name] = course
-            places = course.at(np.arange(course.count, dtype=float))
-            columns[f"{name}.x"], columns[f"{name}.y"] = places.real, places.imag
-        else:
-            columns[name] = course
-    count = max(len(column) for column in columns.values())
-    for name, column in columns.items():
-        if len(column) not in (1, count):
-            raise StudyError(f"path: {name!r} has {len(column)} values where another coordinate has {count}")
-    values = {name: np.broadcast_to(column, (count,)).copy() for name, column in columns.items()}
-    for owner in {name.rpartition(".")[0] for name in columns if name.endswith(".x")} - set(points):
-        if f"{owner}.y" in columns:
-            points[owner] = Polyline.through(values[f"{owner}.x"] + 1j * values[f"{owner}.y"])
-    points = {owner: course for owner, course in points.items() if course.count == count}
-    listed = np.array([column for name, column in values.items() if name.rpartition(".")[0] not in points])
-    corners = [course.corners for course in points.values()] + ([paths.bends(listed)] if len(listed) else [])
-    poses = replace(Poses.single(values), paths=points, corners=np.unique(np.concatenate(corners)))
-    if len(_moving(points)) != 1:
-        return poses
-    slopes, bends = _by_length(poses.groups[0], points, poses.closed, np.arange(count, dtype=float))
-    return replace(poses, slopes=slopes, bends=bends)
-
-
-def _moving(points: Mapping[str, PointPath]) -> list[tuple[str, PointPath]]:
+def with_length(points: Mapping[str, PointPath]) -> list[tuple[str, PointPath]]:
     """Paths that have a length: the way of a point that stays where it is says nothing."""
-    return [(owner, course) for owner, course in points.items() if course.way(np.array([course.count - 1.0]))[0] > 0]
+    first = np.zeros(1, dtype=np.intp)
+    return [(owner, course) for owner, course in points.items()
+            if course.way(first, np.array([course.count - 1.0]))[0] > 0]  # fmt: skip
 
 
-def _by_length(
-    group: PoseGroup, points: Mapping[str, PointPath], closed: bool, s: Floats
-) -> tuple[dict[str, Floats], dict[str, Floats]]:  # fmt: skip
+def by_length(poses: Poses, line: Ints, s: Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Derivatives of what poses give by the length of a point's path, at places in rows: `slopes` and `bends`."""
-    count = len(group.rows)
-    ((owner, course),) = _moving(points)
-    way = np.diff(course.way(np.arange(count + closed, dtype=float)))
+    (group,) = poses.groups
+    ((owner, course),) = with_length(poses.paths)
+    way = course.lengths(poses.designs)
     slopes: dict[str, Floats] = {}
     for name, column in group.values.items():
+        rows = column.reshape(poses.designs, -1)
         # What is listed along with the point's path changes evenly between the places.
         with np.errstate(divide="ignore", invalid="ignore"):
-            rise = np.diff(np.append(column, column[:1]) if closed else column)
+            rise = np.diff(np.concatenate([rows, rows[:, :1]], axis=1) if poses.closed else rows, axis=1)
             steps = np.where(rise == 0, 0.0, rise / way)
-        slopes[name] = steps[np.clip(np.floor(s), 0, len(steps) - 1).astype(np.intp)]
-    slopes_of_point, bends_of_point, _ = course.course(s)
+        slopes[name] = steps[line, np.clip(np.floor(s), 0, steps.shape[1] - 1).astype(np.intp)]
+    slopes_of_point, bends_of_point, _ = course.course(line, s)
     bends = dict.fromkeys(group.names, np.zeros(len(s)))
     for axis, part in (("x", np.real), ("y", np.imag)):
         slopes[f"{owner}.{axis}"] = part(slopes_of_point).copy()
         bends[f"{owner}.{axis}"] = part(bends_of_point).copy()
     return slopes, bends
-
-
-def default(description: Description) -> Poses:
-    """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
-
-    Raises
-    ------
-    StudyError
-        Where nothing sensible can be assumed.
-    """
-    if len(description.drives) != 1:
-        raise StudyError(
-            f"the study says no poses, and with {len(description.drives)} drives none can be assumed; "
-            "give 'poses', 'sweep' or 'path'"
-        )
-    drive = next(iter(description.drives.values()))
-    factor = description.angle_unit if drive.kind == "angle" else 1.0
-    for limit in description.limits:
-        low, high = limit.minimum, limit.maximum
-        if limit.kind == "drive" and limit.items[0] == drive.name and low is not None and high is not None:
-            ends = [(description.places[end].nominal if isinstance(end, str) else end) / factor for end in (low, high)]
-            return _grid({drive.name: np.linspace(ends[0], ends[1], 51)})
-    if drive.kind == "angle":
-        return _grid({drive.name: np.linspace(0.0, 2.0 * math.pi / factor, 73)})
-    raise StudyError(
-        f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
-        "give 'poses', 'sweep' or 'path', or limits of the drive"
-    )

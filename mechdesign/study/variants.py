@@ -1,138 +1,98 @@
 """A study with other numbers: as if its file had been changed, and the text of that file.
 
-It is not read and checked again: only numbers of the geometry are evaluated anew. Where other numbers of the study
-depend on what is changed (a sweep's end, a tolerance, a dimension measured from the sketch) the data is validated
-again, so that they follow.
+It is not read again: numbers that follow parameters are evaluated anew. Only dimensions measured from the sketch, and
+tolerances that go by the size of a dimension, are found anew from the data.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import yaml
 
-from mechdesign.commands import COMMANDS
-from mechdesign.errors import Problem, StudyError, printable
-from mechdesign.expressions import Expression, ExpressionError, Number
+from mechdesign.errors import StudyError, printable
+from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
-from mechdesign.study.loading import Study, load_document
-from mechdesign.study.schema.iso_tolerances import is_class
-from mechdesign.study.text.document import Document, KeyPath, Mark, in_yaml, leaves, plain, read
+from mechdesign.study.loading import Study, load_document, same_sketch
+from mechdesign.study.schema.entries import number_at
+from mechdesign.study.schema.study_file import entry, kinds_of, override
+from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, in_yaml, leaves, plain, read
 
-# Sections whose numbers are read once, when the study is loaded.
-SECTIONS = (*(name for name in COMMANDS if name != "optimize"), "requirements")
+Changes = Sequence[tuple[str, Any]]
+"""Entries of a study, by the names that ``--set`` takes, and their values."""
+# Sections that say which studies are made of this one.
+_OF_OTHERS = ("matrix", "sensitivities")
 # Bytes of a text beyond which it is written anew, without its comments.
 _MOST_BYTES = 1_000_000
 _INPUT = "input_"
 
 
-def variant(study: Study, changed: Mapping[str, float]) -> Study:
-    """The study with other values of parameters or single places, in its units; the assembly stays the sketch's.
+def overrides(changes: Changes) -> tuple[str, ...]:
+    """Changes as ``a.b.c=value``."""
+    return tuple(f"{name}={in_yaml(value)}" for name, value in changes)
 
-    A parameter that depends on changed ones follows. A place that is changed itself becomes a number: parameters no
-    longer change it.
+
+def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] | None = None) -> Study:
+    """The study with changed entries, and perhaps more parameters, without sections that make other studies of it.
+
+    Where only numbers of the mechanism are otherwise its assembly is that of the study's sketch, unless the sketch is
+    changed itself.
 
     Raises
     ------
     StudyError
-        If a name is neither a parameter nor a place, or the values make no mechanism.
-    MechanismError, AssemblyError
-        See `mechdesign.mechanism.mechanism.Variant`.
+        If the entries make no study; every mistake in one go.
     """
-    file = str(study.path or "")
-    unknown = [name for name in changed if name not in study.parameters.known()]
-    if unknown:
-        raise StudyError([Problem("is neither a parameter nor a dimension", name, file) for name in unknown])
-    values = {name: np.asarray(value, dtype=float) for name, value in changed.items()}
-    parameters, places = study.parameters.values(values), study.parameters.places(values)
-    (wrong,) = faults(study, parameters, places, 1)
-    if wrong:
-        raise StudyError([Problem(wrong, "mechanism", file)])
-    resolved = changed_data(study, changed)
-    if follows(study, changed):
-        document = Document(file, resolved, values={(): Mark(file)})
-        return load_document(
-            document, study.path, study.folder, study.text, study.text_sha256, study.overrides, study.seed,
-            study.mechanism,
-        )  # fmt: skip
-    description = study.mechanism.description
-    new = {name: dataclasses.replace(description.places[name], nominal=float(value)) for name, value in places.items()}
-    description = dataclasses.replace(description, places={**description.places, **new})
-    old = study.parameters
-    return dataclasses.replace(
-        study,
-        resolved=resolved,
-        mechanism=Variant(study.mechanism, description),
-        parameters=dataclasses.replace(
-            old,
-            nominal={name: float(value) for name, value in parameters.items()},
-            formulas={name: formula for name, formula in old.formulas.items() if name not in changed},
-            dependent={place: formula for place, formula in old.dependent.items() if place not in changed},
-            measured=old.measured.difference(changed),
-        ),
-    )
+    data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
+    document = Document("", data, values={(): Mark("")})
+    override(document, overrides(changes))
+    if parameters:
+        data["mechanism"].setdefault("parameters", {}).update(parameters)
+    return load_document(
+        document, study.path, study.folder, study.text, study.text_sha256, (*study.overrides, *overrides(changes)),
+        original=study.mechanism if same_sketch(data, study.resolved) else None,
+    )  # fmt: skip
 
 
-def faults(study: Study, parameters: Mapping[str, Number], places: Mapping[str, Number], count: int) -> list[str]:
-    """Why the numbers of each of `count` designs make no mechanism; empty where they do."""
-    found = np.full(count, "", dtype=object)
+def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:
+    """What is wrong with values of an entry, each alone in the study: the number of the value, and why.
 
-    def note(wrong: Any, message: str) -> None:
-        found[np.broadcast_to(wrong, count) & (found == "")] = message
-
-    for name, value in (*parameters.items(), *places.items()):
-        note(~np.isfinite(value), f"{name} has no finite value")
-    nominal, links = study.mechanism.nominal, study.mechanism.description.links
-    for name, value in places.items():
-        owner, _, last = name.rpartition(".")
-        if owner in links and last == "length":
-            note(~(np.asarray(value) > 0), f"{name} is not positive")
-    for index, limit in enumerate(study.mechanism.description.limits):
-        low, high = (
-            places.get(f"limits.{index}.{end}", nominal.get(f"limits.{index}.{end}")) for end in ("min", "max")
-        )
-        if low is not None and high is not None:
-            note(np.asarray(high) < low, f"limits.{index}: the maximum is below the minimum")
-        for end in (low, high):
-            if limit.kind == "distance" and end is not None:
-                note(np.asarray(end) < 0, f"limits.{index}: a distance is never negative")
-    return [str(reason) for reason in found]
-
-
-def follows(study: Study, names: Collection[str], sections: Collection[str] = SECTIONS) -> bool:
-    """Whether more than numbers of the geometry depends on parameters or places: numbers of sections, or the sketch's.
-
-    A name in any text of a section counts: that it never misses matters more than that it is sometimes wrong.
+    What is wrong elsewhere then may be right together with other changes.
     """
-    parameters = study.parameters.moved(names)
-    mechanism = study.resolved["mechanism"]
-    # An expression of a target is evaluated with the parameters at hand; the numbers of a list are not.
-    read = [study.resolved.get(name) for name in sections]
-    read += [target for target in (mechanism.get("targets") or {}).values() if not isinstance(target, str)]
-    if any(_mentions(part, parameters) for part in read):
-        return True
-    if "reliability" in sections and _has_classes(study):
-        return True
+    place = dotted(entry(study.resolved, name))
+    for k, value in enumerate(values):
+        try:
+            with_entries(study, [(name, value)])
+        except StudyError as error:
+            yield from ((k, each.message) for each in error.problems if f"{each.key}.".startswith(f"{place}."))
+
+
+def entry_unit(study: Study, name: str) -> str:
+    """Unit of an entry, as far as the study or its format tell it."""
+    keys = entry(study.resolved, name)
+    for k in range(len(keys), 0, -1):
+        if keys[:k] in study.kinds:
+            return study.units.label(study.kinds[keys[:k]])
+    # What a short form stands for lies below it.
+    kinds = kinds_of(keys) | {kind for path, kind in study.kinds.items() if path[:-1] == keys}
+    if len(kinds) == 1:
+        return study.units.label(*kinds)
+    if keys[:2] == ("reliability", "dimensions"):
+        return study.unit_of(str(keys[2])) or ""
+    return study.unit_of(number_at(keys, study.parameters.nominal, study.mechanism.description.places)) or ""
+
+
+def remeasured(study: Study, names: Collection[str]) -> bool:
+    """Whether dimensions that are measured from the sketch depend on parameters or places."""
     if not study.parameters.measured:
         return False
-    return _mentions(mechanism.get("sketch"), parameters) or not _drawing(study).isdisjoint(
+    sketch = study.resolved["mechanism"].get("sketch")
+    return _mentions(sketch, study.parameters.moved(names)) or not _drawing(study).isdisjoint(
         study.parameters.moved_places(names)
-    )
-
-
-def _has_classes(study: Study) -> bool:
-    """Whether a tolerance goes by the size of its dimension: that of a class."""
-    section = study.resolved.get("reliability") or {}
-    return any(
-        isinstance(value, str) and is_class(value) and value not in study.parameters.nominal
-        for _, value in leaves(section.get("dimensions") or {})
     )
 
 

@@ -1,5 +1,7 @@
 """Speed of kinematics: closed forms with their derivatives, groups solved by Newton's method, and single poses.
 
+Populations of designs, in processor time a design, stand beside a closed form of the same written in NumPy by hand.
+
 pylinkage's compiled stepping of the same four-bar runs beside it where it is installed (`pip install .[benchmark]`).
 """
 
@@ -7,6 +9,9 @@ from __future__ import annotations
 
 import math
 import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +21,15 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.kinematics.analysis import answers, kinematics
+from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.poses import study_poses
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.parallel import map_chunks
 from mechdesign.report.tables import csv_blocks
+from mechdesign.study import Study
+from mechdesign.study.designs import Designs
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSES = 2_000_000
@@ -129,3 +138,137 @@ def test_one_pose(benchmark: Any) -> None:
     mechanism = study_of(FOUR_BAR).mechanism
     pose = benchmark(mechanism.solve, {"theta": 60})
     assert float(pose["rocker.angle"]) == pytest.approx(102.890327, abs=5e-7)
+
+
+DESIGNS = 100
+LENGTHS = ("crank.length", "rod.length", "rocker.length")
+TURN = """
+kinematics:
+  sweep: {crank: {from: 0, to: 360, step: 5}}
+  outputs: [C, rocker.angle, mu]
+"""
+MEASURED = (
+    FOUR_BAR.replace("rod: [A, B, 3.5]", "rod: {from: A, to: B, length: 3.5, points: {C: [1.75, 1.5]}}").replace(
+        "theta: {angle: crank}", "crank: {angle: crank}"
+    )
+    + "  measures: {mu: {angle: [rod, rocker]}}\n"
+)
+FIVE_BAR = """
+mechanism:
+  links:
+    ground: {B1: [100, 0], B2: [-100, 0]}
+    lower_1: [B1, D1, 100]
+    upper_1: [D1, C, 215]
+    lower_2: [B2, D2, 100]
+    upper_2: [D2, C, 215]
+  drives: {phi1: {angle: lower_1}, phi2: {angle: lower_2}}
+  sketch: {D1: [170, 72], D2: [-170, 72], C: [0, 205]}
+kinematics:
+  sweep: {C.x: {from: 0, to: 0, number: 1}, C.y: {from: 160, to: 250, number: 91}}
+  outputs: [C, lower_1.angle]
+"""
+
+
+def population(names: Sequence[str], study: Study, width: float = 0.05) -> dict[str, np.ndarray]:
+    random = np.random.default_rng(1)
+    return {name: study.mechanism.nominal[name] * (1 + width * random.uniform(-1, 1, DESIGNS)) for name in names}
+
+
+def processor_time(work: Callable[[], object], rounds: int = 7) -> float:
+    """Least processor time of some rounds, in ms a design."""
+    spent = []
+    for _ in range(rounds):
+        begin = time.process_time()
+        work()
+        spent.append(time.process_time() - begin)
+    return 1e3 * min(spent) / DESIGNS
+
+
+def evaluated(text: str, names: Sequence[str], minimised: str, condition: str) -> tuple[Evaluator, Mapping[str, Any]]:
+    ranges = ", ".join(f"{name}: {{from: 0, to: 1, number: 2}}" for name in names)
+    section = f"optimize={{variables: {{{ranges}}}, minimize: [{minimised}], subject_to: [{condition}]}}"
+    study = study_of(text, section)
+    return Evaluator(study), population(names, study)
+
+
+def four_bar_turn(crank: np.ndarray, rod: np.ndarray, rocker: np.ndarray) -> list[np.ndarray]:
+    """Range of C.x, time ratio of the rocker, least transmission angle: places of 5 degrees, then Newton's method."""
+    theta = np.linspace(0, 2 * np.pi, 73)
+    a, b, c, d = (np.reshape(v, (-1, 1)) for v in (crank, rod, rocker, 4.0))
+
+    def poses(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        pin = a * np.exp(1j * theta)
+        span = d - pin
+        along = (np.abs(span) ** 2 + b**2 - c**2) / (2 * np.abs(span))
+        turn = span / np.abs(span) * (along + 1j * np.sqrt(b**2 - along**2)) / b
+        return pin + (1.75 + 1.5j) * turn, np.angle(pin + b * turn - d)
+
+    found = []
+    for part in (0, 1):
+        ends = []
+        for sign in (1, -1):
+            values = sign * (poses(theta)[part].real)
+            place = theta[values.argmax(axis=1)][:, None]
+            for _ in range(4):
+                low, middle, high = (sign * poses(place + h)[part].real for h in (-1e-3, 0.0, 1e-3))
+                place = place - 5e-4 * (high - low) / (high - 2 * middle + low)
+            ends.append((sign * poses(place)[part].real, place))
+        found += [ends[0][0] + ends[1][0], ends[0][1] - ends[1][1]]
+    mu = [np.arccos((b**2 + c**2 - (d + side * a) ** 2) / (2 * b * c)) for side in (-1, 1)]
+    return [*found, np.minimum(mu[0], np.pi - mu[1])]
+
+
+def test_ends_of_a_turn_of_many_designs(benchmark: Any) -> None:
+    """At most 0.3 ms a design: a range, a time ratio and the least transmission angle of a four-bar's turn."""
+    goals = "kinematics.extremes.C.x.range, kinematics.extremes.rocker.angle.time_ratio"
+    evaluator, batch = evaluated(MEASURED + TURN, LENGTHS, goals, "{result: kinematics.mu, at_least: 20}")
+    found = benchmark.pedantic(evaluator, (batch,), rounds=3, warmup_rounds=1)
+    assert not any(found.reasons)
+    floor = four_bar_turn(*batch.values())
+    np.testing.assert_allclose(found.table[:, 0], floor[0][:, 0], rtol=1e-6)
+    benchmark.extra_info["ms_a_design"] = processor_time(lambda: evaluator(batch))
+    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: four_bar_turn(*batch.values()))
+
+
+def five_bar_sweep(lower_1: np.ndarray, upper_1: np.ndarray, lower_2: np.ndarray) -> np.ndarray:
+    """Angle of the first drive at 91 poses, and its range."""
+    reach = 1j * np.linspace(160, 250, 91) - 100
+    a, b, c = (np.reshape(v, (-1, 1)) for v in (lower_1, upper_1, lower_2))
+    other = np.arccos((c**2 + np.abs(reach) ** 2 - 215**2) / (2 * c * np.abs(reach)))
+    angle = np.angle(reach) - np.arccos((a**2 + np.abs(reach) ** 2 - b**2) / (2 * a * np.abs(reach)))
+    return np.ptp(angle, axis=1) + 0 * other.sum(axis=1)
+
+
+def test_a_sweep_of_a_five_bar_of_many_designs(benchmark: Any) -> None:
+    """At most 0.3 ms a design: 91 poses over three lengths, with what lies between the poses."""
+    names = ("lower_1.length", "upper_1.length", "lower_2.length")
+    goal, condition = "kinematics.extremes.lower_1.angle.range", "{result: kinematics.inverse_condition, at_least: 0}"
+    text = FIVE_BAR.replace("outputs: [C, lower_1.angle]", "outputs: [C, lower_1.angle]\n  jacobian: [C]")
+    evaluator, batch = evaluated(text, names, goal, condition)
+    found = benchmark.pedantic(evaluator, (batch,), rounds=3, warmup_rounds=1)
+    assert not any(found.reasons)
+    floor = np.degrees(five_bar_sweep(*batch.values()))
+    assert (found.table[:, 0] >= floor - 1e-9).all()
+    np.testing.assert_allclose(found.table[:, 0], floor, rtol=1e-2)
+    benchmark.extra_info["ms_a_design"] = processor_time(lambda: evaluator(batch))
+    benchmark.extra_info["floor_ms_a_design"] = processor_time(lambda: five_bar_sweep(*batch.values()))
+
+
+def test_all_tables_of_many_designs(benchmark: Any) -> None:
+    """At most 1.5 ms a design: every table, count and warning of a four-bar's turn; beside that one by one."""
+    study = study_of(MEASURED + TURN + "  rates: {crank: 1 rad/s}\n")
+    designs = population(LENGTHS, study)
+    poses = study_poses(study, "kinematics", Designs(study, designs).numbers)
+    found = benchmark.pedantic(answers, (study, poses), rounds=3, warmup_rounds=1)
+    assert all({"motion", "extremes", "limits", "loops", "toggles"} <= set(each.tables) for each in found)
+    benchmark.extra_info["ms_a_design"] = processor_time(lambda: answers(study, poses))
+    benchmark.extra_info["alone_ms"] = DESIGNS * processor_time(lambda: kinematics(study))
+
+
+def test_single_studies(benchmark: Any) -> None:
+    """At most 25 ms in the median over the shipped studies: a single small study in a process."""
+    studies = [mechdesign.load(path) for path in sorted(CONFIGS.rglob("*.yaml"))]
+    studies = [study for study in studies if study.kinematics is not None]
+    benchmark.pedantic(lambda: [kinematics(study) for study in studies], rounds=2, warmup_rounds=1)
+    each = [DESIGNS * processor_time(partial(kinematics, study), 3) for study in studies]
+    benchmark.extra_info["median_ms"] = float(np.median(each))

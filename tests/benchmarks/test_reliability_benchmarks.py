@@ -5,14 +5,18 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from helpers.memory import peak_of
 
 import mechdesign
+from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.analyses.optimize.goals import goal
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 ARM_SAMPLES = 2_000_000
@@ -141,3 +145,106 @@ def test_memory_of_ten_million_samples(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mechdesign", "reliability", str(CONFIGS / "two_link_arm.yaml"), "--quiet"]
     changes = ["--set", "reliability.samples=10000000", "--set", "reliability.poses=[{theta1: 30, theta2: 60}]"]
     assert peak_of([*command, "--no-plots", *changes, "--out", str(tmp_path)]) < 500e6
+
+
+# Ten poses of a five-bar, whose lengths, base and drives vary.
+FIVE_BAR = """
+mechanism:
+  parameters: {l1: 40, l2: 60, tol: 0.02}
+  links:
+    ground: {A: [0, 0], E: [50, 0]}
+    left: [A, B, l1]
+    right: [E, D, l1]
+    up_left: [B, C, l2]
+    up_right: [D, C, l2]
+  drives: {theta1: {angle: left}, theta2: {angle: right}}
+  sketch: {B: [-10, 38], D: [60, 38], C: [25, 87]}
+reliability:
+  sweep: {theta1: {from: 90, to: 126, number: 10}, theta2: 80}
+  outputs: [C]
+  dimensions: {"*.length": tol, ground.E.x: 0.02, theta1: 0.03, theta2: 0.03}
+  limits: {limits}
+  methods: [analytic]
+optimize: {method: search, variables: {l1: {from: 35, to: 45}, tol: {from: 0.01, to: 0.03}}, minimize: [{result}]}
+"""
+DESIGNS = 100
+
+
+def five_bar_deviations(l1: Any, l2: float, tol: Any) -> Any:
+    """sqrt(sum (J_i sigma_i)^2) of the same outputs, poses and sources, by hand: shape (2, designs, 10)."""
+    theta1, theta2 = np.radians(np.linspace(90, 126, 10)), np.radians(80.0)
+    e1, e2 = np.exp(1j * theta1), np.exp(1j * theta2)
+    b, d = l1[:, None] * e1, 50 + l1[:, None] * e2
+    half = 0.5 * (d - b)
+    c = b + half + 1j * half / np.abs(half) * np.sqrt(l2**2 - np.abs(half) ** 2)
+    u, v = (c - b) / l2, (c - d) / l2
+    cross = u.real * v.imag - u.imag * v.real
+
+    def moved(one: Any, other: Any) -> Any:
+        """Of C, where it moves so far along both upper links."""
+        return np.stack([one * v.imag - other * u.imag, other * u.real - one * v.real]) / cross
+
+    def dot(a: Any, z: Any) -> Any:
+        return a.real * z.real + a.imag * z.imag
+
+    sigma, drive = (tol / 3)[:, None], np.radians(0.03) / 3
+    parts = [
+        moved(dot(u, e1), 0) * sigma, moved(0, dot(v, e2)) * sigma, moved(1, 0) * sigma, moved(0, 1) * sigma,
+        moved(0, v.real) * (0.02 / 3), moved(dot(u, 1j * b), 0) * drive, moved(0, dot(v, 1j * (d - 50))) * drive,
+    ]  # fmt: skip
+    return np.sqrt(sum(part**2 for part in parts))
+
+
+@pytest.mark.parametrize(("result", "limits"), [
+    ("moments.sigma", "{C.x: 0.1, C.y: 0.1}"), ("reliability", "{C.x: 0.1, C.y: 0.1}"),
+    ("reliability", "{C: {radius: 0.1}}"), ("capability.cpk", "{C.x: 0.1, C.y: 0.1}"),
+])  # fmt: skip
+def test_first_order_of_designs(benchmark: Any, result: str, limits: str) -> None:
+    """Milliseconds of one processor a design, in populations of 100, beside NumPy by hand."""
+    text = FIVE_BAR.replace("{limits}", limits).replace("{result}", f"reliability.{result}")
+    study = mechdesign.load(text=text)
+    evaluator = Evaluator(study, [goal(f"reliability.{result}", smallest=result == "moments.sigma")])
+    rng = np.random.default_rng(1)
+    batch = {"l1": rng.uniform(35, 45, DESIGNS), "tol": rng.uniform(0.01, 0.03, DESIGNS)}
+    seconds: list[float] = []
+
+    def ask() -> Any:
+        begin = time.process_time()
+        found = evaluator(batch)
+        seconds.append(time.process_time() - begin)
+        return found
+
+    found = benchmark.pedantic(ask, rounds=20, warmup_rounds=2)
+    assert not any(found.reasons)
+    if result == "moments.sigma":
+        assert found.table[:, 0] == pytest.approx(five_bar_deviations(batch["l1"], 60.0, batch["tol"]).max(axis=(0, 2)))
+    begin = time.process_time()
+    for _ in range(100):
+        five_bar_deviations(batch["l1"], 60.0, batch["tol"])
+    floor = (time.process_time() - begin) / 100
+    benchmark.extra_info.update(milliseconds_a_design=1e3 * min(seconds) / DESIGNS, of_the_floor=min(seconds) / floor)
+
+
+@pytest.mark.parametrize("count", [8, 16, 24])
+def test_allocation_in_grades(benchmark: Any, count: int) -> None:
+    """So many lengths in eight grades, to a Cpk."""
+    names = [f"p{k}" for k in range(count)]
+    sizes = np.random.default_rng(1).uniform(20, 150, count)
+    text = f"""
+mechanism:
+  parameters: {{{", ".join(f"{name}: {size:.4g}" for name, size in zip(names, sizes, strict=True))}}}
+  links: {{ground: {{O: [0, 0], G: [{" + ".join(names)} - {70 * count}, 0]}}, slider: {{B: [0, 0]}}}}
+  joints: {{guide: {{prismatic: [ground, slider], through: G}}}}
+  drives: {{travel: {{slide: guide}}}}
+  sketch: {{B: [30, 0]}}
+reliability:
+  dimensions: {{{", ".join(f"{name}: 0.05" for name in names)}}}
+  poses: [{{travel: 10}}]
+  outputs: [B.x]
+  limits: {{B.x: {0.05 * count**0.5}}}
+  methods: [analytic]
+  allocate: {{cpk: 1.33, grades: true}}
+"""
+    study = mechdesign.load(text=text)
+    found = benchmark.pedantic(lambda: mechdesign.reliability(study), rounds=3, warmup_rounds=1)
+    assert not any("not all choices" in note for note in found.warnings)

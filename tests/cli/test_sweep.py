@@ -57,6 +57,9 @@ def test_the_exit_code_is_the_worst_of_the_cases(study, invoke, values, code):
         (["--vary", f"{R}=1", "--results", "GII,GII"], "--results: matrix.results: 'GII' is listed twice"),
         (["--vary", f"{R}=1", "--cases", "cases.csv"], "--vary and --cases contradict each other"),
         (["--vary", f"{R}=1:2", "--method", "latin_hypercub", "--samples", "4"], "did you mean 'latin_hypercube'?"),
+        (["--vary", f"{R}=1", "--maximize", "kinematics.B.y.max"], "--maximize: matrix.best.maximize.0: the result of"),
+        (["--vary", f"{R}=1", "--minimize", "GII,GII"], "--minimize: matrix.best.minimize: 'GII' is listed twice"),
+        (["--vary", f"{R}=1", "--sort"], "--sort: matrix.best: say what to 'maximize' or 'minimize'"),
         ([], "a sweep needs cases"),
     ],
 )  # fmt: skip
@@ -144,6 +147,48 @@ def test_pictures_and_report(study, invoke):
     assert {path.name for path in (study / "results/press/sweep").iterdir()} == {
         "main_effects.png", "manifest.json", "mechanism.png", "report.html", "report.json", "scatter.png", "sweep.csv",
     }  # fmt: skip
+
+
+def test_the_best_case_is_told_on_the_terminal_and_in_the_report_also_of_what_is_kept(study, invoke):
+    vary = ["--vary", f"{R}=25:40:5", "--vary", "mechanism.parameters.l=90:120:10"]
+    goals = ["--maximize", "kinematics.B.x.range", "--minimize", "kinematics.B.x.max"]
+    for more in ([], ["--resume"]):
+        done = invoke("sweep", "press.yaml", *vary, *goals, "--sort", "--report", *more)
+        assert done.exit_code == 0
+        assert "best of 16 ranked cases is case 13 (r 40, l 90); 4 of them are on the Pareto front" in done.stderr
+        table = rows(done.stdout)
+        assert (table[0]["case"], table[0]["rank"], table[0]["front"]) == ("13", "1", "1")
+        ranks = [int(row["rank"]) for row in table]
+        assert ranks == sorted(ranks)
+    page = (study / "results/press/sweep/report.html").read_text()
+    assert "best case" in page
+    assert "cases on the Pareto front" in page
+    assert (study / "results/press/sweep/response.png").exists()
+
+
+def test_the_best_case_is_told_by_sweep_run_and_merge(study, invoke):
+    best = "best: {maximize: kinematics.B.x.range}"
+    (study / "press.yaml").write_text(STUDY + f"matrix: {{vary: {{{R}: [25, 40, 30]}}, {best}}}\n")
+    told = "press: sweep: best of 3 ranked cases is case 2 (r 40)"
+    asked = ["press.yaml", "--no-plots"]
+    assert told in invoke("sweep", *asked).stderr
+    for more in ([], ["--resume"]):
+        assert told in invoke("run", *asked, *more).stderr
+    for k in (1, 2):
+        assert "best of" not in invoke("run", *asked, "--out", "parts", "--shard", f"{k}/2").stderr
+    for _ in range(2):
+        assert told in invoke("merge", *asked, "--out", "parts").stderr
+
+
+def test_options_are_in_place_of_the_goals_of_the_study(study, invoke):
+    best = "best: {minimize: [kinematics.B.x.max, kinematics.B.x.range], sort: true}"
+    (study / "press.yaml").write_text(STUDY + f"matrix: {{vary: {{{R}: [25, 30, 28]}}, {best}}}\n")
+    table = rows(invoke("sweep", "press.yaml", "--maximize", "kinematics.B.x.max", "--no-plots").stdout)
+    assert [row[R] for row in table] == ["30", "28", "25"]
+    assert "kinematics.B.x.range" not in table[0]
+    table = rows(invoke("sweep", "press.yaml", "--no-plots").stdout)
+    assert [row["rank"] for row in table] == ["1", "2", "3"]
+    assert table[0][R] == "25"
 
 
 def test_words_of_cases_have_letters_beyond_the_first_plane(study, invoke):

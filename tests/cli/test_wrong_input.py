@@ -100,7 +100,7 @@ def test_a_listed_pose_outside_the_limits_is_exit_code_three(folder, invoke) -> 
     ("study", "command", "result", "told"),
     [
         (FOUR_BAR, "kinematics", "kinematics.rocker.angel", "did you mean 'rocker.angle'"),
-        (FOUR_BAR, "kinematics", "kinematics.extremes.rocker.angel.range", "no column 'extremes.rocker.angel.range'"),
+        (FOUR_BAR, "kinematics", "kinematics.extremes.rocker.angel.range", "did you mean 'rocker.angle'"),
         (ARM, "reliability", "reliability.moments.sgma", "no column 'moments.sgma'"),
         (ARM, "reliability", "reliability.reliabilty", "did you mean 'reliability'"),
         (ARM, "optimize", "optimize.scroe", "did you mean 'score'"),

@@ -18,7 +18,7 @@ from helpers.studies import study_of
 from helpers.tables import unsaid
 
 import mechdesign
-from mechdesign.errors import MechdesignError
+from mechdesign.errors import AssemblyError, MechdesignError
 from mechdesign.reference import entries, tables
 from mechdesign.reference.messages import find_messages, groups, messages, unread
 from mechdesign.results import Result
@@ -75,13 +75,21 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
                      "optimize.variables.a={from: 0.25, to: 0.27}")  # fmt: skip
     held = study_of(FIVE_BAR, "optimize.subject_to=[{contains: {circle: 0.001, center: free}}]")
     ranged = study_of(ARM)
-    cases = study_of(FOUR_BAR, "matrix={vary: {mechanism.links.rod.length: [85, 90]}, results: [kinematics.B.x.max]}",
+    cases = study_of(FOUR_BAR, "matrix.vary={mechanism.links.rod.length: [85, 90]}",
+                     "matrix.best={maximize: kinematics.B.x.max}",
                      "requirements=[{result: kinematics.extremes.B.x.range, at_least: 1}]")  # fmt: skip
     slopes = study_of(
         FOUR_BAR,
         "kinematics={poses: [{crank: 30}], outputs: [B]}",
         "sensitivities={results: [kinematics.B.x], parameters: [mechanism.links.rod.length]}",
     )
+    graded = study_of(
+        FOUR_BAR,
+        "reliability={poses: [{crank: 30}], dimensions: {rod.length: 0.1}, limits: {B.x: 0.1}, samples: 100, "
+        "allocate: {cpk: 1, grades: true}}",
+    )
+    hopeless = study_of(FIVE_BAR, "optimize={method: search, evaluations: 20, variables: {a: {from: 0.25, to: 0.27}}, "
+                        "minimize: a, subject_to: [{result: a, at_least: 1}]}")  # fmt: skip
     stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
     return (
         ("pieces", mechdesign.workspace(bar), bar),
@@ -95,8 +103,18 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         ("cases", mechdesign.sweep(cases), cases),
         ("slopes", mechdesign.sensitivities(slopes), slopes),
         ("range", mechdesign.workspace(ranged), ranged),
+        ("graded", mechdesign.reliability(graded), graded),
         ("eigen", mechdesign.stiffness(stiff), stiff),
+        ("nearest", without_feasible(hopeless), hopeless),
     )
+
+
+def without_feasible(study: Any) -> Result:
+    """What a search tells that finds no feasible design."""
+    with pytest.raises(AssemblyError) as caught:
+        mechdesign.optimize(study)
+    assert caught.value.result is not None
+    return caught.value.result
 
 
 def manifest(result: Result, study: Any) -> dict[str, Any]:

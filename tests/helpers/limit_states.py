@@ -104,10 +104,11 @@ def ends(beta: float) -> Case:
 def measured(count: int, limit: float) -> Case:
     """The sum of dimensions measured at 100 parts, two of them outliers by 0.1, beyond a limit, by convolution."""
     rng, step = np.random.default_rng(0), 1e-4
-    laws = [Measured.of(np.r_[rng.normal(0, 0.002, 98), rng.normal(0.1, 0.002, 2)], 0.0) for _ in range(count)]
+    laws = [Measured.of(np.r_[rng.normal(0, 0.002, 98), rng.normal(0.1, 0.002, 2)], 0.0, 0.0) for _ in range(count)]
     grid = step * np.arange(-2000, 2000)
     # Each law in a cell about every node; sums of cells are as far off as half of them on the average.
-    shares = [np.diff(np.interp(grid - 0.5 * step, law.ordered, (np.arange(100) + 0.5) / 100, 0, 1)) for law in laws]
+    below, ranks = grid - 0.5 * step, (np.arange(100) + 0.5) / 100
+    shares = [np.diff(np.interp(below, law.low + law.ordered, ranks, 0, 1)) for law in laws]
     total = reduce(np.convolve, shares)
     exact = float(total[step * np.arange(len(total)) + count * grid[0] > limit].sum())
     return Case(count, lambda u: (limit - sum(law.at(row) for law, row in zip(laws, u, strict=True)))[None], exact)

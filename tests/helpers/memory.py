@@ -17,9 +17,9 @@ sys.exit(code)
 """
 
 
-def peak_of(command: Sequence[str]) -> int:
-    """Bytes that a command used at most; it must succeed."""
+def peak_of(command: Sequence[str], timeout: float = 120) -> int:
+    """Bytes that one process of a command used at most; it must succeed, within so many seconds."""
     done = subprocess.run(
-        [sys.executable, "-S", "-c", _BETWEEN, *command], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-S", "-c", _BETWEEN, *command], capture_output=True, text=True, check=True, timeout=timeout
     )
     return int(done.stdout) * (1 if sys.platform == "darwin" else 1024)

@@ -68,6 +68,18 @@ def _rms(errors: Floats) -> Floats:
     return np.asarray(np.sqrt((errors**2).mean(axis=1)))
 
 
+# Of a motion the root mean square is that of the whole way, by a Gauss rule.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+
+def _of_motion(errors: Callable[[Floats], tuple[Floats, Floats]], crank: Floats, *, rms: bool) -> Floats:
+    """The root mean square of errors over the way of a crank, or the largest at its poses; `OPEN` where some miss."""
+    at_poses, missed = errors(crank)
+    between, missed_between = errors((crank[-1] + crank[0] + (crank[-1] - crank[0]) * NODES) / 2)
+    values = np.sqrt(between**2 @ WEIGHTS / 2) if rms else np.abs(at_poses).max(axis=1)
+    return _judged(values, missed + missed_between)
+
+
 FOUR_BAR = """\
 units: {{length: mm, angle: deg}}
 mechanism:
@@ -112,9 +124,11 @@ def held_height(goal: str, begin: float, end: float, step: float) -> Problem:
     crank = np.arange(begin, end + step / 2, step)
 
     def cost(a: Floats, b: Floats, c: Floats, u: Floats, v: Floats) -> Floats:
-        point, _, missed = four_bar(a, b, c, u, v, crank, 100, 1)
-        errors = point.imag - 100
-        return _judged(_rms(errors) if goal.endswith("rms") else np.abs(errors).max(axis=1), missed)
+        def errors(angles: Floats) -> tuple[Floats, Floats]:
+            point, _, missed = four_bar(a, b, c, u, v, angles, 100, 1)
+            return point.imag - 100, missed
+
+        return _of_motion(errors, crank, rms=goal.endswith("rms"))
 
     return Problem(four_bar_study(ranges, "C.y: 100", goal, (begin, end, step)), goal, ranges, cost)
 
@@ -125,10 +139,11 @@ def function_generator(ranges: Mapping[str, tuple[float, float]], formula: str, 
     crank = np.arange(20.0, 111.0, 5.0)
 
     def cost(a: Floats, b: Floats, c: Floats, first: Floats) -> Floats:
-        _, angle, missed = four_bar(a, b, c, 0, 0, crank, 100, 1)
-        errors = np.degrees(angle) - first[:, None] - wanted(crank)
-        errors = (errors + 180) % 360 - 180
-        return _judged(_rms(errors) if goal.endswith("rms") else np.abs(errors).max(axis=1), missed)
+        def errors(angles: Floats) -> tuple[Floats, Floats]:
+            _, angle, missed = four_bar(a, b, c, 0, 0, angles, 100, 1)
+            return (np.degrees(angle) - first[:, None] - wanted(angles) + 180) % 360 - 180, missed
+
+        return _of_motion(errors, crank, rms=goal.endswith("rms"))
 
     study = four_bar_study(ranges, f'rocker.angle: "first + {formula}"', goal, (20, 110, 5), u="0", v="0")
     return Problem(study, goal, ranges, cost)

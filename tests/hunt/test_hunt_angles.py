@@ -15,10 +15,12 @@ import pytest
 from helpers.studies import study_of
 
 from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.optimize.stacked import poses_of, tables
+from mechdesign.analyses.optimize.stacked import tables
+from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.reliability.analysis import reliability
 from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.errors import AssemblyError
+from mechdesign.study.designs import Designs
 
 Floats = np.ndarray
 Seeds = Callable[[int], Iterator[int]]
@@ -137,7 +139,8 @@ def test_sums_of_angles_along_a_motion(seeds: Seeds, step: int) -> None:
             swing = expected - weights[0] * np.linspace(low, high, len(fine))
             assert extremes["swing"] == pytest.approx(np.ptp(swing), abs=1e-3), (seed, linkage)
         # Many designs at once have the motions of each.
-        poses = poses_of(study, "kinematics")(3, {"rod.length": linkage.rod * np.array([1, 1.01, 1])}, {})
+        designs = Designs(study, {"rod.length": linkage.rod * np.array([1, 1.01, 1])})
+        poses = study_poses(study, "kinematics", designs.numbers)
         several = tables(study, "kinematics", ["motion"], poses)
         again = several.result.tables["motion"]["sum"].reshape(3, -1)
         assert again[[0, 2]] == pytest.approx(np.stack([motion["sum"]] * 2), abs=1e-9)

@@ -88,7 +88,7 @@ def test_serial_legs_and_forces_against_frames(seeds: Seeds) -> None:
         asked = ask(study)
         assert asked.legs is not None
         serial, _ = hold(asked, configuration)
-        other = load(twists_of(asked.network, asked.section, configuration, asked.length), 3).held
+        other = load(twists_of(asked.network, asked.section, configuration, asked.length(configuration)), 3).held
         expected = Structure(study, configuration).compliance()
         if other.margin > 1e-3:
             assert same(serial.compliance[0], expected), seed

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from helpers.designs import assert_as_alone
 from helpers.frames import Structure
 from helpers.layouts import DUMPER, GROUND
 from helpers.platforms import platform
@@ -18,11 +20,12 @@ from hypothesis import strategies as st
 
 import mechdesign
 from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import ask, hold
+from mechdesign.analyses.stiffness.analysis import answers, ask, hold, stiffness
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.study import Study
+from mechdesign.study.designs import Designs
 
 # What is rigid, but for rounding: whatever gives has a compliance of 1e-6 or more.
 NOTHING = 1e-15
@@ -226,7 +229,7 @@ def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(see
     asked = ask(study)
     assert asked.legs is not None
     serial, _ = hold(asked, configuration)
-    twists = twists_of(asked.network, asked.section, configuration, asked.length)
+    twists = twists_of(asked.network, asked.section, configuration, asked.length(configuration))
     other = load(twists, 3).held
     assume(other.margin > 1e-2)
     assert serial.rank == other.rank == 3
@@ -235,3 +238,39 @@ def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(see
     assert np.isnan(serial.stiffness).all() == np.isnan(other.stiffness).all()
     if np.isfinite(serial.stiffness).all():
         agree(other.stiffness[0], serial.stiffness[0], 1e-6)
+
+
+@settings(max_examples=25)
+@given(sprung(), st.integers(0, 2**32 - 1))
+def test_many_designs_at_once_are_those_one_by_one(case: Sprung, seed: int) -> None:
+    """Every number of the section is a parameter of its own, and lengths of links differ, too.
+
+    But for the condition of the mechanism drawn, which magnifies the last digit of a number. Not the eigen-stiffnesses:
+    twists of two that are alike, such as rigid ones, are any in their plane.
+    """
+    data = yaml.safe_load(case.text(loads=[[30.0, -20.0, 8.0 if case.link else 0.0]], direction=25.0))
+    section, rng = data["stiffness"], np.random.default_rng(seed)
+    parameters: dict[str, float] = {}
+
+    def named(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: named(value) for key, value in part.items()}
+        if isinstance(part, list):
+            return [named(value) for value in part]
+        if isinstance(part, bool) or not isinstance(part, int | float):
+            return part
+        name = f"n{len(parameters)}"
+        parameters[name] = part
+        return name
+
+    for key in ("sections", "actuators", "bearings", "loads", "direction"):
+        section[key] = named(section[key])
+    data["mechanism"]["parameters"] = {**data["mechanism"].get("parameters", {}), **parameters}
+    study = study_of(yaml.dump(data))
+    values = {name: value * rng.uniform(0.9, 1.1, 4) for name, value in parameters.items()}
+    lengths = [name for name in study.mechanism.nominal if name.endswith(".length")]
+    values |= {name: study.mechanism.nominal[name] * rng.uniform(0.99, 1.01, 4) for name in lengths}
+    designs = Designs(study, values)
+    # What is measured from the sketch is read anew.
+    assume(designs.alike)
+    assert_as_alone(designs, answers, stiffness, 1e-9, rounding=1e-13)

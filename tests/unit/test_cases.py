@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import pickle
 
+import numpy as np
 import pytest
 from helpers.studies import IN_LINE
 
 import mechdesign
 from mechdesign.errors import StudyError
-from mechdesign.experiments.cases import Answered, Case, Wanted, answers, foresee, variant
+from mechdesign.experiments.cases import Case, answers, foresee, variant
+from mechdesign.experiments.tally import Tally
+from mechdesign.experiments.wanted import Wanted
 
 SLIDER_CRANK = (
     IN_LINE
@@ -32,29 +35,52 @@ STROKE = Wanted("kinematics.extremes.B.x.range")
 SWING = Wanted("kinematics.rod.angle.max")
 
 
-def asked(text: str, cases: list[dict[str, object]], *wanted: Wanted, jobs: int = 1) -> list[Answered]:
-    study = mechdesign.load(text=text)
-    return list(answers(study, map(Case.of, cases), wanted, jobs=jobs))
+def asked(text: str, cases: list[dict[str, object]], *wanted: Wanted, jobs: int = 1) -> Tally:
+    study, given = mechdesign.load(text=text), [*map(Case.of, cases)]
+    tally = Tally(given, len(wanted), len(study.requirements))
+    for answered in answers(study, given, wanted, jobs=jobs):
+        tally.add(answered)
+    return tally
 
 
 def test_stroke_and_swing_of_slider_cranks():
-    radii = (20.0, 30.0, 35.0, 45.0)
-    found = asked(SLIDER_CRANK, [{"mechanism.parameters.r": r} for r in radii], STROKE, SWING)
-    for r, each in zip(radii, found, strict=True):
-        (stroke, unit), (swing, _) = each.numbers
-        assert (stroke, unit) == (pytest.approx(2 * r), "mm")
-        assert swing == pytest.approx(math.degrees(math.asin(r / 100)))
-        long, steep = each.verdicts
-        assert (long.met, long.worst, long.margin) == (2 * r >= 70, stroke, pytest.approx(2 * r - 70))
-        assert (steep.met, steep.worst) == (swing <= 25, pytest.approx(swing))
-        assert steep.place in ("crank 90", "crank 270")
-        assert each.exit_code == int(not (long.met and steep.met))
-        assert not each.failed
+    radii = np.array([20.0, 30.0, 35.0, 45.0])
+    found = asked(SLIDER_CRANK, [{"mechanism.parameters.r": r} for r in radii.tolist()], STROKE, SWING)
+    (stroke, unit), (swing, _) = found.result(0), found.result(1)
+    np.testing.assert_allclose(stroke, 2 * radii, rtol=1e-9)
+    np.testing.assert_allclose(swing, np.degrees(np.arcsin(radii / 100)), rtol=1e-9)
+    assert unit == "mm"
+    long, steep = found.required(0), found.required(1)
+    assert long[0].tolist() == stroke.tolist()
+    assert long[1].tolist() == (2 * radii >= 70).tolist()
+    np.testing.assert_allclose(steep[0], swing, rtol=1e-9)
+    assert steep[1].tolist() == (swing <= 25).tolist()
+    assert found.table[:, 0].tolist() == (1 - long[1] * steep[1]).tolist()
+    assert not found.failed
+    short, broad = found.verdicts
+    assert (short.worst, short.margin) == (pytest.approx(40), pytest.approx(-30))
+    assert short.place.startswith("case 1 (r 20)")
+    assert "case 4 (r 45), crank 90" in broad.place or "case 4 (r 45), crank 270" in broad.place
+
+
+def test_numbers_and_limits_that_follow_are_those_of_each_case_alone():
+    text = SLIDER_CRANK.replace("at_least: 70", "at_least: 2*r - 5").replace("at_most: 25", "at_least: 3, at_most: r")
+    cases: list[dict[str, object]] = [{"mechanism.parameters.r": 20 + 0.5 * k} for k in range(20)]
+    found = asked(text, cases, STROKE, SWING)
+    for k, case in enumerate(cases):
+        study = mechdesign.load(text=text, overrides=case)
+        verdicts = mechdesign.requirements(study, mechdesign.kinematics(study))
+        for j, verdict in enumerate(verdicts):
+            worst, met, unit = (part[k] if isinstance(part, np.ndarray) else part for part in found.required(j))
+            assert (worst, bool(met), unit) == (pytest.approx(verdict.worst, rel=1e-12), verdict.met, verdict.unit)
+    assert [each.margin for each in found.verdicts] == [pytest.approx(5), pytest.approx(-3)]
 
 
 def test_cases_come_in_their_order_whatever_the_workers():
     cases: list[dict[str, object]] = [{"mechanism.parameters.l": 100 + k} for k in range(7)]
-    assert asked(SLIDER_CRANK, cases, STROKE, jobs=2) == asked(SLIDER_CRANK, cases, STROKE)
+    one, two = (asked(SLIDER_CRANK, cases, STROKE, jobs=jobs) for jobs in (1, 2))
+    assert one.table.tobytes() == two.table.tobytes()
+    assert one.verdicts == two.verdicts
 
 
 def test_a_case_that_fails_is_answered_with_its_reason():
@@ -62,23 +88,24 @@ def test_a_case_that_fails_is_answered_with_its_reason():
         {"mechanism.parameters.r": -1}, {"mechanism.parameters.rr": 1}, {"kinematics.poses": [{"B.x": 200}],
         "kinematics.sweep": None}, {},
     ]  # fmt: skip
-    negative, misspelt, unreached, good = asked(SLIDER_CRANK, cases, STROKE)
-    assert (negative.exit_code, negative.failed) == (3, "mechanism.links.crank.2: must be positive, not -1")
-    assert misspelt.exit_code == 3
-    assert "did you mean 'r'?" in misspelt.failed
-    assert unreached.exit_code == 3
-    assert "cannot be assembled" in unreached.failed
-    for each in (negative, misspelt, unreached):
-        assert math.isnan(each.numbers[0].value)
-        assert [verdict.met for verdict in each.verdicts] == [False, False]
-    assert (good.exit_code, good.failed) == (1, "")
+    found = asked(SLIDER_CRANK, cases, STROKE)
+    assert found.table[:, 0].tolist() == [3, 3, 3, 1]
+    assert found.reason(0) == "mechanism.links.crank.2: must be positive, not -1"
+    assert "did you mean 'r'?" in found.reason(1)
+    assert "cannot be assembled" in found.reason(2)
+    assert found.reason(3) == ""
+    assert np.isnan(found.result(0)[0]).tolist() == [True, True, True, False]
+    for k in (0, 1):
+        assert not found.required(k)[1][:3].any()
+        assert math.isnan(found.verdicts[k].worst)
+        assert found.verdicts[k].place.startswith("case 1 (r -1)")
 
 
 def test_the_assembly_stays_that_of_the_sketch_unless_that_is_changed():
     # With the crank this much shorter the sketched B would be nearer to the other side.
     height = Wanted("kinematics.B.y")
     moved = {"mechanism.links.ground.D": [100, 90]}
-    kept, mirrored = asked(FOUR_BAR, [moved, moved | {"mechanism.sketch.B": [75, -55]}], height)
+    kept, mirrored = asked(FOUR_BAR, [moved, moved | {"mechanism.sketch.B": [75, -55]}], height).result(0)[0]
 
     def height_of(side: int) -> float:
         a, d = 30j, 100 + 90j
@@ -86,8 +113,8 @@ def test_the_assembly_stays_that_of_the_sketch_unless_that_is_changed():
         along = (90**2 - 60**2 + abs(line) ** 2) / (2 * abs(line))
         return (a + line / abs(line) * complex(along, side * math.sqrt(90**2 - along**2))).imag
 
-    assert kept.numbers[0].value == pytest.approx(height_of(1))
-    assert mirrored.numbers[0].value == pytest.approx(height_of(-1))
+    assert kept == pytest.approx(height_of(1))
+    assert mirrored == pytest.approx(height_of(-1))
 
 
 def test_another_mechanism_is_assembled_anew():
@@ -110,5 +137,9 @@ def test_what_no_result_has_is_found_before_anything_is_computed():
 def test_a_case_and_its_answer_can_be_pickled():
     case = Case.of({"mechanism.parameters.r": 30, "kinematics.outputs": ["B.x"]})
     assert pickle.loads(pickle.dumps(case)) == case
-    (answer,) = asked(SLIDER_CRANK, [{}], STROKE)
-    assert pickle.loads(pickle.dumps(answer)) == answer
+    (answer,) = answers(mechdesign.load(text=SLIDER_CRANK), [Case(())], [STROKE])
+    again = pickle.loads(pickle.dumps(answer))
+    assert again.table.tobytes() == answer.table.tobytes()
+    assert (again.reasons, again.units, again.warned, again.worst) == (
+        answer.reasons, answer.units, answer.warned, answer.worst
+    )  # fmt: skip

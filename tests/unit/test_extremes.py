@@ -12,8 +12,10 @@ from scipy.optimize import minimize_scalar
 import mechdesign
 from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.analyses.optimize import stacked
+from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
 from mechdesign.results import Table
+from mechdesign.study.designs import Designs
 
 GALLERY = Path(__file__).parents[2] / "configs" / "gallery"
 SLIDER = """\
@@ -156,8 +158,9 @@ def test_designs_that_reach_a_limit_are_answered_with_the_others() -> None:
     text = ROCKER.replace("A: [60, 0], B: [94, 50]", "A: [52, 30], B: [100, 50]")
     text += "kinematics: {sweep: {crank: {from: 0, to: 60, step: 10}}, outputs: [B.x]}\n"
     lengths = (70, 95)
-    poses = stacked.poses_of(study_of(text), "kinematics")(2, {"rod.length": np.array(lengths)}, {})
-    stack = stacked.tables(study_of(text), "kinematics", ["extremes", "loops"], poses)
+    study = study_of(text)
+    poses = study_poses(study, "kinematics", Designs(study, {"rod.length": np.array(lengths, dtype=float)}).numbers)
+    stack = stacked.tables(study, "kinematics", ["extremes", "loops"], poses)
     assert stack.whole.tolist() == [True, False]
     for k, length in enumerate(lengths):
         row = extremes(text, f"mechanism.links.rod.2={length}")["B.x"]

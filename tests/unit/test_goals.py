@@ -14,8 +14,8 @@ from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import Goal, goal, goals_of, unit_of
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
+from mechdesign.study.designs import variant
 from mechdesign.study.schema.optimize import Condition
-from mechdesign.study.variants import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 Designs = Mapping[str, np.ndarray]
@@ -248,7 +248,7 @@ def test_stiffness_as_an_index_of_the_workspace() -> None:
 def test_numbers_of_the_section_that_depend_on_a_variable() -> None:
     study = varied("gallery/function_generator.yaml", ["crank_turn"])
     designs = {"crank_turn": np.array([50.0, 60.0, 66.0])}
-    agree(study, [goal("kinematics.targets.rms", smallest=True)], designs, together=False)
+    agree(study, [goal("kinematics.targets.rms", smallest=True)], designs)
 
 
 TELESCOPE = """
@@ -367,15 +367,31 @@ def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None
 
 
 def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mechdesign.analyses.optimize import evaluation
+    from mechdesign.analyses import poses
 
     study = varied("gallery/four_bar.yaml", ["crank.length", "coupler.C.x"])
     goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
     designs = around(study, ["crank.length", "coupler.C.x"], 9, 0.1)
     whole = Evaluator(study, goals)(designs)
-    monkeypatch.setattr(evaluation, "POSES_AT_ONCE", 150)
+    monkeypatch.setattr(poses, "POSES_AT_ONCE", 150)
     parts = Evaluator(study, goals)(designs)
     assert parts.table.tobytes() == whole.table.tobytes()
+
+
+def test_a_whole_number_that_a_variable_decides() -> None:
+    """The number of poses follows a variable: designs of one number are evaluated together."""
+    study = study_of("""
+mechanism:
+  parameters: {n: 5, r: 40}
+  links: {ground: {O: [0, 0]}, arm: [O, P, r]}
+  drives: [arm]
+kinematics: {sweep: {arm: {from: 0, to: 80, number: n}}, outputs: [P]}
+optimize: {method: search, variables: {n: {from: 2, to: 9}, r: {from: 1, to: 9}}, minimize: kinematics.motion.P.x}
+""")
+    designs = {"n": np.array([3.0, 5.0, 3.0, 2.5]), "r": np.array([10.0, 20.0, 30.0, 40.0])}
+    found = Evaluator(study, [goal("kinematics.P.x")], graded=True)(designs)
+    np.testing.assert_allclose(found.table[:3, 0], np.array([10, 20, 30]) * np.cos(np.radians(80)))
+    assert found.reasons == ["", "", "", "kinematics.sweep.arm.number: expected a whole number, not ..."]
 
 
 def test_conditions_with_rows() -> None:

@@ -15,7 +15,7 @@ ORDER = (
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
     ("mechdesign.study.building",),
-    ("mechdesign.study.schema", "mechdesign.study.poses"),
+    ("mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths"),
     ("mechdesign.study",),
     ("mechdesign.curve",),
     ("mechdesign.analyses", "mechdesign.analyses.region"),

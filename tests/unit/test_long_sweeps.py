@@ -14,7 +14,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses import poses
-from mechdesign.analyses.kinematics import analysis, passage
+from mechdesign.analyses.kinematics import passage, remarks
 from mechdesign.errors import OutputError
 from mechdesign.report.requirements import requirements
 from mechdesign.report.tables import csv_blocks
@@ -72,7 +72,7 @@ def texts(result: Result) -> dict[str, str]:
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (poses, passage, analysis):
+    for module in (poses, passage, remarks):
         monkeypatch.setattr(module, "POSES_AT_ONCE", 50)
 
 

@@ -13,7 +13,7 @@ from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.study.variants import variant
+from mechdesign.study.designs import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 COARSE = ("optimize.variables.l_min.step=0.5", "optimize.variables.l_a.step=0.5")
@@ -55,7 +55,7 @@ def compare(values: list[float], *, smallest: bool = False, feasible: int | None
     study = mechdesign.load(CONFIGS / "two_link_arm.yaml")
     return Designs(
         study, {"r1": np.arange(count) + 1.0}, (one,), (), {one: np.array(values)}, {}, codes, ["", "lost"],
-        np.ones((1, 1)), {},
+        np.full(count, np.nan), np.ones((1, 1)), {},
     )  # fmt: skip
 
 

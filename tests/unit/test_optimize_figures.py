@@ -11,16 +11,17 @@ import mechdesign
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.report.figures import style
+from mechdesign.report.figures.front import front_figure
 from mechdesign.report.figures.optimize import (
     ENVELOPE_STEPS,
     MAX_LINES,
     convergence,
     figures,
-    front_figure,
     parallel_axes,
     score_curves,
 )
 from mechdesign.results import Column, Table
+from mechdesign.study import Study
 
 ARM = """
 mechanism:
@@ -79,13 +80,22 @@ def test_a_single_goal_is_shown_in_its_own_unit() -> None:
     assert line[:, 1] == pytest.approx(result.tables["designs"]["kinematics.P.x"])
 
 
+RANGES = "{a: {from: 0, to: 1}, b: {from: 0, to: 1}, c: {from: 0, to: 1}}"
+
+
+def designed() -> Study:
+    return study_of(ARM, f"optimize={{method: search, variables: {RANGES}, maximize: kinematics.P.x}}")
+
+
 def many(count: int = 500) -> Designs:
     x, y, z = np.random.default_rng(0).random((3, count))
     goals = Goal("cost", "", "", smallest=True), Goal("mass", "", "", smallest=True)
     values = dict(zip(goals, (x + y, 1 - x + z), strict=True))
     codes = (np.arange(count) == 3).astype(np.int32)
-    variables, weights = {"x": x, "y": y, "z": z}, np.array([[1.0, 0.0]])
-    return Designs(study_of(ARM), variables, goals, (), values, {}, codes, ["", "wrong"], weights, {})
+    variables, weights = {"a": x, "b": y, "c": z}, np.array([[1.0, 0.0]])
+    return Designs(
+        designed(), variables, goals, (), values, {}, codes, ["", "wrong"], np.full(len(codes), np.nan), weights, {}
+    )
 
 
 def test_parallel_axes_of_many_designs_show_some_and_always_the_best() -> None:
@@ -110,14 +120,14 @@ def test_convergence_never_falls_and_ends_at_the_best() -> None:
 
 def test_the_front_is_drawn_with_its_knee() -> None:
     designs = many()
-    front = table(x=[0.1, 0.2, 0.3], y=[0.1, 0.1, 0.1], z=[0.5, 0.5, 0.5], cost=[0.2, 0.3, 0.4], mass=[1.4, 0.9, 0.8],
+    front = table(a=[0.1, 0.2, 0.3], b=[0.1, 0.1, 0.1], c=[0.5, 0.5, 0.5], cost=[0.2, 0.3, 0.4], mass=[1.4, 0.9, 0.8],
                   knee=[False, True, False])  # fmt: skip
     with style.context():
         axes = front_figure(designs, front).axes[0]
     labels = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
-    assert labels["A: best cost, x = 0.1, y = 0.1, z = 0.5"] == [[0.2, 1.4]]
-    assert labels["knee, x = 0.2, y = 0.1, z = 0.5"] == [[0.3, 0.9]]
-    assert labels["B: best mass, x = 0.3, y = 0.1, z = 0.5"] == [[0.4, 0.8]]
+    assert labels["A: best cost, a = 0.1, b = 0.1, c = 0.5"] == [[0.2, 1.4]]
+    assert labels["knee, a = 0.2, b = 0.1, c = 0.5"] == [[0.3, 0.9]]
+    assert labels["B: best mass, a = 0.3, b = 0.1, c = 0.5"] == [[0.4, 0.8]]
     assert "less is better" in axes.get_xlabel()
 
 
@@ -145,8 +155,8 @@ def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
     x, y = np.random.default_rng(0).random((2, 2000))
     cost = Goal("cost", "", "", smallest=True)
     values = {cost: 1 + (x - 0.5) ** 2 + y}
-    designs = Designs(study_of(ARM), {"x": x, "y": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
-                      np.ones((1, 1)), {})  # fmt: skip
+    designs = Designs(designed(), {"a": x, "b": y}, (cost,), (), values, {}, np.zeros(2000, dtype=np.int32), [""],
+                      np.full(2000, np.nan), np.ones((1, 1)), {})  # fmt: skip
     with style.context():
         figure = score_curves(designs)
     dots, envelope = figure.axes[0].lines[:2]

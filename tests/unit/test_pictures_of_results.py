@@ -9,6 +9,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses import poses
+from mechdesign.analyses.kinematics.special_poses import MOST
 from mechdesign.mechanism.plan import Plan
 from mechdesign.report import writer
 from mechdesign.report.manifest import Extras
@@ -40,8 +41,13 @@ def test_nothing_is_solved_for_a_picture(command, study, options, expected, monk
     given = study_of(study)
     result = getattr(mechdesign, command)(given, **options)
 
-    def refuse(*_arguments, **_options):
-        raise AssertionError("solved a second time")
+    solve = Plan.solve
+
+    def refuse(plan, given, *arguments, **options):
+        # The few poses of its limits and toggles are those of the picture alone.
+        if np.size(given[0]) > MOST:
+            raise AssertionError("solved a second time")
+        return solve(plan, given, *arguments, **options)
 
     monkeypatch.setattr(Plan, "solve", refuse)
     drawn, failed = writer.pictures(given, result, Extras())

@@ -10,6 +10,7 @@ from mechdesign.analyses.reliability.engine.problem import Estimate, binomial
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.probability import (
     disc_failure,
+    disc_failures,
     failure_probability,
 )
 from mechdesign.analyses.reliability.question import Band, Disc
@@ -166,3 +167,21 @@ def test_a_circle_beside_a_limit_that_counts_as_well() -> None:
     p, q = disc_failure(np.eye(2), 6.0), 2 * ndtr(-5.5)
     found = failure_probability(np.eye(3), (Band(2, -5.5, 5.5),), (Disc(0, 1, 6.0),))
     assert found == pytest.approx(p + q, rel=0.02)
+
+
+def test_circles_of_many_poses_are_those_one_by_one() -> None:
+    """Ovals from round to a line, radii from a tenth of a deviation to twelve, means at the centre and far outside."""
+    rng = np.random.default_rng(4)
+    count = 300
+    turned = np.array([[[np.cos(t), -np.sin(t)], [np.sin(t), np.cos(t)]] for t in rng.uniform(0, 7, count)])
+    squares = np.stack([np.ones(count), 10.0 ** rng.uniform(-8, 0, count)], axis=1)
+    covariance = turned @ (squares[:, :, None] * turned.swapaxes(1, 2))
+    radius, mean = (
+        10.0 ** rng.uniform(-1, 1.1, count),
+        rng.normal(size=(count, 2)) * 10.0 ** rng.uniform(-3, 1, (count, 1)),
+    )
+    alone = [disc_failure(c, r, m) for c, r, m in zip(covariance, radius.tolist(), mean, strict=True)]
+    assert disc_failures(covariance, radius, mean) == pytest.approx(np.array(alone), rel=1e-11)
+    # Of independent errors alike the distance has Rayleigh's law.
+    round_ones = disc_failures(np.tile(np.eye(2), (3, 1, 1)), np.array([1.0, 3.0, 9.0]), np.zeros((3, 2)))
+    assert round_ones == pytest.approx(np.exp([-0.5, -4.5, -40.5]), rel=1e-13)

@@ -11,7 +11,6 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.mechanism.derivatives import conditionings
 from mechdesign.mechanism.margins import closures
 from mechdesign.results import Result
 
@@ -143,7 +142,7 @@ def test_slopes_of_the_margins_are_their_differences(text: str) -> None:
         found = closures(linear, places)[0]
         for index, group in enumerate(linear.structure.groups):
             if group.form == "newton":
-                found[-1] = conditionings(linear)[index] ** 2
+                found[-1] = linear.conditionings[index] ** 2
         return found
 
     found, slopes = closures(mechanism.linearize(configuration), places)

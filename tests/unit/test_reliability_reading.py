@@ -42,7 +42,7 @@ def test_an_output_at_a_pin_with_clearance_is_of_a_link_that_is_said() -> None:
     assert on == {"crank"}
     assert any(text.startswith("A.x, A.y: A has a clearance and is that of crank, not of rod") for text in told)
     study = study_of(SLIDER_CRANK)
-    words = in_words(study.reliability, study.mechanism.graph)
+    words = in_words(study.reliability, study.mechanism.graph, study.sizes)
     assert words == ["clearance: the pin A moves in rod; A.x and A.y are those of crank"]
 
 

@@ -83,7 +83,7 @@ def test_a_beta_law_is_that_of_scipy() -> None:
 
 def test_measured_values_have_their_mean_and_deviation_and_interpolated_quantiles() -> None:
     values = np.random.default_rng(3).gamma(2.0, 0.1, 25)
-    law = Measured.of(values, 10.0)
+    law = Measured.of(values, 0.0, 10.0)
     mean, *central = law.moments
     assert (mean, central[0]) == pytest.approx((values.mean(), values.var(ddof=1)), rel=1e-12)
     # Quantiles are straight between the shares of the values, whose middle rule is exact to the cell's square.
@@ -189,10 +189,14 @@ def test_correlations_that_no_laws_have() -> None:
         Correlation.of([Lognormal(-6, 6, 1), Lognormal(-6, 6, 1)], {(0, 1): -0.9})
 
 
+def two_values(low: int, high: int) -> Measured:
+    return Measured.of(np.array([0.0] * low + [1.0] * high), 0.0, 0.0)
+
+
 def with_outliers(seed: int, count: int) -> Measured:
     """Nineteen parts in twenty near 0, the others near 0.1."""
     rng, many = np.random.default_rng(seed), count - count // 20
-    return Measured.of(np.concatenate([rng.normal(0, 0.002, many), rng.normal(0.1, 0.002, count // 20)]), 0.0)
+    return Measured.of(np.concatenate([rng.normal(0, 0.002, many), rng.normal(0.1, 0.002, count // 20)]), 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -202,7 +206,11 @@ def with_outliers(seed: int, count: int) -> Measured:
         (with_outliers(1, 100), with_outliers(2, 40), -0.02),
         (with_outliers(1, 3000), with_outliers(2, 100), 0.9),
         (with_outliers(1, 100), Uniform(-1.0, 1.0), 0.4),
-        (Measured.of(np.array([0.0] * 40 + [1.0] * 40), 0.0), Measured.of(np.array([0.0] * 70 + [1.0] * 9), 0.0), 0.3),
+        (
+            Measured.of(np.array([0.0] * 40 + [1.0] * 40), 0.0, 0.0),
+            Measured.of(np.array([0.0] * 70 + [1.0] * 9), 0.0, 0.0),
+            0.3,
+        ),
         (Triangular(0.0, 1.0), with_outliers(2, 100), -0.25),
     ],
 )
@@ -222,6 +230,6 @@ def test_measured_samples_with_outliers_are_drawn_with_the_correlation_asked(
 
 def test_what_a_measured_sample_cannot_reach_is_refused_with_its_range() -> None:
     """Uniform shares against one jump: at most sqrt(12 p (1 - p)/4) for a jump at the share p."""
-    law = Measured.of(np.array([0.0] * 90 + [1.0] * 10), 0.0)
+    law = two_values(90, 10)
     with pytest.raises(StudyError, match=r"cannot have 0.7, only -0.52.* to 0.52"):
         Correlation.of([law, Uniform(0.0, 1.0)], {(0, 1): 0.7})

@@ -144,7 +144,7 @@ def test_the_force_method_gives_what_serial_legs_give(text: str) -> None:
     asked = ask(study)
     assert asked.legs is not None
     (solved,) = solve_poses(study, study_poses(study, "stiffness"))
-    twists = twists_of(asked.network, asked.section, solved.configuration, asked.length)
+    twists = twists_of(asked.network, asked.section, solved.configuration, asked.length(solved.configuration))
     held = load(twists, asked.size).held
     result = ask_stiffness(text)
     for letter, found in (("K", held.stiffness[0]), ("C", held.compliance[0])):

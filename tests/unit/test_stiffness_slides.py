@@ -284,7 +284,7 @@ stiffness:
     asked = ask(study)
     assert asked.legs is not None
     (solved,) = solve_poses(study, study_poses(study, "stiffness"))
-    twists = twists_of(asked.network, asked.section, solved.configuration, asked.length)
+    twists = twists_of(asked.network, asked.section, solved.configuration, asked.length(solved.configuration))
     result = ask_stiffness(text)
     assert result.tables["stiffness"]["method"].tolist() == ["serial legs"]
     expected = matrix(result, "C")

@@ -219,11 +219,6 @@ QUESTIONS = [
         "reliability: {dimensions: {r: 1}, limits: {kinematics.extremes.rocker.angle.range: 1}}",
         "of a swing or a stroke draw the linkage twice, at both ends, and limit a measure between",
     ),
-    (
-        "optimize: {variables: {r: {from: 1, to: 2, step: 1}}, maximize: GII, "
-        "subject_to: [{contains: {circle: 5, center: [0, r]}}]}",
-        "with 'center: free' the shape may lie anywhere",
-    ),
     ("reliability: {dimensions: {r: -1}}", "10:31: reliability.dimensions.r: must be at least 0, not -1"),
     ("reliability: {dimensions: {rod.lenght: 1}}", "did you mean 'rod.length'?"),
     ("reliability: {dimensions: {'*.lenght': 1}}", "no dimension matches '*.lenght'"),

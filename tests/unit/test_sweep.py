@@ -127,7 +127,7 @@ def test_cases_of_a_file(tmp_path: Path):
         ({"vary": {R: "1:2"}}, "a grid needs a step"),
         ({"vary": {R: "2:1:1"}}, "1 is not above 2"),
         ({"vary": {R: "1:2:3:4"}}, "START:STOP:STEP, LOW:HIGH or a list of values, not '1:2:3:4'"),
-        ({"vary": {R: "0:1:1e-4"}}, "a grid of 10,001 cases, and at most 10,000 are answered"),
+        ({"vary": {R: "0:1:1e-8"}}, "a grid of 100,000,001 cases, and at most 10,000,000 are answered"),
         ({"vary": {R: "1:2:1"}, "method": "sobol", "samples": 4}, "sobol takes a range without a step"),
         ({"vary": {R: "1:2"}, "method": "sobol"}, "sobol needs 'samples'"),
         ({"vary": {R: [1]}, "samples": 4}, "'samples' is of latin_hypercube and sobol"),
@@ -172,6 +172,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
             if len(computed) == 2:
                 raise KeyboardInterrupt
 
+    monkeypatch.setattr("mechdesign.experiments.cases.CASES_AT_ONCE", 1)
     monkeypatch.setattr(room, "answers", stopped)
     path = tmp_path / "unfinished.npz"
     with pytest.raises(Interrupted) as interrupt:

@@ -11,9 +11,9 @@ import mechdesign
 from mechdesign.analyses.reliability.laws import fit_law
 from mechdesign.analyses.reliability.sources import find_sources
 from mechdesign.errors import StudyError
+from mechdesign.study.designs import variant
 from mechdesign.study.schema.iso_tolerances import ToleranceClassError, angle_deviations, deviations, fit_deviations
 from mechdesign.study.schema.reliability import in_words
-from mechdesign.study.variants import variant
 
 # Limit deviations in micrometres as handbooks print them [ISO 286-2:2010].
 PUBLISHED = {
@@ -74,6 +74,15 @@ def test_fundamental_deviations_follow_their_formulas():
             assert deviations(f"{letter}5", high)[0] * 1e3 == pytest.approx(formula, rel=0.035, abs=3.5)
 
 
+@pytest.mark.parametrize("name", ["h7", "H11", "js5", "K7", "M6", "n6", "N9", "P7", "zc8", "ISO 2768-c"])
+def test_sizes_at_once_are_those_one_by_one(name):
+    sizes = np.array([3.5, 6.0, 14.5, 30.0, 30.001, 79.0, 260.0, 400.0])
+    low, high = deviations(name, sizes)
+    assert np.stack([low, high], axis=1).tolist() == [list(deviations(name, size)) for size in sizes]
+    with pytest.raises(ToleranceClassError, match="not of 4500 mm"):
+        deviations(name, np.append(sizes, [4500.0, 5000.0]))
+
+
 def test_holes_mirror_shafts():
     for size in (2, 5, 30, 77, 480):
         for letter in ("a", "c", "d", "e", "f", "g", "h"):
@@ -129,13 +138,18 @@ def study(section, units="{}", arm="90"):
     return mechdesign.load(text=text)
 
 
+def ends(given, name):
+    """Lowest and highest deviation of a dimension at its nominal value."""
+    return given.reliability.dimensions[name].ends(given.sizes[name])
+
+
 def test_tolerances_of_dimensions_by_class():
     found = study(
         'dimensions: {"*.length": ISO 2768-m, arm.length: js9, rod.length: {tolerance: h7, distribution: uniform}}'
-    ).reliability.dimensions
-    assert found["arm.length"].ends == pytest.approx((-0.0435, 0.0435))
-    assert found["rod.length"].ends == pytest.approx((-0.03, 0.0))
-    assert found["rocker.length"].ends == pytest.approx((-0.3, 0.3))
+    )
+    assert ends(found, "arm.length") == pytest.approx((-0.0435, 0.0435))
+    assert ends(found, "rod.length") == pytest.approx((-0.03, 0.0))
+    assert ends(found, "rocker.length") == pytest.approx((-0.3, 0.3))
 
 
 def test_a_parameter_has_the_class_of_the_length_that_it_sets():
@@ -144,7 +158,7 @@ def test_a_parameter_has_the_class_of_the_length_that_it_sets():
         "  limits: [{measure: reach, max: 10*r}]"
     )  # fmt: skip
     found = mechdesign.load(text=text + "reliability: {dimensions: {r: js9}}")
-    assert found.reliability.dimensions["r"].ends[1] == pytest.approx(0.0435)
+    assert ends(found, "r")[1] == pytest.approx(0.0435)
     with pytest.raises(StudyError, match="js9 is of a length or an angle of the drawing"):
         mechdesign.load(text=text + "reliability: {dimensions: {k: js9}}")
 
@@ -153,9 +167,9 @@ def test_classes_go_by_millimetres_in_any_unit():
     inches = ARM.replace("100", "4").replace("90", "2").replace("60", "3").replace("80", "3").replace("30, 85", "1, 2")
     text = inches.replace("85, 78", "3.4, 2.9") + "units: {length: in}\n"
     section = "reliability: {dimensions: {arm.length: js9}, clearances: {P: {fit: 20 H7/g6}}}"
-    found = mechdesign.load(text=text + section).reliability
-    assert found.dimensions["arm.length"].ends[1] == pytest.approx(0.037 / 25.4)
-    assert found.clearances["P"].radius == pytest.approx(0.5 * 0.024 / 25.4)
+    found = mechdesign.load(text=text + section)
+    assert ends(found, "arm.length")[1] == pytest.approx(0.037 / 25.4)
+    assert found.reliability.clearances["P"].radius == pytest.approx(0.5 * 0.024 / 25.4)
     with pytest.raises(StudyError, match="this study's lengths are dimensionless"):
         mechdesign.load(text=text.replace("length: in", "length: dimensionless") + section)
 
@@ -170,7 +184,7 @@ def test_an_angle_goes_by_its_shorter_leg():
       sketch: {P: [90, 0]}
     """
     found = mechdesign.load(text=text + f"reliability: {{poses: [{{arm: 70}}], outputs: [T], {section}}}")
-    assert found.reliability.dimensions["plate.angle"].ends == pytest.approx((-0.5, 0.5))
+    assert ends(found, "plate.angle") == pytest.approx((-0.5, 0.5))
     with pytest.raises(StudyError, match="shorter leg; say which"):
         mechdesign.load(text=text + "reliability: {dimensions: {plate.angle: ISO 2768-c}}")
 
@@ -222,21 +236,21 @@ def test_a_fit_of_uniform_sizes_is_a_trapezoid():
 
 def test_a_class_follows_the_size_that_is_changed():
     given = study("dimensions: {arm.length: js9}")
-    assert variant(given, {"arm.length": 50.0}).reliability.dimensions["arm.length"].ends[1] == 0.031
+    assert ends(variant(given, {"arm.length": 50.0}), "arm.length")[1] == 0.031
 
 
 def test_an_allocated_class_keeps_its_middle():
     given = study("dimensions: {arm.length: h9, rod.length: js9}, limits: {Q.y: 0.1}, allocate: {reliability: 0.99}, "
                   "samples: 2000, sobol: 0")  # fmt: skip
     text = mechdesign.reliability(given).files["allocated.yaml"]
-    found = mechdesign.load(text=text).reliability.dimensions
-    assert sum(found["arm.length"].ends) == pytest.approx(-0.087)
-    assert sum(found["rod.length"].ends) == 0.0
+    found = mechdesign.load(text=text)
+    assert sum(ends(found, "arm.length")) == pytest.approx(-0.087)
+    assert sum(ends(found, "rod.length")) == 0.0
 
 
 def test_check_shows_what_classes_and_fits_come_to():
     given = study('dimensions: {"*.length": ISO 2768-m, arm.length: h9}, clearances: {P: {fit: 20 H7/g6}}')
-    lines = in_words(given.reliability, given.mechanism.graph)
+    lines = in_words(given.reliability, given.mechanism.graph, given.sizes)
     assert lines[1:] == [
         "fit: P, 20 H7/g6: radial clearance 0.0035 to 0.0205",
         "tolerance: ISO 2768-m of rod.length, rocker.length: -0.3 to +0.3",

@@ -10,10 +10,10 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.errors import MechanismError, StudyError
+from mechdesign.errors import StudyError
 from mechdesign.mechanism.mechanism import drawn
 from mechdesign.study import Study
-from mechdesign.study.variants import variant
+from mechdesign.study.designs import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 
@@ -226,7 +226,7 @@ kinematics: {poses: [{floor: 0}, {floor: 10}], outputs: [F]}
 def test_a_closed_chain_of_slides_whose_angles_contradict() -> None:
     found = variant(study_of(WEDGE), {"slope": 30.0})
     assert mechdesign.kinematics(found).main["F.y"] == pytest.approx(np.array([30, 20]) * np.tan(np.radians(30)))
-    with pytest.raises(MechanismError, match="contradict"):
+    with pytest.raises(StudyError, match="contradict"):
         variant(study_of(WEDGE), {"incline.direction": 30.0})
 
 

@@ -4,26 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, rates_of_advantage
 from mechdesign.analyses.poses import SolvedPoses
+from mechdesign.curve.ends import End, Ends
 from mechdesign.curve.functions import Functions
-from mechdesign.curve.motion import Curve, End
+from mechdesign.curve.motion import Curve
+from mechdesign.curve.parts import within
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.derivatives import Jacobian, Linearization, conditionings
+from mechdesign.mechanism.coordinates import angles_of
+from mechdesign.mechanism.derivatives import Jacobian, Linearization
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import POSES_ONLY, Column
+from mechdesign.statistics import Asked, Part
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
 FORWARD, INVERSE, _PACE = "forward singularity", "inverse singularity", "pace"
+# In front of the name of a function with poles: the same without them, of which the means are asked.
+_MEAN_OF = "mean of "
 # Places this near to a pose (in rows) or to zero (as a part of the range of what is swept) are at it; so near to a pose
 # a zero that is only touched may be at it.
 AT_ROW, AT_GIVEN_PLACE = 1e-9, 1e-12
@@ -39,6 +45,8 @@ class Along:
     ----------
     names, also : collection of str
         Columns that are followed: those of the table of extremes where the first is left out, and others.
+    asked : collection of Asked
+        Columns that are followed over the motion or parts of it, whether their means are asked, and which extremes.
     loops : sequence of FourBar
         Four-bars and slider-cranks of which sines and cosines of transmission angles are followed, and with `toggles`
         of the angles between coupler and input.
@@ -46,43 +54,72 @@ class Along:
 
     def __init__(
         self, question: MotionQuestion, curve: Curve, names: Collection[str] | None = None,
-        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), toggles: bool = False, passages: bool = False,
+        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), asked: Collection[Asked] = (),
+        toggles: bool = False, passages: bool = False,
     ) -> None:  # fmt: skip
-        self.question, self.curve, self._loops, self._toggles = question, curve, loops, toggles
+        self.question, self.curve, self.ends = question, curve, Ends(curve)
+        self._loops, self._toggles = loops, toggles
         study, mechanism = question.study, question.study.mechanism
         kinds = {"length": mechanism.size, "angle": 2 * np.pi / study.units.angle_factor}
         columns = {output.name: kinds.get(output.quantity, 0.0) for output in question.outputs}
         columns |= {name: kinds.get(quantity, 0.0) for name, quantity in targets.followed(study, question.poses)}
         columns |= {static.name: 0.0 for static in question.statics}
-        wanted = dict.fromkeys([*(columns if names is None else names), *also])
+        self._asked, self._within = asked, dict[Part, Along]()
+        whole = [each for each in asked if not each.part]
+        shown = {*((*columns, *question.rates) if names is None else names), *also}
+        judged = dict.fromkeys([*also, *(each.column for each in whole)])
+        wanted = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
         self._others = [name for name in wanted if name not in columns]
         columns = {name: size for name, size in columns.items() if name in wanted}
-        columns |= dict.fromkeys(self._others, 0.0)
+        columns |= dict.fromkeys(self._others, 0.0) | {
+            name: kinds.get(quantity, 0.0) * question.tempo**order
+            for name, (quantity, order) in question.orders.items()
+            if name in wanted
+        }
         self.columns = tuple(columns)
+        ends = {name: {each.end for each in whole if each.column == name} for name in columns if name not in shown}
         drives = set(mechanism.drives)
         self._groups = []
         if passages and set(question.poses.names) != drives:
             structure = mechanism.forward.structure
             self._groups = [k for k, group in enumerate(structure.groups) if group.form != "place"]
+        self._errors = any(name.endswith("_error") for name in columns)
         # Of the question only what the columns need is computed.
-        self._lean = question if self._others else question.lean
+        self._lean = question.lean({*columns, *(name for each in asked for name in each.columns)})
+        angles = {angle.name for angle in curve.angles}
+        self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
         self._advantages = {
-            f"{output}_advantage": (output, given) for output, given in question.section.mechanical_advantage.items()
+            f"{output}_advantage": (output, given)
+            for output, given in question.section.mechanical_advantage.items()
+            if f"{output}_advantage" in columns
         }
-        functions = columns | {FORWARD: 1.0, INVERSE: 1.0, _PACE: 0.0}
+        self._chains: dict[str, tuple[int, ...]] = {}
+        divisors = self._divisors()
+        below = {name for powers in divisors.values() for name, _ in powers}
+        integrals = {each.column for each in whole if each.integral}
+        functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
+        functions |= {_PACE: 0.0} if self._errors or integrals else {}
         functions |= {f"rate of {name}": 0.0 for name in self._advantages}
         functions |= {f"group {k}": 1.0 for k in self._groups}
-        ends = (0, 3) if toggles else (3,)
-        lines = [f"{name} {k} {end}" for k in range(len(loops)) for end in ends for name in ("sine", "cosine")]
+        arms = (0, 3) if toggles else (3,)
+        lines = [f"{name} {k} {end}" for k in range(len(loops)) for end in arms for name in ("sine", "cosine")]
         functions |= dict.fromkeys(lines, 1.0)
-        zeros = [*lines, *(f"group {k}" for k in self._groups), *self._others]
-        means = [name for name in columns if name.endswith("_error")]
+        zeros = [*lines, *(f"group {k}" for k in self._groups), *(name for name in self._others if name in judged)]
+        # Means are of the quotient itself where a function has poles.
+        self._means = {name: f"{_MEAN_OF}{name}" if name in divisors else name for name in columns if name in integrals}
+        functions |= {f"{_MEAN_OF}{name}": 0.0 for name in self._means if name in divisors}
+        means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
         self._names = list(functions)
-        sizes = list(functions.values())
-        self.functions = Functions(
-            curve, self._names, self._evaluated, sizes, self._divisors(),
+        self._follow = partial(
+            Functions, curve, self._names, self._evaluated, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
+            ends={name: next(iter(asked_for)) for name, asked_for in ends.items() if len(asked_for) == 1},
         )  # fmt: skip
+
+    @cached_property
+    def functions(self) -> Functions:
+        """The functions, followed where they matter."""
+        return self._follow()
 
     def _divisors(self) -> dict[str, list[tuple[str, int]]]:
         """What functions with poles are divided by, and how often."""
@@ -90,25 +127,42 @@ class Along:
         rates = INVERSE if question.of_given else FORWARD
         found = {static.name: [(FORWARD, 1)] for static in question.statics}
         found |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
-        found |= {name: [(rates, 1)] for name in self._others if name.endswith("_velocity")}
-        found |= {name: [(rates, 3)] for name in self._others if name.endswith("_acceleration")}
+        for name in self._others:
+            output, _, order = name.rpartition("_")
+            if order in (powers := {"velocity": 1, "acceleration": 3}):
+                found[name] = [(rates if question.of_given else self._chain(output), powers[order])]
         found |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
         return {name: divisor for name, divisor in found.items() if name in self.columns}
 
+    def _chain(self, output: str) -> str:
+        """The product of the conditionings of the groups that an output follows from, by name: its rates end there."""
+        mechanism = self.question.study.mechanism
+        structure = mechanism.forward.structure
+        behind = sorted(structure.behind(mechanism.coordinate(output), mechanism.graph))
+        groups = tuple(k for k in behind if structure.groups[k].form != "place")
+        name = " ".join([FORWARD, *(str(k) for k in groups)])
+        self._chains[name] = groups
+        return name
+
     @quiet
     def _evaluated(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
-        poses, configuration = self.curve.solve(line, s, judged=False)
+        poses, configuration = self.curve.solve(line, s, judged=False, turning=self._turning)
         motion = Motion(replace(self._lean, poses=poses), reason=configuration.reason.copy())
         linear = motion.fill(SolvedPoses(np.arange(len(s)), self.question.poses.groups[0].names, configuration))
         arrays: dict[str, Value] = dict(motion.arrays)
         whole = self.question.poses
-        for error in targets.errors(self.question.study, whole, motion.arrays, line * whole.line, between=True):
-            arrays[error.name] = error.values
-        signed = conditionings(linear)
-        arrays[_PACE] = whole.pace(line, s)
+        if _PACE in self._names:
+            arrays[_PACE] = whole.pace(line, s)
+        if self._errors:
+            rows = line * whole.line
+            for error in targets.errors(self.question.study, whole, motion.arrays, rows, between=True):
+                arrays[error.name] = error.values
+        signed = linear.conditionings
         arrays[FORWARD] = forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
         arrays |= {f"group {k}": signed[k] for k in self._groups}
-        if self.question.of_given and self._others:
+        for chain, groups in self._chains.items():
+            arrays[chain] = np.prod(np.broadcast_arrays(np.ones(len(s)), *(signed[k] for k in groups)), axis=0)
+        if INVERSE in self._names:
             arrays[INVERSE] = self._inverse(linear, configuration) * forward
         for name, (output, given) in self._advantages.items():
             arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, given)[0] * forward
@@ -119,7 +173,7 @@ class Along:
         self._known = arrays.keys()
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
-            row[:] = arrays.get(name, 1.0)
+            row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
         return table, motion.arrays["conditioning"]
 
     def _inverse(self, linear: Linearization, configuration: Configuration) -> Value:
@@ -170,30 +224,21 @@ class Along:
             places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))
         return np.where(known, places, np.nan)
 
-    def place_columns(self, places: Floats, meaning: str) -> list[Column]:
-        """Places of a single motion as columns: what is swept, or the row and all coordinates that move."""
-        study, poses, line = self.question.study, self.question.poses, np.zeros(len(places), dtype=np.intp)
+    def place_columns(self, line: Ints, places: Floats, meaning: str) -> list[Column]:
+        """Places of motions as columns: what is swept, or the row and all coordinates that move."""
+        study, poses = self.question.study, self.question.poses
         if poses.swept is not None:
             unit = study.units.label(study.mechanism.quantity(poses.swept))
             return [Column(poses.swept, self.shown(line, places), unit, meaning)]
         values = poses.along(line, places).values
-        moving = [name for name, column in poses.values.items() if np.ptp(column) > 0]
         return [
             Column("row", places, "", f"place along the path in rows from 0: {meaning}"),
-            *(Column(c, values[c], study.units.label(study.mechanism.quantity(c)), "given") for c in moving),
+            *(Column(c, values[c], study.units.label(study.mechanism.quantity(c)), "given") for c in poses.moving),
         ]
 
     def at(self, line: Ints, s: Floats) -> dict[str, Floats]:
         """Every function at places of lines."""
         return dict(zip(self._names, self.functions.at(line, s), strict=True))
-
-    def follows(self, name: str) -> bool:
-        """Whether a column is a function along the motion."""
-        pieces = self.curve.pieces
-        if not len(pieces.line):
-            return False
-        self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
-        return name in self.columns and name in self._known
 
     def worst(self, name: str, sign: int, *, absolute: bool = False, still: float = 0.0) -> tuple[Floats, Floats]:
         """Largest value of a function times a sign over each motion, or of its absolute values times the sign; places.
@@ -201,55 +246,97 @@ class Along:
         The value is that of the function, absolute where that is judged; nan where it has none. Of values within
         `still` the first along the motion counts.
         """
-        rounding = np.full((1, self.curve.lines), still)
-        peaks = {end: self.functions.extremes([name], end, rounding) for end in (1, -1)}
-        high, low = (peaks[end].value[0] * end for end in (1, -1))
-        places = {end: peaks[end].place[0] for end in (1, -1)}
+        if absolute and sign < 0:
+            values, places = self.least([name], still)
+            return values[0], places[0]
+        peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
+        (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
         if not absolute:
-            return (high, places[1]) if sign > 0 else (low, places[-1])
-        if sign > 0:
-            larger = high >= -low
-            return np.where(larger, high, -low), np.where(larger, places[1], places[-1])
-        # The smallest absolute value is zero where the function has both signs.
-        zeros = self.functions.zeros([name], still)
-        first = np.full(self.curve.lines, np.nan)
+            return (high, high_at) if sign > 0 else (low, low_at)
+        larger = high >= -low
+        return np.where(larger, high, -low), np.where(larger, high_at, low_at)
+
+    def least(self, names: Sequence[str], still: float) -> tuple[Floats, Floats]:
+        """Smallest absolute values of functions over each motion, and their places; shape (names, lines).
+
+        They are zero where the function has both signs, or comes within `still` of zero and turns back.
+        """
+        shape = len(names), self.curve.lines
+        peaks = self.functions.extremes(names, np.full(shape, still))
+        (low, high), (low_at, high_at) = peaks.value, peaks.place
+        zeros = self.functions.zeros(names, still)
+        first = np.full(shape, np.nan)
         order = np.argsort(-zeros.place, kind="stable")
-        first[zeros.line[order]] = zeros.place[order]
-        value, place = np.where(low > 0, low, -high), np.where(low > 0, places[-1], places[1])
+        first[zeros.function[order], zeros.line[order]] = zeros.place[order]
+        value, place = np.where(low > 0, low, -high), np.where(low > 0, low_at, high_at)
         zero = np.isfinite(first)
         # It jumps over zero at a corner or a gap: the square has no sign.
         jumps = ~zero & (low <= 0) & (high >= 0)
-        if jumps.any():
-            squared = Functions(self.curve, [name], lambda *at: self._squared(name, *at), [0.0], extremes=[name])
-            least = squared.extremes([name], -1, rounding**2)
-            value = np.where(jumps, np.sqrt(np.maximum(-least.value[0], 0.0)), value)
-            place = np.where(jumps, least.place[0], place)
+        for k in np.flatnonzero(jumps.any(axis=1)).tolist():
+            own = partial(self._squared, names[k])
+            squared = Functions(self.curve, [names[k]], own, [0.0], extremes=[names[k]])
+            smallest = squared.extremes(names[k : k + 1], np.full((1, shape[1]), still**2))
+            value[k] = np.where(jumps[k], np.sqrt(np.maximum(smallest.value[0, 0], 0.0)), value[k])
+            place[k] = np.where(jumps[k], smallest.place[0, 0], place[k])
         # A zero that is only touched is known to the root of rounding: at a pose beside it that is one, it is there.
-        lines = np.flatnonzero(zero & (np.abs(first - np.round(first)) <= NEAR_ROW))
-        at_row = self.functions.at(lines, np.round(first[lines]))[self._names.index(name)]
-        lines = lines[np.abs(at_row) <= still]
-        first[lines] = np.round(first[lines])
+        lanes, lines = np.nonzero(zero & (np.abs(first - np.round(first)) <= NEAR_ROW))
+        if len(lanes):
+            rows = np.array([self._names.index(name) for name in names])[lanes]
+            at_row = self.functions.at(lines, np.round(first[lanes, lines]))[rows, np.arange(len(lanes))]
+            good = np.abs(at_row) <= still
+            first[lanes[good], lines[good]] = np.round(first[lanes[good], lines[good]])
         return np.where(zero, 0.0, value), np.where(zero, first, place)
 
     def _squared(self, name: str, line: Ints, s: Floats) -> tuple[Floats, Floats]:
         table, conditioning = self._evaluated(line, s)
         return table[[self._names.index(name)]] ** 2, conditioning
 
-    def mean(self, name: str, power: int = 1) -> Floats:
-        """Mean of a power of a column over each motion, by the way along it, shape (lines,)."""
-        return self.functions.means(name, power, _PACE)
+    def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
+        """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""
+        return self.functions.means(self._means.get(name, name), power, _PACE, absolute=absolute)
 
-    def at_end(self, end: End, name: str) -> float:
-        """A function at an end of the motion; nan at infinity."""
-        return np.nan if end.endless else self.functions.at_end(name, end.line, end.place, end.x)
+    def poled(self, name: str) -> bool:
+        """Whether a column whose means are asked may go to infinity."""
+        return self._means[name] != name
+
+    def knows(self, names: Collection[str]) -> bool:
+        """Whether some columns have values along the motions."""
+        pieces = self.curve.pieces
+        if not len(pieces.line):
+            return False
+        self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
+        return self._known >= {*names}
+
+    def part(self, part: Part) -> Along:
+        """The same over the part of the motion in which columns lie in intervals, whose ends are found on the curve."""
+        if part not in self._within:
+            places = Along(self.question, self.curve, (), also=[name for name, _ in part])
+            rows = [places._names.index(name) for name, _ in part]
+
+            def values(line: Ints, s: Floats) -> tuple[Floats, Floats]:
+                table, conditioning = places._evaluated(line, s)
+                return table[rows], conditioning
+
+            curve = within(self.curve, [interval for _, interval in part], values)
+            asked = [each._replace(part=()) for each in self._asked if each.part == part]
+            self._within[part] = Along(self.question, curve, (), asked=asked)
+        return self._within[part]
+
+    def at_ends(self, ends: Sequence[End], names: Sequence[str]) -> Floats:
+        """Functions at ends of the motions, shape (names, ends); nan at infinity."""
+        line, x = (np.array([getattr(end, name) for end in ends], dtype=np.intp) for name in ("line", "x"))
+        values = self.functions.at_ends(names, line, np.array([end.place for end in ends]), x)
+        values[:, [end.endless for end in ends]] = np.nan
+        return values
 
     def passages(self) -> list[tuple[int, float, Cause]]:
         """Where motions pass a forward singularity, at which the drives hold the mechanism no longer: line, place."""
         structure, graph = self.question.study.mechanism.forward.structure, self.question.study.mechanism.graph
         zeros = self.functions.zeros([f"group {k}" for k in self._groups], AT_SINGULARITY)
         found = []
+        joints = [" ".join(graph.joined(structure.groups[k].edges)) for k in self._groups]
         for number, line, place in zip(zeros.function.tolist(), zeros.line.tolist(), zeros.place.tolist(), strict=True):
-            joint = " ".join(graph.joined(structure.groups[self._groups[number]].edges))
+            joint = joints[number]
             found.append((line, place, Cause(SINGULARITY, joint, joint, self._groups[number], "passed")))
         return sorted(found, key=lambda passage: passage[:2])
 

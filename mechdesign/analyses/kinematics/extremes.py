@@ -17,35 +17,39 @@ STILL = 1e-12
 
 
 def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
-    """Smallest and largest value of each output, error and effort over the motion, and the ratio of the times between.
+    """Smallest and largest value of outputs, errors, efforts and rates over the motion, and the ratio of times between.
 
     Along a motion they are those of all of it, from limit to limit, between its poses too; elsewhere those of the valid
     poses. Efforts and mechanical advantages are infinite at their poles. `time_ratio` is the longer over the shorter
     part of a full turn of the swept angle between the two extremes, for a drive of constant speed; nan elsewhere.
     `min_at` is what is swept, or the place in rows where nothing or more than one coordinate is.
 
-    Between the poses those of `names` are wanted, or all.
+    Those of `names` are wanted, or all.
     """
     question = motion.question
     study, poses, mechanism = question.study, question.poses, question.study.mechanism
-    curves = {output.name: (output.quantity, motion.arrays[output.name]) for output in question.outputs}
-    curves |= {error.name: (error.quantity, error.values) for error in motion.errors}
-    units = [study.units.label(quantity) for quantity, _ in curves.values()]
-    for static in question.statics:
-        curves[static.name] = ("none", motion.arrays[static.name])
-        units.append(static.unit)
+    turn = 2 * np.pi / study.units.angle_factor
+    kinds, label = {"length": mechanism.size, "angle": turn}, study.units.label
+    # By name what rounding is judged by, and the unit.
+    curves = {output.name: (kinds.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
+    curves |= {error.name: (kinds.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
+    curves |= {static.name: (0.0, static.unit) for static in question.statics}
+    for name, (quantity, order) in question.orders.items():
+        curves[name] = kinds.get(quantity, 0.0) * question.tempo**order, question.rates[name]
+    if names is not None:
+        curves = {name: curve for name, curve in curves.items() if name in names}
+    arrays = motion.arrays | {error.name: error.values for error in motion.errors}
+    units = [unit for _, unit in curves.values()]
     swept = poses.swept
     at = poses.values[swept] if swept is not None else poses.numbers
-    turn = 2 * np.pi / study.units.angle_factor
-    sizes = {"length": mechanism.size, "angle": turn}
     # By curve and design; of both ends the value and its place.
-    table = np.stack([values for _, values in curves.values()]).reshape(len(curves), poses.designs, -1)
+    table = np.array([arrays[name] for name in curves]).reshape(len(curves), poses.designs, -1)
     places = at.reshape(poses.designs, -1)
     counted = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
     row = np.stack([np.where(counted, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
     low, high = (np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row)
     finite = np.where(counted & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
-    size = np.array([sizes.get(quantity, 0.0) for quantity, _ in curves.values()])[:, None]
+    size = np.array([each for each, _ in curves.values()])[:, None]
     still = STILL * np.maximum(finite, size)
     with np.errstate(invalid="ignore"):
         moving = high - low > still
@@ -55,7 +59,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     ends = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
     ends = np.where(counted.any(axis=2), ends, np.nan)
     if along is not None:
-        mine = [k for k, name in enumerate(curves) if name in along.columns and (names is None or name in names)]
+        mine = [k for k, name in enumerate(curves) if name in along.columns]
         _between(along, [list(curves)[k] for k in mine], mine, ends, still, moving)
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
@@ -75,7 +79,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
                 "output",
                 np.tile(np.array(list(curves)), poses.designs),
                 "",
-                "output, error, effort or mechanical advantage, in its own unit",
+                "output, error, effort, mechanical advantage, velocity or acceleration, in its own unit",
             ),
             Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
             Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
@@ -97,16 +101,14 @@ def _between(
     `moving`, shape (curves, designs), says which curves do not stand still.
     """
     line = np.broadcast_to(np.arange(ends.shape[3]), (len(names), ends.shape[3]))
-    peaks = {sign: along.functions.extremes(names, sign, still[rows]) for sign in (-1, 1)}
+    peaks = along.functions.extremes(names, still[rows])
     with np.errstate(invalid="ignore"):
-        moves = peaks[1].value + peaks[-1].value > still[rows]
+        moves = peaks.value[1] - peaks.value[0] > still[rows]
     moving[rows] |= moves
-    for side, sign in enumerate((-1, 1)):
-        peak = peaks[sign]
-        finite = np.isfinite(peak.place) & moves
-        places = along.shown(line.ravel(), peak.place.ravel()).reshape(line.shape)
-        for part, new in enumerate((sign * peak.value, places)):
-            ends[side, part, rows] = np.where(finite, new, ends[side, part, rows])
+    places = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
+    found = np.isfinite(peaks.place) & moves
+    for part, new in enumerate((peaks.value, places)):
+        ends[:, part, rows] = np.where(found, new, ends[:, part, rows])
 
 
 def targets_table(motion: Motion, along: Along | None, sums: Floats | None = None) -> Table:

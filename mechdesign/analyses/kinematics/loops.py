@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechdesign.analyses.kinematics.along import Along, over
 from mechdesign.analyses.kinematics.motion import MotionQuestion
-from mechdesign.analyses.poses import solve_poses
+from mechdesign.analyses.poses import SolvedPoses, solve_poses
+from mechdesign.curve.functions import Zeros
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -26,31 +28,58 @@ SAME_TOGGLE = 1e-5
 ROLES = ("frame", "input", "coupler", "output")
 
 
-def loops_table(question: MotionQuestion, loops: Sequence[FourBar], along: Along | None) -> Table:
-    """Every loop of every design: its links and lengths (of a single design), and how well it transmits.
+def measured(
+    mechanism: Mechanism, loops: Sequence[FourBar], poses: Poses, solved: Iterable[SolvedPoses]
+) -> list[Sequence[FourBar]]:  # fmt: skip
+    """Loops with the lengths that they have in each design, by a valid pose among those solved; as given without one.
 
-    `along` is the motion with the loops; None of listed poses and grids.
+    Of designs without dimensions of their own all are given with those of the sketch.
+    """
+    if not poses.places:
+        return [loops] * poses.designs
+    found, missing = [loops] * poses.designs, np.ones(poses.designs, dtype=bool)
+    for each in solved:
+        valid = np.flatnonzero(each.configuration.valid)
+        designs, first = np.unique(each.rows[valid] // (poses.count // poses.designs), return_index=True)
+        new = missing[designs]
+        one = each.configuration.take(valid[first[new]])
+        lengths = zip(*(loop.measured(one, mechanism.size) for loop in loops), strict=True)
+        for design, own in zip(designs[new].tolist(), lengths, strict=False):
+            found[design], missing[design] = own, False
+    return found
+
+
+def loops_table(
+    question: MotionQuestion, designs: Sequence[Sequence[FourBar]], loops: Sequence[FourBar], along: Along | None
+) -> Table:  # fmt: skip
+    """Every loop of every design: its links and lengths, and how well it transmits.
+
+    Parameters
+    ----------
+    designs : sequence of sequence of FourBar
+        The loops of each design, as many of each.
+    loops : sequence of FourBar
+        The same for all designs, whatever their lengths.
+    along : Along, optional
+        The motion with the loops; None of listed poses and grids.
     """
     study, poses = question.study, question.poses
+    every = [loop for own in designs for loop in own]
     length, angle = study.units.label("length"), study.units.label("angle")
     columns = [
-        Column("kind", np.array([loop.kind for loop in loops]), "", "what the four bodies and their joints are"),
-        *(Column(part, np.array([loop.links[k] for loop in loops]), "", f"the {part} link")
+        Column("kind", np.array([loop.kind for loop in every]), "", "what the four bodies and their joints are"),
+        *(Column(part, np.array([loop.links[k] for loop in every]), "", f"the {part} link")
           for k, part in enumerate(ROLES)),
-        Column("joints", np.array([" ".join(joint.name for joint in loop.joints) for loop in loops]), "",
+        Column("joints", np.array([" ".join(joint.name for joint in loop.joints) for loop in every]), "",
                "joints from the frame round"),
+        *(Column(f"{part}_length", np.array([loop.lengths[k] for loop in every]), length, f"length of the {part}")
+          for k, part in enumerate(ROLES)),
+        Column("offset", np.array([loop.offset for loop in every]), length, "offset of the slide"),
+        Column("class", np.array([loop.type for loop in every]), "",
+               "Grashof's class, or the kind of slider-crank"),
+        Column("excess", np.array([loop.excess for loop in every]), length,
+               "p + q - s - l; rod - crank - offset; |crank - frame| - offset: a link turns fully where positive"),
     ]  # fmt: skip
-    if poses.designs == 1:
-        columns += [
-            *(Column(f"{part}_length", np.array([loop.lengths[k] for loop in loops]), length, f"length of the {part}")
-              for k, part in enumerate(ROLES)),
-            Column("offset", np.array([loop.offset for loop in loops]), length, "offset of the slide"),
-            Column("class", np.array([loop.type for loop in loops]), "",
-                   "Grashof's class, or the kind of slider-crank"),
-            Column("excess", np.array([loop.excess for loop in loops]), length,
-                   "p + q - s - l; rod - crank - offset; |crank - frame| - offset: a link turns fully where positive"),
-        ]  # fmt: skip
-    columns = [Column(c.name, np.tile(c.values, poses.designs), c.unit, c.meaning) for c in columns]
     at_unit, where = "", "row at the"
     if along is not None and poses.swept is not None:
         at_unit, where = study.units.label(study.mechanism.quantity(poses.swept)), f"{poses.swept} at the"
@@ -85,18 +114,19 @@ def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tupl
 
 def _between(along: Along, count: int) -> list[tuple[Floats, Floats]]:
     """Smallest and largest transmission angle over motions, and their places; shape (loops, designs)."""
-    found, every = [], np.arange(along.curve.lines)
-    for name, angle in (("sine", np.arcsin), ("cosine", np.arccos)):
-        both = [along.worst(f"{name} {k} 3", -1, absolute=True, still=SAME_ANGLE) for k in range(count)]
-        values = np.stack([angle(np.clip(value, 0.0, 1.0)) for value, _ in both])
-        found.append((values, np.stack([along.shown(every, place) for _, place in both])))
-    return found
+    names = [f"{name} {k} 3" for name in ("sine", "cosine") for k in range(count)]
+    values, places = (part.reshape(2, count, -1) for part in along.least(names, SAME_ANGLE))
+    line = np.broadcast_to(np.arange(along.curve.lines), places.shape)
+    shown = along.shown(line.ravel(), places.ravel()).reshape(places.shape)
+    angles = np.arcsin(np.clip(values[0], 0.0, 1.0)), np.arccos(np.clip(values[1], 0.0, 1.0))
+    return list(zip(angles, shown, strict=True))
 
 
 @dataclass(frozen=True)
 class Toggle:
-    """Where the coupler of a loop comes into line with its input or its output: the place in rows, and words."""
+    """Where the coupler of a loop comes into line with its input or its output: motion, place in rows, and words."""
 
+    line: int
     place: float
     links: str
     state: str
@@ -106,27 +136,26 @@ class Toggle:
 
 
 def toggles_of(loops: Sequence[FourBar], along: Along) -> list[Toggle]:
-    """Every toggle of a motion, in the order of its places."""
+    """Every toggle of motions, one after the other, in the order of its places."""
     which = [(k, end) for end in (0, 3) for k in range(len(loops))]
     zeros = along.functions.zeros([f"sine {k} {end}" for k, end in which], IN_LINE)
-    zeros = zeros.take(_once(along.snapped(zeros.place), zeros.function))
+    zeros = zeros.take(_once(zeros, along.snapped(zeros.place)))
     if not len(zeros.place):
         return []
     configuration = along.curve.solve(zeros.line, along.curve.inside(zeros.line, zeros.place), judged=False)[1]
-    together = _together(zeros.place, zeros.function % len(loops))
+    together = _together(zeros.place, zeros.function % len(loops) + len(loops) * zeros.line)
     cosines = {end: [loop.squareness(configuration, end)[1] for loop in loops] for end in (0, 3)}
-    found = []
-    for number, (function, place, both) in enumerate(
-        zip(zeros.function.tolist(), along.snapped(zeros.place).tolist(), together.tolist(), strict=True)
-    ):
+    found, lanes = [], (zeros.function, zeros.line, along.snapped(zeros.place), together)
+    for number, (function, line, place, both) in enumerate(zip(*(lane.tolist() for lane in lanes), strict=True)):
         k, end = which[function]
-        found.append(Toggle(place, *_words(loops[k], end, float(cosines[end][k][number]), both)))
+        found.append(Toggle(line, place, *_words(loops[k], end, float(cosines[end][k][number]), both)))
     return found
 
 
 def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
     """Every place at which the coupler of a loop comes into line with its input or its output."""
-    place = np.array([toggle.place for toggle in toggles])
+    line, place = (np.array([getattr(toggle, name) for toggle in toggles], dtype=kind)
+                   for name, kind in (("line", np.intp), ("place", float)))  # fmt: skip
     meanings = {
         "links": "the two links in line", "state": "extended, folded, or perpendicular to the slide",
         "joints": "joints of the two links", "effect": "what it does", "loop": "the four-bar or slider-crank",
@@ -135,16 +164,17 @@ def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
         Column(name, np.array([getattr(toggle, name) for toggle in toggles], dtype=str), "", meaning)
         for name, meaning in meanings.items()
     ]
-    columns = [*along.place_columns(place, "value at which the links are in line"), *words]
+    columns = [*along.place_columns(line, place, "value at which the links are in line"), *words]
     return Table("toggles", tuple(columns), "links of four-bars and slider-cranks that come into line")
 
 
-def _once(position: Floats, function: Ints) -> Ints:
-    """Toggles in the order of the motion; of those of the same links that are one, the one found first."""
-    order = np.lexsort((position, function))
-    begins = np.flatnonzero(_apart(position[order], function[order]))
+def _once(zeros: Zeros, position: Floats) -> Ints:
+    """Toggles in the order of the motions; of those of the same links that are one, the one found first."""
+    kind = zeros.function + (zeros.function.max(initial=0) + 1) * zeros.line
+    order = np.lexsort((position, kind))
+    begins = np.flatnonzero(_apart(position[order], kind[order]))
     first = np.minimum.reduceat(order, begins) if len(order) else order
-    return first[np.lexsort((function[first], position[first]))]
+    return first[np.lexsort((zeros.function[first], position[first], zeros.line[first]))]
 
 
 def _together(position: Floats, loop: Ints) -> Flags:

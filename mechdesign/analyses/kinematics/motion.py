@@ -5,7 +5,7 @@ At a change point that the motion follows, values are interpolated from poses on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -33,12 +33,14 @@ from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.poses import KinematicsSection
 
 # Poses with a conditioning below this have lost digits.
@@ -131,6 +133,38 @@ class MotionQuestion:
             found.append(Static(f"{name}_advantage", unit, meaning))
         return found
 
+    @property
+    def orders(self) -> dict[str, tuple[Quantity, int]]:
+        """Columns of velocities and accelerations, where the study gives rates: of what quantity, and which order."""
+        asked = self.section.rates or self.section.accelerations or self.section.speed
+        moving = {output.name: output for output in [*(self.drives if self.of_given else []), *self.outputs]}
+        return {
+            f"{output.name}_{word}": (output.quantity, order)
+            for output in (moving.values() if asked else ())
+            for order, word in ((1, "velocity"), (2, "acceleration"))
+        }
+
+    @property
+    def rates(self) -> dict[str, str]:
+        """Units of the columns of velocities and accelerations."""
+        label = self.study.units.label
+        return {
+            name: label(ORDERS[quantity][order]) if quantity in ORDERS else ""
+            for name, (quantity, order) in self.orders.items()
+        }
+
+    @property
+    def tempo(self) -> float:
+        """About how fast the mechanism moves: radians, or sizes of it, in a unit of time."""
+        section, mechanism, size = self.section, self.study.mechanism, self.study.mechanism.size or 1.0
+        units = {"angle": self.study.units.angle_factor, "length": 1 / size}
+        found = [(section.speed or 0.0) / size]
+        for rates, order in ((section.rates, 1), (section.accelerations, 2)):
+            found += [
+                abs(rate * units.get(mechanism.quantity(name), 1.0)) ** (1 / order) for name, rate in rates.items()
+            ]
+        return max(found)
+
     @cached_property
     def curve(self) -> Curve | None:
         """The motion that the poses are, with its angles; None of listed poses and grids."""
@@ -140,11 +174,25 @@ class MotionQuestion:
         plan = mechanism.plan(self.poses.groups[0].names)
         return Curve(self.study, self.poses, followed_angles(mechanism, plan, self.watched))
 
-    @property
-    def lean(self) -> MotionQuestion:
-        """The question without rates, Jacobian and instant centres."""
-        nothing: dict[str, object] = {"rates": {}, "accelerations": {}, "speed": None, "instant_centres": ()}
-        return replace(self, section=self.section.model_copy(update=nothing), square=False, of_given=False)
+    def lean(self, names: Collection[str]) -> MotionQuestion:
+        """The question with nothing but what some columns, and the targets of errors among them, need."""
+        section, unasked = self.section, dict[str, object]()
+        centres = [
+            pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
+        ]
+        rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
+        if not rates:
+            unasked |= {"rates": {}, "accelerations": {}, "speed": None}
+        if not any(static.name in names for static in self.statics):
+            unasked |= {"loads": (), "mechanical_advantage": {}}
+        square = self.square and any(name in ("det_J", "inverse_condition") or "_by_" in name for name in names)
+        errors = any(name.endswith("_error") for name in names)
+        values = {*names, *(needed(self.study, self.poses) if errors else ())}
+        return replace(
+            self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
+            watched=[coordinate for coordinate in self.watched if coordinate.name in values],
+            of_given=self.of_given and rates,
+        )  # fmt: skip
 
     @property
     def mixed(self) -> bool:
@@ -173,8 +221,8 @@ class MotionQuestion:
         return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), words)
 
 
-def motion_question(study: Study) -> MotionQuestion:
-    """Read a study's questions about its motion.
+def motion_question(study: Study, poses: Poses | None = None) -> MotionQuestion:
+    """Read a study's questions about its motion, at its own poses or at some others.
 
     Raises
     ------
@@ -184,7 +232,7 @@ def motion_question(study: Study) -> MotionQuestion:
         If no poses are given and none can be assumed.
     """
     section = study.kinematics or KinematicsSection()
-    mechanism, poses = study.mechanism, study_poses(study, "kinematics")
+    mechanism, poses = study.mechanism, study_poses(study, "kinematics") if poses is None else poses
     outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
     listed = outputs if section.jacobian is None else expand_outputs(study, section.jacobian)
     shown = {output.name: output for output in outputs}
@@ -288,14 +336,14 @@ class Motion:
 
         if self.question.square:
             length = characteristic_length(study)
-            arc = (np.nan if length is None else length) if mixes(listed, drives) else None
+            arc = self.question.poses.of(np.nan if length is None else length, rows) if mixes(listed, drives) else None
             jacobian = Jacobian.of(linear, listed, arc)
             for output, line in zip(listed, jacobian.entries, strict=True):
                 for drive, value in zip(drives, line, strict=True):
                     put(entry(output, drive), value)
             put("det_J", jacobian.determinant)
             put("inverse_condition", jacobian.inverse_condition)
-        for name, values in statics(self.question, linear).items():
+        for name, values in statics(self.question, linear, rows).items():
             put(name, values)
 
     def complete(self, poses: Poses, rows: Ints) -> None:
@@ -306,6 +354,7 @@ class Motion:
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""
         question, arrays, label = self.question, self.arrays, self.question.study.units.label
+        rates = question.rates
         shown = {output.name: output for output in question.outputs}
         drives = {drive.name: drive for drive in question.drives}
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
@@ -314,9 +363,8 @@ class Motion:
                 columns.append(Column(name, arrays[name], label(output.quantity), f"value of {name}"))
             for order in ("velocity", "acceleration"):
                 rate = f"{name}_{order}"
-                if rate in arrays:
-                    kind = {"length": order, "angle": f"angular_{order}"}.get(output.quantity, "none")
-                    columns.append(Column(rate, arrays[rate], label(kind), f"{order} of {name}"))
+                if rate in rates:
+                    columns.append(Column(rate, arrays[rate], rates[rate], f"{order} of {name}"))
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
         rows = ", ".join(output.name for output in question.listed)
@@ -350,21 +398,25 @@ class Motion:
         return Column(error.name, error.values, study.units.label(error.quantity), meaning)
 
 
-def statics(question: MotionQuestion, linear: Linearization) -> dict[str, Value]:
-    """Efforts of the drives by virtual work, and mechanical advantages, by their columns; unknown where it stalls."""
-    mechanism, drives, section = question.study.mechanism, question.drives, question.section
-    work: dict[str, float] = {}
+def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict[str, Value]:
+    """Efforts of the drives by virtual work, and mechanical advantages, by their columns; unknown where it stalls.
+
+    `rows` are the poses of `linear`.
+    """
+    mechanism, drives = question.study.mechanism, question.drives
+    section = question.poses.section(question.section, rows)
+    work: dict[str, Value] = {}
     for load in section.loads:
         if load.at is not None and load.force is not None:
             for axis, force in zip("xy", load.force, strict=True):
                 work[f"{load.at}.{axis}"] = work.get(f"{load.at}.{axis}", 0.0) + force
         if load.link is not None and load.moment is not None:
             work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
-    moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
-    found: dict[str, Value] = {
-        f"{drive.name}_effort": -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
-        for k, drive in enumerate(drives if work else ())
-    }
+    found: dict[str, Value] = {}
+    if work:
+        moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
+        for k, drive in enumerate(drives):
+            found[f"{drive.name}_effort"] = -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
     for name, given in section.mechanical_advantage.items():
         found[f"{name}_advantage"] = _advantage(question, linear, name, given)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, move, pieces
 from mechdesign.analyses.kinematics.targets import Error
-from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown
+from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown, SolvedPoses
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.results import LongTable, Scope, Table
@@ -23,7 +23,7 @@ Marks = Callable[[Motion], Mapping[str, Flags]]
 
 
 class Mark(NamedTuple):
-    """How many poses something is to be said of, and the row of the first."""
+    """How many poses of a design something is to be said of, and the row of the first."""
 
     number: int
     first: int
@@ -42,25 +42,28 @@ class Passage:
         The poses that a picture shows, of those of the motion.
     reason : int8 array, shape (poses,)
         Of all poses; see `mechdesign.mechanism.Reason`.
-    marks : mapping of str to Mark
-        What is to be said of how many of all poses.
+    marks : list of mapping of str to Mark
+        By design, what is to be said of how many of all poses.
     sums : ndarray
         `mechdesign.analyses.kinematics.targets.totals` of all poses.
+    solved : list of SolvedPoses
+        The poses themselves, of designs with dimensions of their own; else empty.
     """
 
     question: MotionQuestion
     motion: Motion
     shown: Shown
     reason: NDArray[np.int8]
-    marks: Mapping[str, Mark]
+    marks: Sequence[Mapping[str, Mark]]
     sums: Floats
+    solved: Sequence[SolvedPoses]
 
     @property
     def long(self) -> bool:
         """Whether the motion has not all poses."""
         return self.motion.question is not self.question
 
-    def table(self, make: Callable[[Motion], Table], jobs: int | None, scope: Scope) -> Table:
+    def table(self, make: Callable[[Motion], Table], jobs: int | None, scope: Scope | None) -> Table:
         """A table with a row a pose of a long motion; its rows are made anew where they are wanted."""
         like = replace(make(self.motion), scope=scope)
         return LongTable(like, self.question.poses.count, partial(self.blocks, make, jobs))
@@ -80,26 +83,34 @@ def pass_over(question: MotionQuestion, marks: Marks, progress: Progress, jobs: 
     """
     poses, keeper = question.poses, Keeper(question.study, question.poses)
     if not _is_long(question):
-        motion = move(question, progress, jobs, also=keeper.keep)
-        found = {name: _mark(where, 0) for name, where in marks(motion).items()}
+        solved: list[SolvedPoses] = []
+
+        def keep(part: SolvedPoses) -> None:
+            keeper.keep(part)
+            if poses.places:
+                solved.append(part)
+
+        motion = move(question, progress, jobs, also=keep)
+        flags = {name: where.reshape(poses.designs, -1) for name, where in marks(motion).items()}
+        told = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
         sums = targets.totals(motion.errors, poses.designs, motion.valid)
-        return Passage(question, motion, keeper.shown, motion.reason, found, sums)
+        return Passage(question, motion, keeper.shown, motion.reason, told, sums, solved)
     picked = _Picked(question, keeper.rows)
-    reason, told, sums = np.empty(poses.count, dtype=np.int8), dict[str, Mark](), np.zeros(())
-    for solved, motion in pieces(question, jobs):
-        reason[solved.rows] = motion.reason
-        begin = int(solved.rows[0])
+    reason, known, sums = np.empty(poses.count, dtype=np.int8), dict[str, Mark](), np.zeros(())
+    for part, motion in pieces(question, jobs):
+        reason[part.rows] = motion.reason
+        begin = int(part.rows[0])
         for name, where in marks(motion).items():
-            new, old = _mark(where, begin), told.get(name, Mark(0, -1))
-            told[name] = Mark(old.number + new.number, old.first if old.number else new.first)
+            new, old = _mark(where, begin), known.get(name, Mark(0, -1))
+            known[name] = Mark(old.number + new.number, old.first if old.number else new.first)
         sums = sums + targets.totals(motion.errors, 1, motion.valid)
         picked.add(begin, motion)
-        keeper.keep(solved)
-        progress.update(len(solved.rows))
+        keeper.keep(part)
+        progress.update(len(part.rows))
     motion, shown = picked.motion(), keeper.shown
     assert motion.question.poses.rows is not None
     rows = np.searchsorted(motion.question.poses.rows, shown.rows)
-    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, told, sums)
+    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, [known], sums, [])
 
 
 def _is_long(question: MotionQuestion) -> bool:

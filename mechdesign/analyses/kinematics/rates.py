@@ -51,6 +51,7 @@ def drive_rates(
 
     `linear` is the mechanism at the solved poses.
     """
+    section = poses.section(section, solved.rows)
     inverse = of_given(study, section)
     names = solved.given if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]

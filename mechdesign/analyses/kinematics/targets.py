@@ -12,6 +12,7 @@ from mechdesign.mechanism.algebra import dot, norm2
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study import Study
+from mechdesign.study.point_paths import table_of
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.targets import Target, timing
 
@@ -103,15 +104,42 @@ def _wanted(
         varied = {name: column[rows] for name, column in poses.parameters.items()}
         env: dict[str, ArrayLike] = {**study.parameters.nominal, **varied, **values}
         return [np.asarray(target.expression.evaluate(env), dtype=float) + 0 * values[target.owner]]
-    table = target.table
-    assert table is not None
+    if between and _a_value_each(target, poses):
+        return None
+    tables = _tables(target, poses)
+    if len(tables) == 1:
+        return _by_table(study, target, tables[0], poses, values, rows)
+    design = rows // (poses.count // poses.designs)
+    wanted = np.empty((len(target.coordinates), len(rows)))
+    for k in np.unique(design).tolist():
+        some = np.flatnonzero(design == k)
+        own = {name: column[some] for name, column in values.items()}
+        wanted[:, some] = _by_table(study, target, tables[k], poses, own, rows[some])
+    return list(wanted)
+
+
+def _tables(target: Target, poses: Poses) -> Floats:
+    """The target's table for each design, shape (designs, rows, columns); one where it follows no parameter."""
+    assert target.table is not None
+    if not target.rows or not poses.parameters:
+        return target.table[None]
+    first = np.arange(poses.designs) * (poses.count // poses.designs)
+    tables = table_of(target.rows, lambda number: np.broadcast_to(poses.of(number, first), poses.designs))
+    order = np.argsort(tables[:, :, 0], axis=1, kind="stable")
+    return np.take_along_axis(tables, order[..., None], axis=1) if target.timed else tables
+
+
+def _by_table(
+    study: Study, target: Target, table: Floats, poses: Poses, values: Mapping[str, Floats], rows: Ints
+) -> Sequence[Floats]:
+    """What each coordinate of a target with this table should be."""
     if target.timed:
         drive = timing(study.mechanism.drives, poses)
         assert drive is not None
         turn = 2 * np.pi / study.units.angle_factor if study.mechanism.quantity(drive) == "angle" else None
         return _interpolated(table, values[drive], turn)
     if _a_value_each(target, poses):
-        return None if between else list(table[rows % len(table)].T)
+        return list(table[rows % len(table)].T)
     x, y = (values[name] for name in target.coordinates)
     foot = nearest(x + 1j * y, table[:, 0] + 1j * table[:, 1])
     return [foot.real, foot.imag]

@@ -1,70 +1,79 @@
-"""From a design to the optimum near it, by SciPy's least squares and sequential quadratic programming.
+"""From designs to the optima near them, many at once, by sequential quadratic programming with exact curvature.
 
-The worst of several rows has edges where another row becomes the worst. Its rows are smooth: the worst of them is made
-small by its epigraph, ``min t`` where no row exceeds ``t``. Rows of conditions, and the margins by which poses
-assemble, are conditions of their own. [Nocedal & Wright, Numerical Optimization, 2006, ch. 10 and 18.] Derivatives are
-differences over steps, evaluated in one batch.
+A design in a batch costs far less than alone: at each point all first and second differences are evaluated together.
+They give quadratic models of everything smooth: the residuals of a root mean square, the rows of which a goal is the
+worst, the rows of conditions, and the margins by which poses assemble. The worst of rows is made small by its epigraph,
+``min t`` where no row exceeds ``t``. What is best of the models is looked for in boxes of several widths, and all of
+it is evaluated together again. [Nocedal & Wright, Numerical Optimization, 2006, ch. 4, 10 and 18.]
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from threading import Barrier, BrokenBarrierError
-from typing import Any, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer
+from mechdesign.analyses.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known
+from mechdesign.analyses.optimize.models import FAR, Models, Stencil, Terms, square, without_lost
+from mechdesign.numerics import quadratic
 from mechdesign.numerics.arrays import Floats, Ints
 
-# Steps of differences, and half the widths of the boxes in which they are used, in parts of the ranges.
-LADDER = ((1e-4, 0.3), (1e-5, 0.03))
-# Where values are known to a tolerance, differences over less than this are noise.
-ROUGH_LADDER = ((1e-2, 0.3), (1e-3, 0.05))
-SQUARES_STEP = 1e-5
-# Most steps of least squares, far from their end and near it, and of quadratic programs.
-MAX_SQUARES = 60
-MAX_FINAL_SQUARES = 150
-MAX_STEPS = 60
-# Points asked for one after the other, none of which is better than what was known: a stage ends.
-MAX_IN_VAIN = 30
-ROUGH_MAX_IN_VAIN = 12
-# Gains of a step, in parts of what a range changes, below which a quadratic program ends.
-SMALLEST_GAIN = 1e-14
-ROUGH_SMALLEST_GAIN = 1e-5
+# Half the first width of the box in which models are trusted, its largest, and where a descent ends.
+FIRST_WIDTH, LARGEST_WIDTH, SMALLEST_WIDTH, ROUGH_SMALLEST_WIDTH = 0.1, 0.5, 1e-9, 1e-4
+# Parts of that width in which it is looked, too, and that remains where nothing of this was better.
+NARROWER = (1.0, 0.25, 0.0625)
+SHRUNK = 1 / 64
+# Steps of a descent, and after how many it ends where in so many more it would not reach the best of the others.
+MOST_STEPS, RACE, CATCH_UP = 300, 8, 30
+# Pairs of programs solved, one after the other, for what is best of the models, and rows of each worst, and of all
+# conditions, that they hold per (variables + 1).
+ROUNDS = 5
+# The models' best is settled where a pair gains less than this part of what they promise.
+SETTLED = 0.02
+ROWS_HELD = 6
+# Descents that come this near to another go on as one, in parts of the ranges.
+SAME = 1e-3
+# Price of a condition that is missed, where what a range changes of the goals costs 1.
+PRICE = 1e3
 # How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
 CONDITION_SLACK = 1e-9
-# Added to the objective where a point has no value though it meets all conditions, in parts of what a range changes.
-NO_VALUE_COST = 1e3
+# A descent ends where its models promise less than this part of the objective.
+SMALLEST_GAIN, ROUGH_SMALLEST_GAIN = 1e-12, 1e-6
 # Slopes of conditions below this part of their values are none.
 FLAT_SLOPE = 1e-6
 TINY = float(np.finfo(float).tiny)
 
 
-# From points to their rows of `Explorer.known`.
-Ask = Callable[[Floats], Ints]
+@dataclass
+class _Lane:
+    """One descent: the row of its best point, the width of its box, and what it knows of its conditions.
+
+    Where the widest box led to nothing better, `ahead` is the row of what was found there, and the box: along a curved
+    valley the way over such points is shorter [Chamberlain et al., The watchdog technique, 1982].
+    """
+
+    objective: Floats
+    row: int
+    width: float = FIRST_WIDTH
+    # By how much conditions were missed where their models said they were met, in parts of the width's cube.
+    bent: float = 0.0
+    steps: int = 0
+    ended: bool = False
+    value: float = np.inf
+    pace: float = np.inf
+    ahead: tuple[int, float] | None = None
 
 
-class _InVain(Exception):
-    """A stage comes no further: an optimiser may halve its steps for a long time where poses end."""
-
-
-def descend(
-    explorer: Explorer, descents: Sequence[tuple[Floats, int]], ladder: Sequence[tuple[float, float]] = LADDER,
-    *, final: bool = False,
-) -> list[int]:  # fmt: skip
-    """Descend from known points, all at once: a batch of designs costs little more than one.
+def descend(explorer: Explorer, descents: Sequence[tuple[Floats, int]], *, width: float = FIRST_WIDTH) -> list[int]:
+    """Descend from known points, all at once.
 
     Parameters
     ----------
     descents : sequence of (ndarray, int)
         Factors of the goals whose sum is made small, and the row of `explorer.known` from which.
-    ladder : sequence of (float, float)
-        Steps of differences and half the widths of boxes.
-    final : bool
-        Whether they begin near their ends.
+    width : float
+        Half the first width of the boxes, in parts of the ranges.
 
     Returns
     -------
@@ -76,296 +85,228 @@ def descend(
     Spent
         If the evaluations are used up.
     """
-    running = [_Descent(explorer, objective, row, ladder, final) for objective, row in descents]
-    side_by_side(explorer, [each.run for each in running])
-    return [each.best for each in running]
+    lanes = [_Lane(objective, row, width) for objective, row in descents]
+    scouts: list[tuple[_Lane, _Lane]] = []
+    while open_ := [lane for lane in lanes if not lane.ended]:
+        _step(explorer, [*open_, *(scout for scout, _ in scouts)])
+        for scout, lane in scouts:
+            if scout.value < lane.value:
+                lane.row, lane.width, lane.value, lane.ended = scout.row, scout.width, scout.value, False
+        for group in _alike(lanes):
+            _race(explorer.known, group)
+        scouts = [
+            (_Lane(lane.objective, lane.ahead[0], lane.ahead[1], lane.bent), lane)
+            for lane in lanes if lane.ahead is not None and not lane.ended
+        ]  # fmt: skip
+    return [lane.row for lane in lanes]
 
 
-def side_by_side(explorer: Explorer, tasks: Sequence[Callable[[Ask], None]]) -> None:
-    """Run tasks that ask for few points at a time; what all of them ask is evaluated in one batch.
-
-    A batch waits for every task that still runs, and holds their points in the order of the tasks, so that the result
-    does not depend on which of them came first. `explorer.known` does not change while a task computes.
-
-    Raises
-    ------
-    Spent
-        If the evaluations are used up; all tasks have ended then.
-    """
-    none = np.empty((0, explorer.dimensions))
-    asked, rows = [none] * len(tasks), [np.empty(0, dtype=np.intp)] * len(tasks)
-    over = not tasks
-    # All tasks and this thread meet twice a batch: when everything is asked, and when everything is known.
-    meeting = Barrier(len(tasks) + 1)
-
-    def run(k: int) -> None:
-        def ask(points: Floats) -> Ints:
-            asked[k] = points
-            meeting.wait()
-            meeting.wait()
-            return rows[k]
-
-        try:
-            # The state of warnings is a thread's own.
-            with np.errstate(all="ignore"):
-                tasks[k](ask)
-            # One that has ended asks for nothing until all have.
-            while not over:
-                ask(none)
-        except BaseException:
-            meeting.abort()
-            raise
-
-    with ThreadPoolExecutor(max(len(tasks), 1)) as pool:
-        running = [pool.submit(run, k) for k in range(len(tasks))]
-        try:
-            while not over:
-                meeting.wait()
-                ends = np.cumsum([len(points) for points in asked])
-                over = not ends[-1]
-                rows[:] = np.split(explorer(np.concatenate(asked)), ends[:-1])
-                meeting.wait()
-        except BrokenBarrierError:
-            pass
-        finally:
-            meeting.abort()
-    for error in [task.exception() for task in running]:
-        if error is not None and not isinstance(error, BrokenBarrierError):
-            raise error
+def _step(explorer: Explorer, lanes: list[_Lane]) -> None:
+    """A step of every lane, or of some of them a narrower box."""
+    groups = _alike(lanes)
+    stencil = Stencil(explorer, [lane.row for group in groups for lane in group])
+    first, programs = 0, []
+    for group in groups:
+        programs.append(_Programs(explorer, group, stencil, slice(first, first + len(group))))
+        first += len(group)
+    rows = explorer(np.concatenate([each.points.reshape(-1, explorer.dimensions) for each in programs]))
+    for each in programs:
+        shape = each.points.shape[:2]
+        each.judge(rows[: shape[0] * shape[1]].reshape(shape))
+        rows = rows[shape[0] * shape[1] :]
 
 
-class _Descent:
-    """One descent: the best row so far, and the smooth parts of which its objective consists."""
-
-    def __init__(
-        self, explorer: Explorer, objective: Floats, row: int, ladder: Sequence[tuple[float, float]], final: bool
-    ) -> None:
-        self.explorer, self.objective, self.best, self.ladder, self.final = explorer, objective, row, ladder, final
-        self.plain, known = objective.copy(), explorer.known
-        goals = len(self.plain)
-        self.edged, self.held, self.squares = [], [], []
-        self.conditions = np.ones(known.margins.shape[1], dtype=bool)
-        for part in explorer.parts:
-            if part.column == ASSEMBLY:
-                self.held.append(part)
-            elif part.column >= goals:
-                if np.isnan(known.rows[row, part.place]).any():
-                    continue
-                self.held.append(part)
-                self.conditions[part.column - goals] = False
-            elif part.squares:
-                self.squares += [part] if self.plain[part.column] > 0 else []
-            elif objective[part.column] * part.sign > 0 and np.isfinite(known.rows[row, part.place]).all():
-                self.edged.append((part, abs(objective[part.column])))
-                self.plain[part.column] = 0.0
-        # A root mean square that is the only goal is made small by its square, which is smoother.
-        self.curvature = 0.0
-        self._last: tuple[Floats, Ints] = np.empty((0, 0)), np.empty(0, dtype=np.intp)
-        self._in_vain = 0
-        # Whether slopes were asked for at the last point.
-        self._taken = True
-        self.squared = len(self.squares) == np.count_nonzero(objective) == 1
-
-    def run(self, ask: Ask) -> None:
-        """Descend by points that `ask` evaluates."""
-        self._evaluate = ask
-        if not self.explorer.known.valid[self.best]:
-            return
-        if self.squared:
-            # `trf` is quicker far from the optimum, `dogbox` along a narrow valley that ends on bounds.
-            self._stage(self._least_squares, "dogbox" if self.final else "trf")
-        for step, width in self.ladder:
-            self._stage(self._programming, step, width)
-
-    def _stage(self, optimiser: Callable[..., None], *arguments: Any) -> None:
-        """Let an optimiser go on until it ends, or comes no further; its best point is kept."""
-        self._in_vain = 0
-        with suppress(_InVain):
-            optimiser(*arguments)
-
-    def ask(self, points: Floats) -> Ints:
-        """Rows of points; the best of them, or of those before, is where the next stage begins."""
-        if self._in_vain > (ROUGH_MAX_IN_VAIN if self.explorer.rough else MAX_IN_VAIN):
-            raise _InVain
-        rows = self._evaluate(points)
-        known = self.explorer.known
-        among = np.concatenate([[self.best], rows])
-        merit = known.merit(self.objective)[among]
-        self.best = int(among[np.argmin(merit)])
-        self._in_vain = 0 if merit.min() < merit[0] else self._in_vain + 1
-        return rows
-
-    def terms(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
-        """The smooth sum, shape (m, 1), rows that bound each worst, and what may not be positive; nan where unknown."""
-        known = self.explorer.known
-        lines = known.rows[rows]
-        none = np.empty((len(rows), 0))
-        pieces = [part.pieces(lines) * factor for part, factor in self.edged]
-        limits = [-known.margins[rows][:, self.conditions], *(part.pieces(lines) for part in self.held)]
-        plain = known.values[rows] @ self.plain if self.plain.any() else np.zeros(len(rows))
-        plain = plain**2 if self.squared else plain
-        return plain[:, None], np.concatenate([none, *pieces], axis=1), np.concatenate(limits, axis=1)
-
-    def _least_squares(self, method: Literal["trf", "dogbox"]) -> None:
-        from scipy.optimize import least_squares
-
-        (part,) = self.squares
-
-        def residuals(u: Floats) -> Floats:
-            row = self.at(u, SQUARES_STEP)[0]
-            return np.asarray(self.explorer.known.rows[row, part.place])
-
-        def slopes(u: Floats) -> Floats:
-            points, rows = self._stencil(u, SQUARES_STEP)
-            return np.nan_to_num(_differences(points, u, self.explorer.known.rows[rows][:, part.place]))
-
-        begin = self.explorer.known.u[self.best]
-        if np.isfinite(residuals(begin)).all():
-            most = MAX_FINAL_SQUARES if self.final else MAX_SQUARES
-            least_squares(
-                residuals, begin, jac=slopes, bounds=(0.0, 1.0), method=method, max_nfev=most,
-                xtol=1e-14, ftol=1e-14, gtol=None,
-            )  # fmt: skip
-
-    def at(self, u: Floats, step: float) -> Ints:
-        """Rows of a point, and of those for its slopes where they cost little more and are likely to be asked for next.
-
-        They are not where the point before was not taken.
-        """
-        if self.explorer.slow or not self._taken:
-            return self.ask(u[None])
-        rows = self._stencil(u, step)[1]
-        self._taken = False
-        return rows
-
-    def _stencil(self, u: Floats, step: float) -> tuple[Floats, Ints]:
-        """A point, and those a step from it along each variable, inside the cube."""
-        sides = [np.clip(u + sign * step * np.eye(len(u)), 0.0, 1.0) for sign in (-1, 1)]
-        points = np.concatenate([u[None], *sides])
-        if not np.array_equal(points, self._last[0]):
-            # Asked for again, they would wait for the other descents.
-            self._last = points, self.ask(points)
-        self._taken = True
-        return self._last
-
-    def _programming(self, step: float, width: float) -> None:
-        """Sequential quadratic programming in a box about the best point."""
-        from scipy.optimize import minimize as scipy_minimize
-
-        # Its stubs know no bounds of other than plain numbers.
-        minimize: Any = scipy_minimize
-        begin = self.explorer.known.u[self.best].copy()
-        n, more = len(begin), len(self.edged)
-        lines = self.explorer.known.rows[[self.best]]
-        owner = np.repeat(np.arange(more), [part.pieces(lines).shape[1] for part, _ in self.edged])
-        program = _Program(self, begin, step)
-        raised, free = np.eye(more)[owner], np.zeros((len(program.lengths), more))
-
-        def cost(y: Floats) -> float:
-            return float(program.terms(y[:n])[0][0] + y[n:].sum())
-
-        def cost_slope(y: Floats) -> Floats:
-            return np.concatenate([program.slopes(y[:n])[0][0], np.ones(more)])
-
-        def room(y: Floats) -> Floats:
-            _, pieces, limits = program.terms(y[:n])
-            return np.concatenate([y[n:][owner] - pieces, -limits - CONDITION_SLACK])
-
-        def room_slope(y: Floats) -> Floats:
-            _, pieces, limits = program.slopes(y[:n])
-            return np.block([[-pieces, raised], [-limits, free]])
-
-        pieces = program.terms(begin)[1]
-        tops = np.array([pieces[owner == k].max() for k in range(more)])
-        low, high = np.maximum(begin - width, 0.0), np.minimum(begin + width, 1.0)
-        minimize(
-            cost, np.concatenate([begin, tops]), jac=cost_slope, method="SLSQP",
-            bounds=[*zip(low, high, strict=True), *[(None, None)] * more],
-            constraints=[{"type": "ineq", "fun": room, "jac": room_slope}] if len(owner) + len(free) else (),
-            options={"maxiter": MAX_STEPS, "ftol": ROUGH_SMALLEST_GAIN if self.explorer.rough else SMALLEST_GAIN},
-        )  # fmt: skip
-
-    def linear(self, u: Floats, step: float) -> tuple[list[Floats], list[Floats]]:
-        """The terms at a point, and their slopes, each of shape (columns, n)."""
-        points, rows = self._stencil(u, step)
-        found = self.terms(rows)
-        if self.squared:
-            # Slopes vanish at the bottom of a valley; there the curvature gives the change over a range.
-            n, plain = len(u), found[0][:, 0]
-            inside = np.abs(points[n + 1 :] - points[1 : n + 1]).max(axis=1) > 1.5 * step
-            bends = np.abs(plain[1 : n + 1] + plain[n + 1 :] - 2 * plain[0])[inside] / step**2
-            self.curvature = max(self.curvature, float(np.nan_to_num(bends).max(initial=0.0)))
-        return [part[0] for part in found], [np.nan_to_num(_differences(points, u, part)) for part in found]
+def _alike(lanes: Sequence[_Lane]) -> list[list[_Lane]]:
+    """Lanes of the same objective together."""
+    groups: dict[bytes, list[_Lane]] = {}
+    for lane in lanes:
+        groups.setdefault(lane.objective.tobytes(), []).append(lane)
+    return list(groups.values())
 
 
-class _Program:
-    """What a descent makes small, in parts of what a range changes of it: its terms and their slopes at any point.
+def _race(known: Known, lanes: Sequence[_Lane]) -> None:
+    """End descents of one objective that come to where a better one is, or would not catch up with the best."""
+    lanes = sorted(lanes, key=lambda lane: lane.value)
+    for k, lane in enumerate(lanes):
+        behind = lane.value - lane.pace * CATCH_UP > lanes[0].value
+        lane.ended |= lane.steps > RACE and behind
+        near = (np.abs(known.u[[other.row for other in lanes[:k]]] - known.u[lane.row]) < SAME).all(axis=1)
+        lane.ended |= bool(near.any())
 
-    Where the goals have no value they go on as straight lines from the last point where they had, as long as a
-    condition or a clearance tells that nothing is to be had there; else they are too high for a step to be taken.
+
+class _Programs:
+    """What is best of the models of some lanes with one objective, in boxes of several widths.
+
+    Attributes
+    ----------
+    points : ndarray, shape (lanes, widths, n)
     """
 
-    def __init__(self, descent: _Descent, begin: Floats, step: float) -> None:
-        self._descent, self._step = descent, step
-        values, slopes = descent.linear(begin, step)
-        scale = max(*(float(np.abs(part).max(initial=0.0)) for part in slopes[:2]), descent.curvature, TINY)
-        steepest = np.abs(slopes[2]).max(axis=1, initial=0.0)
-        self.lengths = np.maximum(steepest, np.maximum(FLAT_SLOPE * np.abs(np.nan_to_num(values[2])), TINY))
-        self._scales = [np.array([scale]), np.full(len(values[1]), scale), self.lengths]
-        values, self._slopes = self._in_parts(values, slopes)
-        self._at, self._values = begin.copy(), [np.nan_to_num(part) for part in values]
-        self._known: dict[bytes, list[Floats]] = {}
-        self._known_slopes = {self._at.tobytes(): self._slopes}
+    def __init__(self, explorer: Explorer, lanes: Sequence[_Lane], stencil: Stencil, place: slice) -> None:
+        self._explorer, self._lanes, self._at = explorer, lanes, stencil.at[place]
+        self._objective = lanes[0].objective
+        self._terms = Terms(explorer, lanes[0].objective)
+        centre, rows = stencil.centre[place], stencil.rows[place]
+        plain, pieces, limits = (stencil.models(part) for part in self._terms(rows))
+        owner = self._terms.owner
+        steepest = np.abs(limits.slope).max(axis=2, initial=0.0)
+        lengths = np.maximum(steepest, FLAT_SLOPE * np.abs(np.nan_to_num(limits.value)))
+        self._lengths = np.where(lengths > 0, lengths, 1.0)
+        self._rounding = SMALLEST_GAIN if not explorer.rough else ROUGH_SMALLEST_GAIN
+        # The models are of all widths of a lane, one after the other.
+        wide = np.repeat(np.arange(len(lanes)), len(NARROWER))
+        self._widths = np.array([lane.width * part for lane in lanes for part in NARROWER])
+        self._begin = (self._at - centre)[wide]
+        self._low, self._high = (np.clip(self._at[wide] + side * self._widths[:, None], 0, 1) - centre[wide]
+                                 for side in (-1, 1))  # fmt: skip
+        self._slack = CONDITION_SLACK + np.array([lane.bent for lane in lanes])[wide] * self._widths**3
+        scale = self._scale(plain, pieces)
+        self._plain = plain.take(wide) if self._terms.squared else plain.scaled(scale[:, None]).take(wide)
+        widest, most = np.array([lane.width for lane in lanes]), ROWS_HELD * (centre.shape[1] + 1)
+        pieces = without_lost(pieces.scaled(np.repeat(scale[:, None], pieces.value.shape[1], 1)))
+        chosen = []
+        for k in range(self._terms.edges):
+            own = np.flatnonzero(owner == k)
+            chosen.append(own[pieces.columns(np.broadcast_to(own, (len(lanes), len(own)))).highest(widest, most)])
+        self._owner = np.repeat(np.arange(len(chosen)), [part.shape[1] for part in chosen])
+        if chosen:
+            pieces = pieces.columns(np.concatenate(chosen, axis=1))
+        self._pieces = pieces.take(wide)
+        limits = without_lost(limits.scaled(self._lengths))
+        self._limits = limits.columns(limits.highest(widest, most)).take(wide)
+        self._scales = scale[wide]
+        found, promised = self._best()
+        self.points = np.clip(centre[wide] + found, 0, 1).reshape(len(lanes), len(NARROWER), -1)
+        self._promised = (promised * self._scales).reshape(len(lanes), -1).max(axis=1)
 
-    def _in_parts(self, values: list[Floats], slopes: list[Floats]) -> tuple[list[Floats], list[Floats]]:
-        return (
-            [part / scale for part, scale in zip(values, self._scales, strict=True)],
-            [part / scale[:, None] for part, scale in zip(slopes, self._scales, strict=True)],
-        )
+    def _scale(self, plain: Models, pieces: Models) -> Floats:
+        """What a range changes of the objective, by its slopes or by its curvature; 1 where it changes nothing."""
+        if self._terms.squared:
+            _, slope, bend = square(plain, np.zeros_like(plain.slope[:, 0]))
+            scale = np.maximum(np.abs(slope).max(axis=1), np.abs(bend).max(axis=(1, 2)))
+        else:
+            lanes = len(plain.value)
+            flat = np.maximum(
+                *(np.abs(part.slope).reshape(lanes, -1).max(axis=1, initial=0.0) for part in (plain, pieces))
+            )
+            bends = np.abs(plain.bend).reshape(lanes, -1).max(axis=1, initial=0.0)
+            scale = np.where(flat > 0, flat, bends)
+        return np.where(scale > 0, scale, 1.0)
 
-    def _straight(self, u: Floats) -> list[Floats]:
-        return [part + slope @ (u - self._at) for part, slope in zip(self._values, self._slopes, strict=True)]
+    def _smooth_at(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Value, slope and curvature of the smooth sum at a point of each lane."""
+        if self._terms.squared:
+            value, slope, bend = square(self._plain, x)
+            return value / self._scales, slope / self._scales[:, None], bend / self._scales[:, None, None]
+        value, slope = self._plain.at(x)
+        return np.nan_to_num(value[:, 0]), slope[:, 0], self._plain.bend[:, 0]
 
-    def terms(self, u: Floats) -> list[Floats]:
-        """The smooth sum, the rows that bound each worst, and what may not be positive."""
-        key = u.tobytes()
-        if key not in self._known:
-            rows = self._descent.at(u, self._step)[:1]
-            found = [part[0] / scale for part, scale in zip(self._descent.terms(rows), self._scales, strict=True)]
-            impossible = np.isnan(found[0]).any() or np.isnan(found[1]).any()
-            told = bool((found[2] > 0).any())
-            found = [np.where(np.isnan(new), line, new) for new, line in zip(found, self._straight(u), strict=True)]
-            if impossible and not told:
-                found[0] = found[0] + NO_VALUE_COST
-            self._known = {key: found}
-        return self._known[key]
+    def _cost(self, x: Floats) -> Floats:
+        """What the models say of points, with the price of what is missed."""
+        cost = self._smooth_at(x)[0]
+        pieces, limits = self._pieces.at(x)[0], self._limits.at(x)[0]
+        for k in range(self._terms.edges):
+            cost = cost + pieces[:, self._owner == k].max(axis=1)
+        return np.asarray(cost + PRICE * np.maximum(limits.max(axis=1, initial=FAR) + self._slack, 0.0))
 
-    def slopes(self, u: Floats) -> list[Floats]:
-        """Slopes of the terms, each of shape (columns, n)."""
-        key = u.tobytes()
-        if key not in self._known_slopes:
-            values, slopes = self._in_parts(*self._descent.linear(u, self._step))
-            known, straight = [np.isfinite(part) for part in values], self._straight(u)
-            self._slopes = [
-                np.where(good[:, None], new, old) for good, new, old in zip(known, slopes, self._slopes, strict=True)
-            ]
-            self._values = [np.where(good, new, line) for good, new, line in zip(known, values, straight, strict=True)]
-            self._at = u.copy()
-            self._known_slopes = {key: self._slopes}
-        return self._known_slopes[key]
+    def _best(self) -> tuple[Floats, Floats]:
+        """The best points of the models that some rounds of programs find, and by how much they are better."""
+        begin = self._cost(self._begin)
+        x, cost = self._begin, begin
+        widths, weights = self._widths.copy(), None
+        for _ in range(ROUNDS):
+            low, high = (np.clip(x + side * widths[:, None], self._low, self._high) for side in (-1, 1))
+            first, weights = self._program(x, weights, low, high, widths)
+            # Where rows bend the first step may miss them; a second one comes back to them.
+            second, weights = self._program(first, weights, low, high, widths)
+            before = cost
+            for new in (first, second):
+                costs = self._cost(new)
+                less = costs < cost
+                x, cost = np.where(less[:, None], new, x), np.where(less, costs, cost)
+            widths = np.where(cost < before, np.minimum(2 * widths, self._widths), widths / 4)
+            if (cost - begin >= (1 + SETTLED) * (before - begin)).all() and (cost < begin).any():
+                break
+        return x, begin - cost
+
+    def _program(
+        self, x: Floats, weights: tuple[Floats, Floats] | None, low: Floats, high: Floats, width: Floats
+    ) -> tuple[Floats, tuple[Floats, Floats]]:  # fmt: skip
+        """The solution of the quadratic program at points, and the multipliers of all pieces and limits."""
+        lanes, n = x.shape
+        edges = self._terms.edges
+        _, slope, bend = self._smooth_at(x)
+        pieces, limits = self._pieces.at(x), self._limits.at(x)
+        if weights is not None:
+            bend = bend + self._pieces.summed(weights[0]) + self._limits.summed(weights[1])
+        size = n + edges + 1
+        matrix = np.zeros((lanes, size, size))
+        matrix[:, :n, :n] = _convex(bend * width[:, None, None])
+        q = np.concatenate([slope, np.ones((lanes, size - n))], axis=1)
+        tops = np.stack([pieces[0][:, self._owner == k].max(axis=1) for k in range(edges)] or [width], axis=1)
+        box = np.zeros((lanes, n + 1, size))
+        box[:, range(n), range(n)], box[:, n, -1] = 1, -1
+        lines = [np.zeros((*part.shape[:2], size)) for part in (pieces[1], limits[1])]
+        lines[0][:, range(len(self._owner)), n + self._owner] = -1
+        lines[1][:, :, -1] = -1 / PRICE
+        for line, part in zip(lines, (pieces[1], limits[1]), strict=True):
+            line[:, :, :n] = part
+        rooms = [
+            tops[:, self._owner] - pieces[0], -limits[0] - self._slack[:, None], high - x, np.zeros((lanes, 1)), x - low
+        ]  # fmt: skip
+        # Slopes are at most 1: what is farther does not matter within the box.
+        bounds = np.minimum(np.concatenate(rooms, axis=1) / width[:, None], 2 * n + 2)
+        rows = np.concatenate([*lines, box, -box[:, :n]], axis=1)
+        z, multipliers = quadratic.solve(matrix, q, rows, bounds, np.zeros((lanes, size)))
+        first, second = len(self._owner), len(self._owner) + limits[0].shape[1]
+        new = np.clip(x + width[:, None] * z[:, :n], low, high)
+        return new, (multipliers[:, :first], multipliers[:, first:second])
+
+    def judge(self, rows: Ints) -> None:
+        """Go to the best of the evaluated points, shape (lanes, widths), and choose the next boxes, or end."""
+        among = np.column_stack([[lane.row for lane in self._lanes], rows])
+        standing, missed = self._standing(among)
+        for k, lane in enumerate(self._lanes):
+            lane.steps += 1
+            best = int(standing[k].argmin())
+            gained = standing[k, 0] - standing[k, best]
+            lane.value, lane.pace = float(standing[k, best]), float(gained)
+            value = abs(lane.value)
+            widths = lane.width * np.array(NARROWER)
+            # Of narrow boxes it is rounding.
+            wrong = missed[k, 1:] > CONDITION_SLACK
+            lane.bent = min(float(2 * (missed[k, 1:] / widths**3)[wrong][0]), 1.0) if wrong.any() else lane.bent / 2
+            lane.ahead = None
+            if best != 1 and standing[k, 1] < UNKNOWN:
+                lane.ahead = int(among[k, 1]), lane.width
+            if best:
+                way = np.abs(self._explorer.known.u[among[k, best]] - self._at[k]).max()
+                at_edge = best == 1 and way > 0.9 * lane.width
+                lane.width = min(3 * lane.width, LARGEST_WIDTH) if at_edge else max(min(2 * way, lane.width), TINY)
+                lane.row = int(among[k, best])
+            else:
+                lane.width *= SHRUNK
+            small = self._rounding * (value**2 if self._terms.squared else value)
+            # What does not keep its conditions yet goes on as long as it gains.
+            lane.ended = (
+                bool(self._promised[k] <= small and gained <= self._rounding * value)
+                or lane.width < (ROUGH_SMALLEST_WIDTH if self._explorer.rough else SMALLEST_WIDTH)
+                or lane.steps >= MOST_STEPS
+            )
+
+    def _standing(self, rows: Ints) -> tuple[Floats, Floats]:
+        """What is made small at points, shape (lanes, points), and by how much they miss conditions."""
+        known, flat = self._explorer.known, rows.ravel()
+        limits = self._terms(rows)[2] / self._lengths[:, None]
+        missed = np.nan_to_num(limits, nan=FAR).max(axis=2, initial=FAR)
+        values = (known.values[flat] @ self._objective).reshape(rows.shape)
+        valid = known.valid[flat].reshape(rows.shape)
+        feasible = known.feasible[flat].reshape(rows.shape)
+        outside = np.where(valid | (missed > 0), CONDITION_MISSED * (1 + np.maximum(missed, 0.0)), UNKNOWN)
+        return np.where(feasible, values, outside), missed
 
 
-def _differences(points: Floats, u: Floats, values: Floats) -> Floats:
-    """Slopes, shape (columns, n), of values at a point and at those below and above it along each variable.
-
-    Central where both sides are known, else one-sided; nan where neither is.
-    """
-    n = len(u)
-    below, above = values[1 : n + 1], values[n + 1 :]
-    down, up = u - np.diagonal(points[1 : n + 1]), np.diagonal(points[n + 1 :]) - u
-    with np.errstate(all="ignore"):
-        left = (values[0] - below) / down[:, None]
-        right = (above - values[0]) / up[:, None]
-        # Of unequal sides this is the slope of the parabola through the three points.
-        both = (left * up[:, None] + right * down[:, None]) / (up + down)[:, None]
-    return np.asarray(np.where(np.isfinite(both), both, np.where(np.isfinite(left), left, right)).T)
+def _convex(matrices: Floats) -> Floats:
+    """The nearest matrices that bend nowhere downwards."""
+    values, vectors = np.linalg.eigh(np.nan_to_num(matrices))
+    return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(vectors, 1, 2))

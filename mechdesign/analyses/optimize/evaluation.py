@@ -2,76 +2,43 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise
-from typing import Any, NamedTuple
+from itertools import chain
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from mechdesign.analyses.kinematics.along import Along
-from mechdesign.analyses.kinematics.analysis import A_ROW_A_POSE
 from mechdesign.analyses.look import ask, look
 from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, unit_of
-from mechdesign.analyses.poses import POSES_AT_ONCE, solve_poses, study_poses
+from mechdesign.analyses.optimize.batch import FAILED, Batch, Evaluated, Layout, first_reason, without_numbers
+from mechdesign.analyses.optimize.goals import Goal, conditions_of, goals_of, shape_of, unit_of
+from mechdesign.analyses.optimize.stacked import grouped
+from mechdesign.analyses.optimize.variables import entry_of, shown
+from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.analysis import index_meanings
 from mechdesign.analyses.workspace.contained import fitting_scale
-from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, split
-from mechdesign.analyses.workspace.ranged import Ranged
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, shared, split
 from mechdesign.analyses.workspace.tables import where
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
-from mechdesign.expressions import Number
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Result
-from mechdesign.rows import Chosen, UnknownColumnError, choose
+from mechdesign.rows import Chosen, UnknownColumnError
+from mechdesign.statistics import Asked
 from mechdesign.study import Study
+from mechdesign.study.designs import Designs
+from mechdesign.study.poses import Poses
 from mechdesign.study.text.units import Amount, QuantityError
-from mechdesign.study.variants import faults, follows, variant
+from mechdesign.study.variants import remeasured, with_entries
+from mechdesign.terms import Sum, terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"
-_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
-# Why a pose fails, by `mechdesign.mechanism.Reason`.
-FAILED = np.array([
-    "",
-    "a pose cannot be assembled",
-    "a pose is reached in another assembly only",
-    "a pose is outside the limits",
-    "a pose does not hold its load",
-], dtype=object)  # fmt: skip
-
-
-class Layout:
-    """Columns of what is found of designs.
-
-    Values of the goals and their estimated errors (nan where there is none); how far the poses are from assembling
-    (`mechdesign.analyses.optimize.stacked.shortfall`, nan where there is no such design); a code that is 0 where the
-    design can be built; then `rows` that goals are made of, and `assembly` margins of commands.
-    """
-
-    def __init__(self, goals: Sequence[Goal], rows: Mapping[Goal, int], assembly: Mapping[str, int]) -> None:
-        count = len(goals)
-        self.column = {each: k for k, each in enumerate(goals)}
-        self.values, self.errors = slice(0, count), slice(count, 2 * count)
-        self.shortfall, self.code, self.head = 2 * count, 2 * count + 1, 2 * count + 2
-        ends = np.cumsum([self.head, *rows.values(), *assembly.values()]).tolist()
-        places = [slice(begin, end) for begin, end in pairwise(ends)]
-        self.rows = dict(zip(rows, places, strict=False))
-        self.assembly = dict(zip(assembly, places[len(rows) :], strict=True))
-        self.margins = slice(ends[len(rows)], ends[-1])
-        self.width = ends[-1]
-
-
-class Evaluated(NamedTuple):
-    """A row of a `Layout` for each design, and why it cannot be built (empty where it can); its code is still nan."""
-
-    table: Floats
-    reasons: list[str]
+# Studies put together otherwise that are kept.
+MAX_OTHERS = 256
 
 
 class Evaluator:
@@ -89,40 +56,41 @@ class Evaluator:
     def __init__(self, study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> None:
         assert study.optimize is not None
         # Where the study names each.
-        self._keys = goals_of(study.optimize) | conditions_of(study.optimize)
+        moved = study.parameters.moved(study.optimize.variables)
+        self._keys = goals_of(study.optimize) | conditions_of(study.optimize, moved)
         self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals or self._keys)), graded
         self.squares: set[Goal] = set()
         self._rows: dict[Goal, int] = {}
         # Goals of commands and tables whose answers are found for all designs at once; those asked of each design.
         self._together: dict[str, dict[str, list[Goal]]] = {}
         self._alone: dict[str, list[Goal]] = {}
-        # Outputs whose extremes are asked, and columns whose worst value counts between the poses, too.
+        # Outputs whose extremes are asked, and what is asked of columns between the poses.
         self._outputs: set[str] = set()
-        self._columns_between: set[str] = set()
+        self._asked: set[Asked] = set()
+        # Studies that are put together otherwise.
+        self._others: dict[tuple[float, ...], Evaluator] = {}
         # Goals with their bounds in the unit of their column.
         self._bounded: dict[Goal, Goal] = {}
         self._regional = [each for each in self.goals if each.regional]
-        whole = [each for each in self._regional if each.shape is None]
+        whole = [each for each in self._regional if each.outline is None]
         self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
         # One for each value of the held coordinates; of each design the worst counts.
         self.questions: list[Question] = []
         self._regions_together = True
         if self._regional:
             self.questions = questions(study, GRID_TOLERANCE, self._columns)
-            one_by_one = follows(study, study.optimize.variables, ("workspace",))
-            one_by_one |= isinstance(self.questions[0].field, Ranged)
-            self._regions_together = not one_by_one and all(batched(each.column) for each in whole)
+            together = shared(study, self.questions, moved) and not remeasured(study, study.optimize.variables)
+            self._regions_together = together and all(batched(each.column) for each in whole)
         commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
         problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
         if problems:
             # A condition of two bounds would be named twice.
             raise StudyError([*dict.fromkeys(problems)])
         self.goals = tuple(self._bounded.get(each, each) for each in self.goals)
-        self._poses = {command: stacked.poses_of(study, command) for command in self._together}
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
-            poses = self._poses[command](1, {}, {})
+            poses = study_poses(study, command)
             # Extremes may be of some of the poses only.
             if poses.listed or set(tables) != {"extremes"}:
                 clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
@@ -132,12 +100,17 @@ class Evaluator:
 
     def __getstate__(self) -> dict[str, Any]:
         """What the study gives again, where it travels to."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("questions", "_poses")}
+        return {name: value for name, value in self.__dict__.items() if name not in ("questions", "_others")}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         self.__dict__.update(state)
+        self._others = {}
         self.questions = questions(self.study, GRID_TOLERANCE, self._columns) if self._regional else []
-        self._poses = {command: stacked.poses_of(self.study, command) for command in self._together}
+
+    @property
+    def alone(self) -> bool:
+        """Whether some goals are asked of each design alone."""
+        return bool(self._alone)
 
     @property
     def slow(self) -> bool:
@@ -169,24 +142,28 @@ class Evaluator:
             yield self.study.problem(mistake, *self._keys.get(goals[0], ()))
             return
         assert self.study.optimize is not None
-        together = command in stacked.TABLES and stacked.possible(self.study, command, self.study.optimize.variables)
-        if command in stacked.TABLES:
-            poses = stacked.poses_of(self.study, command)(1, {}, {})
-            gates = [each.column for each in goals if each.gate and not each.where]
-            columns = [column.removeprefix(f"{table}.") for column in gates for table in A_ROW_A_POSE]
-            stack = stacked.tables(self.study, command, stacked.TABLES[command], poses, columns=columns)
-            for each in list(goals):
+        together = command in stacked.TABLES and stacked.complete(self.study, command)
+        if together:
+            poses = study_poses(self.study, command)
+            stack = stacked.tables(self.study, command, stacked.TABLES[command], poses)
+            named: dict[Goal, Chosen | Sum] = {}
+            for each in goals:
                 with suppress(UnknownColumnError):
-                    goal, chosen = self._count(each, stack.result, stack.along)
-                    goals.remove(each)
+                    named[each] = self._named(each, stack.result)
+            for each, terms in named.items():
+                for chosen in terms.parts:
                     if chosen.table.name == "extremes":
                         self._outputs.update(chosen.table["output"][chosen.counts].tolist())
-                    elif chosen.table.name in A_ROW_A_POSE and each.gate and not each.where:
-                        self._columns_between.add(chosen.column)
-                    if together:
-                        self._together.setdefault(command, {}).setdefault(chosen.table.name, []).append(goal)
-                    else:
-                        self._alone.setdefault(command, []).append(goal)
+                    elif (asked := each.asked_of(chosen)) is not None:
+                        self._asked.add(asked)
+            tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
+            stack = stacked.tables(self.study, command, {"motion", *tables}, poses, self._outputs, self._asked)
+            for each, terms in named.items():
+                goal = self._count(each, terms, stack.result)
+                goals.remove(each)
+                tables_of = self._together.setdefault(command, {})
+                wanted = [tables_of.setdefault(chosen.table.name, []) for chosen in terms.parts]
+                wanted[0].append(goal)
         if not goals:
             return
         # Where the study's own design has no such result, other designs may.
@@ -194,71 +171,119 @@ class Evaluator:
             result = look(self.study, command)
             for k, each in enumerate(goals):
                 try:
-                    goals[k], _ = self._count(each, result)
+                    goals[k] = self._count(each, self._named(each, result), result)
                 except UnknownColumnError as error:
                     yield self.study.problem(str(error), *self._keys.get(each, ()))
         self._alone.setdefault(command, []).extend(goals)
 
-    def _count(self, each: Goal, result: Result, along: Along | None = None) -> tuple[Goal, Chosen]:
+    def _named(self, each: Goal, result: Result) -> Chosen | Sum:
+        """What a goal is of."""
+        terms = terms_of(result, each.column, dict(each.where))
+        if terms.missing:
+            raise UnknownColumnError(terms.missing)
+        terms.bound(each.bound)
+        if isinstance(terms, Sum):
+            terms.numbers()
+        return terms
+
+    def _count(self, each: Goal, terms: Chosen | Sum, result: Result) -> Goal:
         """A goal with its bound in the unit of its column.
 
         How many rows it is the worst of, or the root mean square, by the study's own design, is noted.
         """
-        chosen = choose(result, each.column, dict(each.where))
-        if chosen.missing:
-            raise UnknownColumnError(chosen.missing)
-        self._bounded[each] = each = replace(each, bound=chosen.bound(each.bound))
-        judgement = each.judge(result, 1, along)
+        self._bounded[each] = each = replace(each, bound=terms.bound(each.bound))
+        judgement = each.judge(result)
         if judgement.squares:
             self.squares.add(each)
         if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
             self._rows[each] = judgement.rows.size
-        return each, chosen
+        return each
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
-        batch = _Batch(self, designs)
-        values = {**self.study.parameters.nominal, **batch.parameters}
+        forms = [name for name in designs if self._forms_study(name)]
+        if not forms:
+            return self._alike(designs)
+        own = {name: values for name, values in designs.items() if name not in forms}
+        kinds, which = np.unique(np.stack([designs[name] for name in forms], axis=1), axis=0, return_inverse=True)
+        table = np.full((len(which), self.layout.width), np.nan)
+        reasons = np.full(len(which), "", dtype=object)
+        for k, kind in enumerate(kinds.tolist()):
+            rows = np.flatnonzero(which.ravel() == k)
+            try:
+                other = self._of(dict(zip(forms, kind, strict=True)))
+            except MechdesignError as error:
+                reasons[rows] = without_numbers(error)
+                continue
+            found = other({name: values[rows] for name, values in own.items()})
+            # What stands behind the goals has as many rows in designs that are put together alike.
+            width = self.layout.width if other.layout.width == self.layout.width else self.layout.head
+            table[rows, :width] = found.table[:, :width]
+            reasons[rows] = found.reasons if own else found.reasons[0]
+        return Evaluated(table, reasons.tolist())
+
+    def _forms_study(self, name: str) -> bool:
+        """Whether a variable decides how the study is put together: an entry, or a whole number that is read once."""
+        parameters = self.study.parameters
+        return name not in parameters.known() or not parameters.moved([name]).isdisjoint(self.study.fixed)
+
+    def _of(self, values: Mapping[str, float]) -> Evaluator:
+        """Evaluates the same goals for the study with such values."""
+        key = tuple(values.values())
+        if key not in self._others:
+            while len(self._others) >= MAX_OTHERS:
+                self._others.pop(next(iter(self._others)))
+            design = {name: shown(self.study, name, np.array(value)).item() for name, value in values.items()}
+            study = with_entries(self.study, [entry_of(self.study, name, value) for name, value in design.items()])
+            self._others[key] = Evaluator(study, self.goals, graded=self._graded)
+        return self._others[key]
+
+    def _alike(self, designs: Mapping[str, Floats]) -> Evaluated:
+        """Evaluate designs of one study that differ in numbers."""
+        batch = Batch(Designs(self.study, designs), self.layout)
+        values: dict[str, ArrayLike] = {**self.study.parameters.nominal, **batch.designs.parameters}
         for each in self.goals:
             if each.expression is not None:
                 found = np.asarray(each.expression.evaluate(values))
                 found = np.where(np.isfinite(found), found, np.nan)
                 batch.table[:, self.layout.column[each]] = np.abs(found) if each.absolute else found
         if self.questions and self._regions_together:
-            self._regions(batch, batch.feasible, self.questions, batch.places)
+            self._regions(batch, batch.feasible, self.questions)
         for command, tables in self._together.items():
-            rows, size = batch.feasible, max(1, POSES_AT_ONCE // self._poses[command](1, {}, {}).count)
-            for begin in range(0, len(rows), size):
-                self._tables(batch, command, tables, rows[begin : begin + size])
+            for rows, study, poses in grouped(batch.designs, command, batch.feasible, batch.failed):
+                self._tables(batch, command, tables, rows, study, poses)
         if self._alone or not self._regions_together:
             for k in batch.feasible.tolist():
                 batch.reasons[k] = self._one(batch, k)
-        for each, values in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
-            batch.note(slice(None), np.isnan(values), f"{each.name} has no value")
+        for each, column in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
+            batch.note(slice(None), np.isnan(column), f"{each.name} has no value")
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
-    def _regions(
-        self, batch: _Batch, rows: Ints, asked: Sequence[Question], places: Mapping[str, Number]
-    ) -> None:  # fmt: skip
-        """Numbers of the workspaces of some designs, the worst of all values of the held coordinates."""
+    def _regions(self, batch: Batch, rows: Ints, asked: Sequence[Question]) -> None:
+        """Numbers of the workspaces of some designs, the worst of all values of the held coordinates.
+
+        The questions are those of the study, or of the one design.
+        """
         if not len(rows):
             return
+        numbers, own = batch.designs.take(rows).numbers, asked is self.questions
         try:
-            given = [answer(question, batch.take(places, rows), len(rows), BATCH) for question in asked]
+            given = [answer(each, each.places(numbers) if own else {}, len(rows), BATCH) for each in asked]
         except AssemblyError as error:
             # One design's workspace has no end; the others are asked in halves.
             if len(rows) == 1:
-                batch.reasons[rows] = _plainly(error)
+                batch.reasons[rows] = without_numbers(error)
                 return
             for half in np.array_split(rows, 2):
-                self._regions(batch, half, asked, places)
+                self._regions(batch, half, asked)
             return
         for question, each in zip(asked, given, strict=True):
             there = where(question) if len(asked) > 1 else ""
             batch.note(rows, ~(each.panels.closes & (each.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
         for goal in self._regional:
-            column, shape = self.layout.column[goal], goal.shape
+            column, outline = self.layout.column[goal], goal.outline
+            shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
                 each.values[goal.column] if shape is None else fitting_scale(shape, each.panels)[0] for each in given
             ])  # fmt: skip
@@ -269,23 +294,34 @@ class Evaluator:
                 errors = np.stack([each.errors[goal.column] for each in given])
                 batch.table[rows, len(self.goals) + column] = errors[worst, lanes]
 
-    def _tables(self, batch: _Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints) -> None:
-        poses = self._poses[command](len(rows), batch.take(batch.places, rows), batch.take(batch.parameters, rows))
-        wanted = {*tables, "motion"} if self.squares.intersection(*tables.values()) else set(tables)
-        stack = stacked.tables(self.study, command, wanted, poses, self._outputs, self._columns_between)
-        failed = FAILED[_first(stack.reason)]
+    def _tables(
+        self, batch: Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints, study: Study, poses: Poses
+    ) -> None:
+        wanted = {*tables, "motion"} if self.squares.intersection(chain(*tables.values())) else set(tables)
+        try:
+            stack = stacked.tables(study, command, wanted, poses, self._outputs, self._asked)
+        except MechdesignError as error:
+            if len(rows) == 1:
+                batch.failed(rows, error)
+                return
+            # The numbers of one design cannot be asked; the others are, in halves.
+            for half in np.array_split(rows, 2):
+                own = study_poses(study, command, batch.designs.take(half).numbers)
+                self._tables(batch, command, tables, half, study, own)
+            return
+        failed = FAILED[first_reason(stack.reason)]
         wrong = stack.reason != 0
         partly = all(each.unassembled for goals in tables.values() for each in goals)
         batch.note(rows, wrong.all(axis=1) if partly else wrong.any(axis=1), failed)
         batch.note(rows, ~stack.whole & (not partly), BETWEEN)
         clear = self.layout.assembly.get(command)
         if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
-            margins = stacked.assembly_margins(self.study, poses, stack.solved or solve_poses(self.study, poses))
+            margins = stacked.assembly_margins(study, poses, stack.solved or solve_poses(study, poses))
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
-            if clear is not None:
+            if clear is not None and margins.shape[1] == clear.stop - clear.start:
                 batch.table[rows, clear] = margins
         for each in [each for goals in tables.values() for each in goals]:
-            lost = np.isnan(batch.judge(each, stack.result, rows, stack.along))
+            lost = np.isnan(batch.judge(each, stack.result, rows))
             batch.note(rows, lost & (failed != ""), failed)
 
     def _needed(self, study: Study) -> Study:
@@ -299,14 +335,14 @@ class Evaluator:
             section = section.model_copy(update={"sobol": 0})
         return replace(study, reliability=section)
 
-    def _one(self, batch: _Batch, k: int) -> str:
+    def _one(self, batch: Batch, k: int) -> str:
         """Ask what is left of one design; returns why it is infeasible."""
         row = np.array([k])
         command = ""
         try:
-            other = variant(self.study, {name: float(column[k]) for name, column in batch.designs.items()})
+            other = batch.designs.one(k)
             if not self._regions_together:
-                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns), {})
+                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns))
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
             other = self._needed(other)
@@ -319,12 +355,12 @@ class Evaluator:
         except UnknownColumnError as error:
             return str(error)
         except AssemblyError as error:
-            return (self._pose_reason(batch, k, other, command) if command else "") or _plainly(error)
+            return (self._pose_reason(batch, k, other, command) if command else "") or without_numbers(error)
         except MechdesignError as error:
-            return _plainly(error)
+            return without_numbers(error)
         return ""
 
-    def _pose_reason(self, batch: _Batch, k: int, study: Study, command: str) -> str:
+    def _pose_reason(self, batch: Batch, k: int, study: Study, command: str) -> str:
         """Why poses of one design fail, empty where none does; notes how far they are from assembling."""
         if command == "workspace":
             return NO_REGION
@@ -332,62 +368,10 @@ class Evaluator:
         solved = list(solve_poses(study, poses))
         if self._graded:
             batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
-        return str(FAILED[_first(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
-
-
-class _Batch:
-    """Designs of one call, and what is found of them."""
-
-    def __init__(self, evaluator: Evaluator, designs: Mapping[str, Floats]) -> None:
-        count = len(next(iter(designs.values())))
-        parameters = evaluator.study.parameters
-        self.designs, self._layout = designs, evaluator.layout
-        self.parameters = {name: value for name, value in parameters.values(designs).items() if np.ndim(value)}
-        self.places = parameters.places(designs)
-        self.reasons = np.array(faults(evaluator.study, self.parameters, self.places, count), dtype=object)
-        self.table = np.full((count, self._layout.width), np.nan)
-        self.table[self.feasible, self._layout.shortfall] = 1.0
-
-    @property
-    def feasible(self) -> Ints:
-        """Rows of the designs that have no reason to be infeasible so far."""
-        return np.flatnonzero(self.reasons == "")
-
-    def take(self, values: Mapping[str, Number], rows: Ints) -> dict[str, Floats]:
-        """Values of some designs."""
-        count = len(self.reasons)
-        return {name: np.broadcast_to(np.asarray(v, dtype=float), count)[rows] for name, v in values.items()}
-
-    def judge(self, each: Goal, result: Result, rows: Ints, along: Along | None = None) -> Floats:
-        """Note the values of a goal by a result of some designs; returns them."""
-        values, listed, _ = each.judge(result, len(rows), along)
-        self.table[rows, self._layout.column[each]] = values
-        place = self._layout.rows.get(each, slice(0))
-        if listed is not None and listed.shape[1] == place.stop - (place.start or 0):
-            self.table[rows, place] = listed
-        return values
-
-    def note(self, rows: Ints | slice, wrong: Flags, reasons: NDArray[np.object_] | str) -> None:
-        """Say what is wrong with some of the rows, where nothing has been said yet."""
-        self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
+        return str(FAILED[first_reason(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
 
 
 def missing(goal: Goal, result: Result) -> str:
     """Which poses or parts of the motion that a goal is of are not valid, in words; empty where all are."""
-    scope = choose(result, goal.column, dict(goal.where)).table.scope
-    return scope.missing if scope is not None else ""
-
-
-def _first(reason: NDArray[np.int8]) -> Ints:
-    """The first reason of each design's poses, shape (designs,); 0 where none fails."""
-    worst = np.where(reason == 0, len(FAILED), reason).min(axis=1, initial=len(FAILED))
-    return np.where(worst == len(FAILED), 0, worst).astype(np.intp)
-
-
-def _plainly(error: MechdesignError) -> str:
-    """An error without its numbers and the file's name, so that designs with one mistake count together."""
-    text = str(error).splitlines()[0]
-    if isinstance(error, StudyError):
-        first = error.problems[0]
-        text = ": ".join(part for part in (first.key, first.message) if part)
-    return _NUMBER.sub("...", text)
+    scopes = [chosen.table.scope for chosen in terms_of(result, goal.column, dict(goal.where)).parts]
+    return next((scope.missing for scope in scopes if scope is not None and scope.missing), "")

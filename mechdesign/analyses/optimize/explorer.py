@@ -117,25 +117,28 @@ class Explorer:
     ----------
     evaluate
         Of points, shape (m, dimensions).
+    snap
+        Points of shape (m, dimensions), moved to where those that are the same design are the same point.
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
-    slow : bool
-        Whether each point costs as much alone as among others.
 
     Attributes
     ----------
     left, reserve : int
         Evaluations that are left, and how many of them are kept for later.
+    visited : ndarray of int
+        Rows of `known` that were asked for since the last `forget`.
     """
 
     def __init__(
         self, evaluate: Callable[[Floats], Known], dimensions: int, budget: int, parts: Sequence[Part] = (),
-        *, rough: bool = False, slow: bool = False,
+        *, snap: Callable[[Floats], Floats] = np.asarray, rough: bool = False,
     ) -> None:  # fmt: skip
-        self._evaluate, self.dimensions, self.parts = evaluate, dimensions, tuple(parts)
+        self._evaluate, self._snap, self.dimensions, self.parts = evaluate, snap, dimensions, tuple(parts)
         self.left, self.reserve = budget, 0
-        self.rough, self.slow = rough, slow
+        self.rough = rough
         self._rows: dict[bytes, int] = {}
+        self._visits: list[Ints] = []
         # Columns of points, values, margins, rows and shortfall; more lines than are filled.
         self._table, self._ends = np.empty((0, dimensions + 1)), [dimensions] * 4
 
@@ -145,6 +148,19 @@ class Explorer:
         u, values, margins, rows, shortfall = np.split(self._table[: len(self._rows)], self._ends, axis=1)
         return Known(u, values, margins, rows, shortfall[:, 0])
 
+    @property
+    def evaluated(self) -> int:
+        """How many points are known."""
+        return len(self._rows)
+
+    @property
+    def visited(self) -> Ints:
+        return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *self._visits]))
+
+    def forget(self) -> None:
+        """Begin to note anew which points are visited."""
+        self._visits.clear()
+
     def __call__(self, u: Floats) -> Ints:
         """Rows of `known` that hold these points, shape (m, dimensions).
 
@@ -153,7 +169,7 @@ class Explorer:
         Spent
             If there are more new points than may be evaluated; nothing is evaluated then.
         """
-        u = np.clip(u, 0.0, 1.0) + 0.0
+        u = self._snap(np.clip(u, 0.0, 1.0) + 0.0)
         keys = [point.tobytes() for point in u]
         new = {key: k for k, key in reversed(list(enumerate(keys))) if key not in self._rows}
         if new:
@@ -171,4 +187,6 @@ class Explorer:
                 self._table = grown
             self._table[begun:end] = np.concatenate(parts, axis=1)
             self._rows |= {keys[k]: begun + row for row, k in enumerate(order)}
-        return np.array([self._rows[key] for key in keys], dtype=np.intp)
+        rows = np.array([self._rows[key] for key in keys], dtype=np.intp)
+        self._visits.append(rows)
+        return rows

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along
-from mechdesign.analyses.kinematics.analysis import A_ROW_A_POSE
 from mechdesign.analyses.workspace.contained import Shape
 from mechdesign.analyses.workspace.question import COLUMNS, split
-from mechdesign.commands import COMMANDS
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result
-from mechdesign.rows import Chosen, choose, worst
+from mechdesign.rows import Chosen
+from mechdesign.statistics import WORST, Asked, worst
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Condition, Containment, OptimizeSection
+from mechdesign.study.schema.optimize import Condition, Containment, OptimizeSection, Outline
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
+from mechdesign.terms import Sum, command_of, path_of, terms_of
 
 # A shape that fits but for this part of its size is contained.
 ROUNDING = 1e-9
+# A rule for the mean square of errors along a motion.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 @dataclass(frozen=True)
@@ -35,16 +36,16 @@ class Goal:
     name : str
         As the study gives it; of a condition with its bound.
     column : str
-        As `mechdesign.rows.choose` understands it; of an expression its text.
+        As `mechdesign.rows.terms_of` understands it; of an expression over parameters its text.
     smallest : bool
         Whether the largest row is the worst one; of a condition, whether its bound is an upper one.
     absolute : bool
         Judge absolute values.
     where : tuple of (str, object)
-        Only rows whose columns have these values count.
+        Only rows whose columns have these values, or lie in these spans, count.
     unassembled : bool
         Whether poses that are not valid are left out; else they make a design infeasible.
-    shape : Shape, optional
+    outline : Outline, optional
         What the workspace is to hold; the largest scale at which it does is judged.
     gate : bool
         Whether it is a condition, which has to hold between the poses of a motion, too; of a goal the rows count.
@@ -59,13 +60,13 @@ class Goal:
     bound: float = 0.0
     unassembled: bool = False
     expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
-    shape: Shape | None = None
+    outline: Outline | None = None
     gate: bool = False
 
     @property
     def regional(self) -> bool:
         """Whether it is a number of the whole workspace."""
-        found = self.shape is not None or self.column in COLUMNS or bool(split(self.column)[0])
+        found = self.outline is not None or self.column in COLUMNS or bool(split(self.column)[0])
         return self.command == "workspace" and found and not self.where
 
     def margin(self, values: Floats) -> Floats:
@@ -76,50 +77,48 @@ class Goal:
         """Which values keep the bound; nan never does."""
         return self.margin(values) >= 0
 
-    def judge(self, result: Result, designs: int = 1, along: Along | None = None) -> Judgement:
+    def judge(self, result: Result, designs: int = 1) -> Judgement:
         """The value of each design, and the rows that make it.
 
         Parameters
         ----------
         result : Result
             Of several designs, as many rows of each, one design after the other.
-        along : Along, optional
-            Their motions between the poses, which the result of a single design knows itself.
 
         Raises
         ------
         UnknownColumnError
             If the result has no such column.
         """
-        chosen = choose(result, self.column, dict(self.where))
-        counts = chosen.counts
-        if self.unassembled and "valid" in chosen.table:
-            counts = counts & chosen.table["valid"].astype(bool)
-        shape = designs, len(chosen.values) // designs
-        values, counts = chosen.values.reshape(shape), counts.reshape(shape)
-        found = worst(np.abs(values) if self.absolute else values, counts, largest=self.smallest)
+        chosen = terms_of(result, self.column, dict(self.where))
+        if isinstance(chosen, Sum) or chosen.statistic not in WORST[self.smallest]:
+            numbers = chosen.numbers(designs, assembled=self.unassembled)
+            return Judgement(np.abs(numbers) if self.absolute else numbers, None)
+        absolute = self.absolute or chosen.statistic == "peak"
+        values, counts = chosen.shaped(designs, assembled=self.unassembled)
+        found = worst(np.abs(values) if absolute else values, counts, largest=self.smallest)
         if chosen.table.name == "targets" and chosen.column == "rms" and "motion" in result.tables:
             outputs = {str(name) for name in chosen.table["output"][chosen.counts]}
             if len(outputs) == 1:
-                return Judgement(found, _errors(result, outputs.pop(), designs), squares=True)
+                return Judgement(found, _errors(result, outputs.pop(), found), squares=True)
         alike = designs > 0 and np.ptp(counts.sum(axis=1)) == 0
         rows = values[counts].reshape(designs, -1) if alike else None
-        between = self._between(chosen, along) if self.gate and not self.where else None
-        if between is not None:
-            take = np.fmax if self.smallest else np.fmin
-            found = np.where(np.isnan(found), found, take(found, np.abs(between) if self.absolute else between))
+        if self.asked_of(chosen) is not None and chosen.course is not None:
+            course, take = chosen.course, np.fmax if self.smallest else np.fmin
+            between = course.worst(1 if self.smallest else -1, absolute=absolute)[0]
+            lost = (counts & np.isnan(values)).any(axis=1)
+            found = np.where(lost, np.nan, take(found, np.abs(between) if absolute else between))
             between = np.where(np.isnan(between), found, between)
             rows = None if rows is None else np.column_stack([rows, between])
         return Judgement(found, rows)
 
-    def _between(self, chosen: Chosen, along: Along | None) -> Floats | None:
-        """The worst value of each design's motion between its poses, where that is known."""
-        sign = 1 if self.smallest else -1
-        if along is not None and chosen.table.name in A_ROW_A_POSE and along.follows(chosen.column):
-            return along.worst(chosen.column, sign, absolute=self.absolute)[0]
-        scope = chosen.table.scope
-        value = scope.worst(chosen.column, sign, self.absolute) if scope is not None and scope.worst else None
-        return None if value is None else np.array([value[0]])
+    def asked_of(self, chosen: Chosen) -> Asked | None:
+        """What of a column has to be known between the poses: of conditions, statistics, and parts of a motion."""
+        between = self.gate or chosen.statistic or chosen.part
+        if not between or chosen.picked:
+            return None
+        both = self.absolute or bool(chosen.statistic)
+        return chosen.asked._replace(end=0 if both else 1 if self.smallest else -1)
 
 
 class Judgement(NamedTuple):
@@ -131,7 +130,7 @@ class Judgement(NamedTuple):
         The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
         The signed rows that count, then of a condition the worst between them; None where these are not as many in each
-        design. Of a root mean square over targets, where the result has the motion, errors whose squares have about its
+        design. Of a root mean square over targets, where the result has the motion, errors whose squares have its
         square as their sum.
     squares : bool
         Whether the rows are such errors.
@@ -142,14 +141,20 @@ class Judgement(NamedTuple):
     squares: bool = False
 
 
-def _errors(result: Result, output: str, designs: int) -> Floats:
-    """Errors of an output's target, 0 where it has none, over the root of the number of poses that have it."""
-    motion = result.tables["motion"]
+def _errors(result: Result, output: str, rms: Floats) -> Floats:
+    """Errors of an output's target, in such parts that their squares sum to that of `rms`, shape (designs, errors).
+
+    Of a motion that is followed they are those of a Gauss rule, else those of the poses, 0 where one has no target.
+    """
+    motion, designs = result.tables["motion"], len(rms)
     parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
-    errors = np.stack([motion[name].reshape(designs, -1) for name in parts], axis=1)
-    known = np.isfinite(errors)
-    number = np.maximum(known[:, 0].sum(axis=1), 1)
-    return np.asarray(np.where(known, errors, 0.0) / np.sqrt(number)[:, None, None]).reshape(designs, -1)
+    follow = motion.scope.course if motion.scope is not None else None
+    courses = [follow(Asked(name, (), True)) for name in parts] if follow is not None else [None]
+    followed = [course.at((1 + _NODES) / 2) * np.sqrt(_WEIGHTS) for course in courses if course is not None]
+    columns = followed or [motion[name].reshape(designs, -1) for name in parts]
+    errors = np.nan_to_num(np.concatenate(columns, axis=1))
+    size = np.linalg.norm(errors, axis=1)
+    return np.asarray(errors * np.divide(rms, size, out=np.full(designs, np.nan), where=size > 0)[:, None])
 
 
 def goal(
@@ -179,23 +184,20 @@ def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
     }  # fmt: skip
 
 
-def conditions_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
-    """The worst rows that a section's conditions judge, and where it says so."""
+def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal, KeyPath]:
+    """The worst rows that a section's conditions judge, and where it says so; designs differ in parameters `moved`."""
     given = enumerate(section.subject_to)
-    return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition)}
+    return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition, moved)}
 
 
-def bounds_of(condition: Condition | Containment) -> Iterator[Goal]:
-    """The worst rows that a condition judges, one for each of its bounds; or the scale at which a shape is held."""
+def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:
+    """The worst rows that a condition judges, one for each of its bounds; or the scale at which a shape is held.
+
+    Designs differ in the parameters `moved`.
+    """
     if isinstance(condition, Containment):
-        outline = condition.contains
-        width, height = outline.rectangle or (outline.circle, outline.circle)
-        assert width is not None
-        assert height is not None
-        centre = None if outline.center is None else complex(*(each.nominal for each in outline.center))
-        factor = 1.0 if outline.rectangle else 2.0
-        shape = Shape(factor * width.nominal, factor * height.nominal, not outline.rectangle, centre)
-        yield Goal(f"{shape.name} contained", "workspace", f"scale of {shape.name}", bound=1 - ROUNDING, shape=shape)
+        name = condition.contains.named(moved)
+        yield Goal(f"{name} contained", "workspace", f"scale of {name}", bound=1 - ROUNDING, outline=condition.contains)
         return
     _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):
@@ -206,12 +208,24 @@ def bounds_of(condition: Condition | Containment) -> Iterator[Goal]:
             yield Goal(name, command, column, upper, condition.abs, where, bound, allowed, expression, gate=True)
 
 
+def shape_of(outline: Outline, number: Callable[[float], Any] = float) -> Shape:
+    """The shape that an outline is, by what `number` makes of its numbers: one each, or one for each design."""
+    centre = None
+    if outline.center is not None:
+        x, y = outline.center
+        centre = number(x) + 1j * number(y)
+    if outline.rectangle is not None:
+        width, height = outline.rectangle
+        return Shape(number(width), number(height), False, centre)
+    assert outline.circle is not None
+    return Shape(2 * number(outline.circle), 2 * number(outline.circle), True, centre)
+
+
 def _parts(result: str | Expression) -> tuple[str, str, str, Expression | None]:
     """Name, command, column and expression of what is judged."""
     if isinstance(result, Expression):
         return result.text, "", result.text, result
-    command, _, column = result.partition(".")
-    return (result, command, column, None) if command in COMMANDS else (result, "workspace", result, None)
+    return result, command_of(result) or "workspace", path_of(result), None
 
 
 def unit_of(study: Study, text: str) -> str:

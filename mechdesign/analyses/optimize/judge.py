@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
-from mechdesign.analyses.optimize.evaluation import Evaluated, Evaluator
+from mechdesign.analyses.optimize.batch import Evaluated
+from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, goals_of, unit_of
-from mechdesign.analyses.optimize.variables import Batch, from_cube
+from mechdesign.analyses.optimize.variables import Batch, from_cube, shown
+from mechdesign.analyses.optimize.variables import unit_of as variable_unit
 from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.results import Column
+from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
-from mechdesign.study.schema.reliability import SUFFIXES
+from mechdesign.study.schema.limits import SUFFIXES
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
 DESIGNS_AT_ONCE = 384
@@ -44,9 +48,15 @@ class Designs:
         Estimated errors, of goals that have any.
     codes, words : ndarray of int, list of str
         Why a design cannot be built: ``words[code]``, empty where it can.
+    shortfall : ndarray
+        How far the poses of a design are from assembling; nan where that is not known.
     weights : ndarray, shape (rows, goals)
     meanings : mapping
         Unit and meaning of indices of the workspace, by column.
+    marks : tuple of str
+        What each optimum is, of a front.
+    chosen : ndarray of int
+        Rows of the first optima, of a front; the others are the best for their weights.
     """
 
     study: Study
@@ -57,15 +67,22 @@ class Designs:
     errors: dict[Goal, Floats]
     codes: NDArray[np.int32]
     words: list[str]
+    shortfall: Floats
     weights: Floats
     meanings: Mapping[str, tuple[str, str]]
+    marks: tuple[str, ...] = ()
+    chosen: Ints = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
     def __len__(self) -> int:
         return len(self.codes)
 
-    def numbers(self, row: int) -> dict[str, float]:
-        """The variables of one design."""
-        return {name: float(column[row]) for name, column in self.variables.items()}
+    def design(self, row: int) -> dict[str, float | str]:
+        """The variables of one design: numbers, and words of choices."""
+        return {name: self.shown(name)[row].item() for name in self.variables}
+
+    def shown(self, name: str) -> NDArray[Any]:
+        """A variable of every design: numbers, or words of choices."""
+        return shown(self.study, name, self.variables[name])
 
     @cached_property
     def failures(self) -> dict[str, Flags]:
@@ -110,14 +127,15 @@ class Designs:
 
     @cached_property
     def winners(self) -> Ints:
-        """The best design for each row of weights, the first of equals."""
-        scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights]
-        return np.array([np.argmax(score) for score in scores], dtype=np.intp)
+        """A front's knee and ends, then the best design for each row of weights, the first of equals."""
+        scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights[len(self.chosen) :]]
+        return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
     @property
     def best(self) -> int:
-        """The optimum that is best on the whole."""
-        return int(self.winners[np.argmax(self.cpi[self.winners])])
+        """The optimum that is best on the whole; of a front its knee."""
+        winners = self.winners
+        return int(winners[0 if len(self.chosen) else np.argmax(self.cpi[winners])])
 
     def score(self, row: Floats) -> Floats:
         """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
@@ -150,12 +168,16 @@ class Designs:
         for each in self.goals:
             if each.name == name:
                 return self._unit_and_meaning(each)[0]
-        return self.study.unit_of(name) or ""
+        return variable_unit(self.study, name)
+
+    def unit_of_condition(self, condition: Goal) -> str:
+        """Unit of what a condition bounds; none of the scale of a shape."""
+        return "" if condition.outline is not None else self._unit_and_meaning(condition)[0]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
-        for name, column in self.variables.items():
-            yield Column(name, column[rows], self.unit_of(name), "design variable")
+        for name in self.variables:
+            yield Column(name, self.shown(name)[rows], self.unit_of(name), "design variable")
         for each in self.goals:
             # A parameter that varies is a goal and a variable at once.
             if each.name not in self.variables:
@@ -165,7 +187,7 @@ class Designs:
                 meaning = f"estimated error of {each.name}"
                 yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
         for each in self.conditions:
-            if each.shape is not None:
+            if each.outline is not None:
                 yield Column(each.column, self.found[each][rows], "", self.meanings[each.column][1])
         yield from shared(self.study.units, CPI=self.cpi[rows])
 
@@ -177,7 +199,10 @@ class Designs:
 
     def _coordinate_unit(self, judged: Goal) -> str:
         """Unit of a coordinate, its rates and its error; none where a goal is something else."""
-        column = judged.column.removeprefix("motion.")
+        head, _, word = judged.column.partition(" ")[0].rpartition(".")
+        if word in STATISTICS and STATISTICS[word].pure:
+            return ""
+        column = (head if word in STATISTICS else judged.column).removeprefix("motion.")
         order = next((order for order, suffix in enumerate(SUFFIXES) if suffix and column.endswith(suffix)), 0)
         try:
             quantity = self.study.mechanism.quantity(column.removesuffix(SUFFIXES[order]).removesuffix("_error"))
@@ -227,12 +252,21 @@ class Judge:
         found = np.full((len(u), self.layout.width), np.nan)
         if given.any():
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
+        return self._known(u, found)
+
+    def _known(self, u: Floats, found: Floats) -> Known:
         values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
         margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
         return Known(
             u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
             found[:, self.layout.head :], found[:, self.layout.shortfall],
         )  # fmt: skip
+
+    def nearest(self) -> int | None:
+        """The design, of those that are not feasible, that misses least; None where nothing is known of any."""
+        found = np.concatenate([np.empty((0, self.layout.head)), *self._found])
+        merit = self._known(np.empty((len(found), 0)), found).merit(np.zeros(len(self.goals)))
+        return int(merit.argmin()) if np.isfinite(merit).any() else None
 
     def evaluate(self, designs: Batch) -> Floats:
         """Evaluate designs chunk by chunk; in rows of `layout`, whatever the workers and the journal."""
@@ -275,5 +309,6 @@ class Judge:
             self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
             {each: column for each, column in errors if not np.isnan(column).all()},
-            found[:, self.layout.code].astype(np.int32), [*self._words], weights, meanings,
+            found[:, self.layout.code].astype(np.int32), [*self._words], found[:, self.layout.shortfall], weights,
+            meanings,
         )  # fmt: skip

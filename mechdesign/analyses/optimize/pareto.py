@@ -2,50 +2,116 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from math import comb
+from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.optimize.explorer import Explorer, Spent
+from mechdesign.analyses.optimize.descent import descend
+from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
 from mechdesign.analyses.optimize.judge import Designs
-from mechdesign.analyses.optimize.search import sample
+from mechdesign.analyses.optimize.search import sample, search
+from mechdesign.numerics import fronts
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
 
-# Evaluations for each goal where the study says none.
-FRONT_EVALUATIONS = 1200
-# Generations that a population is given of those that are left.
-GENERATIONS = 25
-SMALLEST_FRONT_POPULATION = 8
-LARGEST_FRONT_POPULATION = 200
+# Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
+FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
+# Parts of them, at most: for the ends of the front before it is spread, and for exact ends after that.
+ENDS_PART, LAST_PART = 3, 20
+# Size of a population of two goals; generations that it is given of the evaluations that are left, at least; and
+# divisions of each goal by which more goals are spread.
+POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
+DIVISIONS = {3: 12, 4: 6, 5: 4}
+MOST_DIVISIONS = 3
+MOST_GENERATIONS = 1_000_000
+# Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
+BESIDE = 1e-6
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
 DESIGN_DISTANCE = 1e-4
-# A front whose hypervolume grows by more than this part in the last tenth of the evaluations is not at its end; of so
-# many goals the volume is computed at most.
-STILL_GROWING, MAX_VOLUME_GOALS = 2e-3, 4
+# A front whose hypervolume grows by more than this part in the last quarter of the designs since it was spread
+# is not at its end; it is looked at after so many generations.
+STILL_GROWING, LOOKS = 1e-3, 20
+# Corner of the hypervolume, in parts of the way from each goal's best value on the front to its worst, and rows of it.
+CORNER, VOLUME_ROWS = 1.1, 20
 
 
-def spread(explorer: Explorer, signs: Floats, seed: int) -> None:
-    """Use the evaluations that are left to spread a population along the front, from its widest gaps so far.
+def allowance(goals: int, *, alone: bool) -> int:
+    """Most evaluations of a front where the study says none; fewer where designs are evaluated one by one."""
+    return (ALONE_FRONT_EVALUATIONS if alone else FRONT_EVALUATIONS) * goals
 
-    `signs`, shape (goals,), are 1 where a goal is minimised, -1 where it is maximised.
+
+def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> int:
+    """Find the front: what is best in each goal alone, then designs between, then the exact ends.
+
+    Returns how many designs were evaluated before a population was spread along the front.
+
+    Parameters
+    ----------
+    signs : ndarray, shape (goals,)
+        1 where a goal is minimised, -1 where it is maximised.
+    use_all : bool
+        Whether all evaluations are used; else it ends when the front's hypervolume no longer grows.
     """
-    size = int(np.clip(explorer.left // GENERATIONS, SMALLEST_FRONT_POPULATION, LARGEST_FRONT_POPULATION))
+    budget, goals = explorer.left, np.eye(len(signs))
+    explorer.left = budget // ENDS_PART
+    search(explorer, (signs > 0).tolist(), goals.tolist(), seed, use_all=False)
+    explorer.left += budget - budget // ENDS_PART
+    explorer.reserve, begun = budget // LAST_PART, explorer.evaluated
+    _spread(explorer, signs, seed, use_all=use_all)
+    explorer.reserve = 0
+    _end(explorer, signs)
+    if use_all:
+        _spread(explorer, signs, seed + 1, use_all=True)
+        # Of a population that is larger than what is left nothing was evaluated.
+        explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
+    return begun
+
+
+def _spread(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
+    """Spread a population along the front, begun in the widest gaps so far."""
+    partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
+    size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
+    size = int(np.clip((explorer.left - explorer.reserve) // GENERATIONS, SMALLEST_POPULATION, size))
     known = explorer.known
     begun = np.flatnonzero(known.feasible)
     if len(begun):
         rows = begun[front(known.values[begun] * signs)]
         begun = rows[np.argsort(-crowding(known.values[rows] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
-    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
+    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed, use_all=use_all)
 
 
-def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
-    """Spread a population along the front by NSGA-II [Deb et al., 2002], from points of shape (points, dimensions)."""
+def _end(explorer: Explorer, signs: Floats) -> None:
+    """Descend to the ends of the front, each goal's best; the others count as far as that one leaves them free."""
+    known = explorer.known
+    rows = np.flatnonzero(known.feasible)
+    if not len(rows):
+        return
+    rows = rows[front(known.values[rows] * signs)]
+    values = known.values[rows] * signs
+    span = np.ptp(values, axis=0)
+    weights = signs / np.where(span > 0, span, np.inf) * (np.eye(len(signs)) + BESIDE)
+    with suppress(Spent):
+        descend(explorer, [(weights[k], int(rows[end])) for k, end in enumerate(ends(normalised(values)))])
+
+
+def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *, use_all: bool = True) -> None:
+    """Spread a population along the front, from points of shape (points, dimensions), while evaluations last.
+
+    Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. Unless all evaluations are to be
+    used it ends when the front's hypervolume no longer grows, or the population brings nothing new.
+    """
     from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.algorithms.moo.nsga3 import NSGA3
     from pymoo.core.evaluator import Evaluator
     from pymoo.core.problem import Problem
     from pymoo.problems.static import StaticProblem
+    from pymoo.util.ref_dirs import get_reference_directions
 
     def outcome(u: Floats) -> tuple[Floats, Floats]:
         rows = explorer(u)
@@ -59,11 +125,18 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
         open_ = 1e3 * (1.0 + np.nan_to_num(known.shortfall[rows], nan=1e9))
         return values, np.column_stack([missing / np.where(worst > 0, worst, 1.0), np.where(valid, 0.0, open_)])
 
+    goals = len(signs)
     try:
         conditions = outcome(first)[1].shape[1]
-        problem = Problem(n_var=explorer.dimensions, n_obj=len(signs), n_ieq_constr=conditions, xl=0.0, xu=1.0)
-        algorithm = NSGA2(pop_size=len(first), sampling=first)
-        algorithm.setup(problem, termination=("n_gen", 100 * GENERATIONS), seed=seed, verbose=False)
+        problem = Problem(n_var=explorer.dimensions, n_obj=goals, n_ieq_constr=conditions, xl=0.0, xu=1.0)
+        if goals == 2:
+            algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
+        else:
+            partitions = DIVISIONS.get(goals, MOST_DIVISIONS)
+            directions = get_reference_directions("das-dennis", goals, n_partitions=partitions)
+            algorithm = NSGA3(ref_dirs=directions, pop_size=len(first), sampling=first)
+        algorithm.setup(problem, termination=("n_gen", MOST_GENERATIONS), seed=seed, verbose=False)
+        begun, before = explorer.evaluated, -1
         while algorithm.has_next():
             asked = algorithm.ask()
             if asked is None or not len(asked):
@@ -71,17 +144,53 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
             values, missing = outcome(np.asarray(asked.get("X"), dtype=float))
             Evaluator().eval(StaticProblem(problem, F=values, G=missing), asked)
             algorithm.tell(infills=asked)
+            if algorithm.n_gen % LOOKS == 0:
+                # Where all designs are known, generations cost nothing and bring nothing.
+                if explorer.evaluated == before:
+                    return
+                before = explorer.evaluated
+                if not use_all and not _grows(explorer.known, signs, begun):
+                    return
     except Spent:
         return
 
 
+def _grows(known: Known, signs: Floats, begun: int) -> bool:
+    """Whether the hypervolume of the front still grows, by the last quarter of what was evaluated since row `begun`."""
+    rows = np.flatnonzero(known.feasible)
+    whole = np.array([len(known.u)])
+    counts = np.concatenate([_last_quarter(begun, whole), whole])
+    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, counts))
+    return bool(last - before > STILL_GROWING * last)
+
+
+def _last_quarter(begun: int, counts: Ints) -> Ints:
+    """Rows at which the last quarter of the designs since row `begun` begins, when so many designs are evaluated."""
+    return np.asarray(counts - np.maximum(counts - begun, 0) // 4)
+
+
+def volumes(values: Floats, counts: Ints) -> list[float]:
+    """Hypervolumes of the fronts of the first so many rows of values, shape (designs, goals), less being better.
+
+    They are in units of the box between each goal's best value on the front of all rows and its worst, and reach a
+    tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
+    """
+    from pymoo.indicators.hv import HV
+
+    if not len(values):
+        return [0.0] * len(counts)
+    last = values[front(values)]
+    low, span = last.min(axis=0), np.ptp(last, axis=0)
+    shares = (values - low) / np.where(span > 0, span, 1.0)
+    volume = HV(ref_point=np.full(values.shape[1], CORNER))
+    parts = [shares[:count] for count in counts]
+    return [float(volume(part[front(part)])) if len(part) else 0.0 for part in parts]
+
+
 def front(values: Floats) -> Ints:
     """Rows of values, shape (designs, goals), that no other surpasses, less being better; of equals the first."""
-    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
-
-    unique, first = np.unique(values, axis=0, return_index=True)
-    rows = NonDominatedSorting().do(unique, only_non_dominated_front=True)
-    return np.sort(first[rows])
+    rows = np.flatnonzero(fronts.front(values))
+    return np.sort(rows[np.unique(values[rows], axis=0, return_index=True)[1]])
 
 
 def normalised(values: Floats) -> Floats:
@@ -94,31 +203,34 @@ def distinct(values: Floats) -> Ints:
     """Rows of a front, its ends among them, of which no two are closer than `DESIGN_DISTANCE` in every goal."""
     share = normalised(values)
     kept: list[int] = []
-    for k in (*_ends(share), *range(len(share))):
+    for k in (*ends(share), *range(len(share))):
         if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > DESIGN_DISTANCE).all():
             kept.append(k)
     return np.sort(np.array(kept, dtype=np.intp))
 
 
-def _ends(share: Floats) -> list[int]:
+def ends(share: Floats) -> list[int]:
     """The best row in each goal; of rows equally good in it the one that is best in the others."""
     return [int(np.lexsort((share.sum(axis=1), column))[0]) for column in share.T]
 
 
-def knee(values: Floats) -> int:
-    """The row farthest from the plane through the extremes of a front (the line, for two goals), towards the ideal.
-
-    Less is better. [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
-    """
+def plane(values: Floats) -> Floats:
+    """Factors of the normalised goals in the plane through the ends of a front, positive, shape (goals,)."""
     share = normalised(values)
     ones = np.ones(share.shape[1])
     try:
-        normal = np.linalg.solve(share[_ends(share)], ones)
+        normal = np.asarray(np.linalg.solve(share[ends(share)], ones), dtype=float)
     except np.linalg.LinAlgError:
         normal = ones
-    if not np.isfinite(normal).all() or (normal <= 0).any():
-        normal = ones
-    return int(np.argmax((1 - share @ normal) / np.linalg.norm(normal)))
+    return normal if np.isfinite(normal).all() and (normal > 0).all() else ones
+
+
+def knee(values: Floats) -> int:
+    """The row farthest from the plane through the ends of a front (the line, for two goals), towards the ideal.
+
+    Less is better. [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
+    """
+    return int(np.argmin(normalised(values) @ plane(values)))
 
 
 def crowding(values: Floats) -> Floats:
@@ -131,41 +243,101 @@ def crowding(values: Floats) -> Floats:
     return np.asarray(calc_crowding_distance(values) * values.shape[1])
 
 
-def doubts(designs: Designs, evaluations: int) -> Iterator[str]:
-    """A warning of a front whose hypervolume still grows in the last tenth of its evaluations.
+@dataclass(frozen=True)
+class Front:
+    """The designs on the front, the best of the first goal first.
 
-    The volume is that between the front and its worst corner, each goal in parts of the front's extent.
+    Parameters
+    ----------
+    rows : ndarray of int
+        Their rows in the designs.
+    values : ndarray, shape (rows, goals)
+        Of their goals, less being better.
     """
-    from pymoo.indicators.hv import HV
 
-    if len(designs.goals) > MAX_VOLUME_GOALS:
-        return
-    rows = np.flatnonzero(designs.feasible)
-    values = designs.values[rows] * [1 if goal.smallest else -1 for goal in designs.goals]
-    last = values[front(values)]
-    low, span = last.min(axis=0), np.ptp(last, axis=0)
-    shares = (values - low) / np.where(span > 0, span, 1.0)
-    volume = HV(ref_point=np.ones(len(designs.goals)))
-    before, whole = (volume(part) if len(part) else 0.0 for part in (shares[rows < 0.9 * len(designs)], shares))
-    growth = 1 - before / whole if whole > 0 else 0.0
-    if growth > STILL_GROWING:
-        yield (f"the front still grows: its hypervolume by {100 * growth:.2g} % in the last tenth of the evaluations; "
+    rows: Ints
+    values: Floats
+
+    @property
+    def knee(self) -> int:
+        """Row of the knee in the designs."""
+        return int(self.rows[knee(self.values)])
+
+    @property
+    def ends(self) -> list[int]:
+        """Rows of the best of each goal in the designs."""
+        return [int(self.rows[k]) for k in ends(normalised(self.values))]
+
+
+def signs_of(designs: Designs) -> Floats:
+    """1 for each goal that is minimised, -1 for one that is maximised."""
+    return np.array([1.0 if goal.smallest else -1.0 for goal in designs.goals])
+
+
+def front_of(designs: Designs) -> Front:
+    """The front over all feasible designs that were evaluated."""
+    feasible = np.flatnonzero(designs.feasible)
+    values = designs.values[feasible] * signs_of(designs)
+    rows = front(values)
+    rows = rows[np.lexsort(values[rows].T[::-1])]
+    rows = rows[distinct(values[rows])]
+    return Front(feasible[rows], values[rows])
+
+
+def optima(designs: Designs, typed: Floats) -> Designs:
+    """The designs with the optima of their front: its knee, its ends, and those of the weights that the study types.
+
+    The weights of the knee are the factors of the goals in the plane from which it is the farthest.
+
+    Parameters
+    ----------
+    typed : ndarray, shape (rows, goals)
+    """
+    found = front_of(designs)
+    inside = designs.values[designs.feasible]
+    ranges, spans = np.ptp(inside, axis=0), np.ptp(found.values, axis=0)
+    weights = plane(found.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
+    rows = np.concatenate([[weights / weights.max()], np.eye(len(weights)), typed])
+    names = ("knee", *(f"best {goal.name}" for goal in designs.goals), *["weights"] * len(typed))
+    chosen = np.array([found.knee, *found.ends], dtype=np.intp)
+    return dataclasses.replace(designs, weights=rows, marks=names, chosen=chosen)
+
+
+def doubts(growth: Table, evaluations: int) -> Iterator[str]:
+    """A warning of a front whose hypervolume still grows in the last quarter of its designs."""
+    share = float(growth["growth"][-1])
+    if share > STILL_GROWING:
+        yield (f"the front still grows: its hypervolume by {100 * share:.2g} % in the last quarter of its designs; "
                f"allow more, e.g. optimize.evaluations: {4 * evaluations}")  # fmt: skip
 
 
-def pareto_table(designs: Designs) -> tuple[Table, int]:
-    """The front over all feasible designs that were evaluated, the best of the first goal first, and its knee's row."""
-    feasible = np.flatnonzero(designs.feasible)
-    values = designs.values[feasible] * [1 if each.smallest else -1 for each in designs.goals]
-    on_front = front(values)
-    on_front = on_front[np.lexsort(values[on_front].T[::-1])]
-    on_front = on_front[distinct(values[on_front])]
-    rows, values = feasible[on_front], values[on_front]
-    marked = np.arange(len(rows)) == knee(values)
+def growth_table(designs: Designs, begun: int) -> Table:
+    """Hypervolume of the front after so many designs, and how it grew; `begun` designs came before it was spread."""
+    rows = np.flatnonzero(designs.feasible)
+    counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
+    earlier = _last_quarter(begun, counts)
+    values = designs.values[rows] * signs_of(designs)
+    volume, before = (np.array(volumes(values, np.searchsorted(rows, ends))) for ends in (counts, earlier))
     columns = (
-        *designs.columns(rows),
-        Column("knee", marked, "", "1 at the design farthest from the plane through the extremes of the front"),
-        Column("crowding", crowding(values), "", "gap between the neighbours on the front; inf at its ends"),
+        Column("designs", counts, "", "designs that were evaluated until then"),
+        Column("front", np.array([len(front(values[: np.searchsorted(rows, count)])) for count in counts]), "",
+               "how many of them no other surpassed"),
+        Column("hypervolume", volume, "", "of their front, in boxes between the last front's best and worst values, "
+               "up to a tenth beyond"),
+        Column("growth", np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0), "",
+               "part of the hypervolume that the last quarter of these designs since it was spread brought"),
+    )  # fmt: skip
+    return Table("hypervolume", columns, "how the front grew, and whether it still does")
+
+
+def pareto_table(designs: Designs) -> Table:
+    """The designs on the front."""
+    found = front_of(designs)
+    columns = (
+        *designs.columns(found.rows),
+        Column(
+            "knee", found.rows == found.knee, "", "1 at the design farthest from the plane through the front's ends"
+        ),
+        Column("crowding", crowding(found.values), "", "gap between the neighbours on the front; inf at its ends"),
     )
-    table = Table("pareto", columns, "designs none of which is surpassed in every goal at once")
-    return table, int(rows[marked][0])
+    return Table("pareto", columns, "designs none of which is surpassed in every goal at once")

@@ -8,55 +8,58 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.optimize.descent import LADDER, ROUGH_LADDER, descend
+from mechdesign.analyses.optimize.descent import descend
 from mechdesign.analyses.optimize.explorer import CONDITION_MISSED, UNKNOWN, Explorer, Known, Spent
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 
-# Evaluations per row of weights and per (variables + 1): the fewest of a start, and the default of a search.
-START_EVALUATIONS = 500
-DEFAULT_EVALUATIONS = 1800
-# That default where designs are evaluated one by one, per (variables + 1) and per row of weights and end of a goal.
-SLOW_DEFAULT_EVALUATIONS = 20
-MAX_STARTS = 12
-# Points of a start's sample per (variables + 1); it takes one in so many of the start's evaluations, at least.
+# Most evaluations of a search where the study says none, per (variables + 1) and per row of weights; and the same where
+# designs are evaluated one by one.
+DEFAULT_EVALUATIONS = 8000
+ALONE_DEFAULT_EVALUATIONS = 200
+# An optimum that so many independent starts came to, and half of all, is confirmed.
+CONFIRMATIONS = 3
+# Points of a start's sample per (variables + 1); it takes at most one in so many of the evaluations that are left.
 SAMPLE_POINTS = 16
-SAMPLE_SHARE = 6
+SAMPLE_SHARE = 3
 # With no more variables than these the cube's vertices join the sample.
 MAX_VERTICES = 4
-# Differential evolution: population per variable, smallest population, the part of a start's evaluations that it takes.
+# Differential evolution: population per variable, smallest population, most evaluations of a start per (variables + 1),
+# and the part of those left that it takes at most.
 POPULATION = 8
 SMALLEST_POPULATION = 24
-EVOLUTION_PART = 0.5
+EVOLUTION = 250
+EVOLUTION_PART = 0.4
 # Generations that improve the objective by less than this part of its range end it; fewer of values with noise.
 STALLED_GAIN = 1e-3
 STALLED_GENERATIONS = 8
 ROUGH_STALLED_GENERATIONS = 3
-# Most descents at once, and the smallest distance between their beginnings, in parts of the ranges.
+# Most descents of a start at once, and the smallest distance between their beginnings, in parts of the ranges.
 MAX_DESCENTS = 6
+ROUGH_MAX_DESCENTS = 2
 START_DISTANCE = 0.05
+# The same of as many descents from the sample, which lead elsewhere.
+SAMPLE_DISTANCE = 0.15
 # Evaluations that a descent takes as a rule, in those of its slopes (2 n + 1).
 DESCENT_EVALUATIONS = 40
-# Rounds of descents in a start: where the search may end early, and where it uses all its evaluations.
-MIN_ROUNDS = 2
-MAX_ROUNDS = 1000
 # Length of the steps that may not improve the optimum, in parts of the ranges, and rounds of such steps.
 CHECK_STEP = 1e-4
 MAX_CHECKS = 12
-# Evaluations kept for these rounds, in those of slopes; those of a root mean square have the narrowest valleys.
+# Half the first width of the boxes of the last descents.
+CHECK_WIDTH = 1e-3
+# Evaluations kept for these rounds, in those of slopes.
 CHECK_EVALUATIONS = 40
-SQUARES_CHECK_EVALUATIONS = 200
 # Improvements below these parts of the objective, and of its range, are rounding; of values known to a tolerance.
 ROUNDING = 1e-9
 RANGE_ROUNDING = 1e-10
 NOISE = 1e-5
 # A descent that gains more than this part of the objective has not come to its end.
 ENDED_GAIN = 1e-6
-# Starts that end within this part of the best agree.
+# Starts that end within this part of the best came to the same; of those within the second it is told how many agree.
+SAME_OPTIMUM = 1e-3
 AGREEMENT = 0.01
 
 
@@ -67,7 +70,7 @@ class Ending:
     Parameters
     ----------
     checked : bool
-        Whether a descent from each optimum came to its end, and no small step improves it.
+        Whether several starts came to each optimum, a descent from there to its end, and no small step improves it.
     ends : list of ndarray
         For each row of weights the objective's smallest value of every start, in the goal's own units where it weighs
         one; nan where a start found no feasible point.
@@ -83,11 +86,9 @@ class Ending:
     best: list[float]
 
 
-def allowance(dimensions: int, rows: int, goals: int, *, slow: bool) -> int:
-    """Evaluations of a search where the study says none."""
-    if slow:
-        return SLOW_DEFAULT_EVALUATIONS * (dimensions + 1) * (rows + 2 * goals)
-    return DEFAULT_EVALUATIONS * (dimensions + 1) * rows
+def allowance(dimensions: int, rows: int, *, alone: bool = False) -> int:
+    """Most evaluations of a search where the study says none; fewer where designs are evaluated one by one."""
+    return (ALONE_DEFAULT_EVALUATIONS if alone else DEFAULT_EVALUATIONS) * (dimensions + 1) * rows
 
 
 def search(
@@ -102,82 +103,83 @@ def search(
     rows : sequence of sequence of float
         Rows of weights.
     use_all : bool
-        Whether all evaluations are used; else it ends when two starts have found the same.
+        Whether all evaluations are used; else it ends when several starts have found the same for each row.
     """
     rng = np.random.default_rng(seed)
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
-    starts = int(np.clip(budget // (START_EVALUATIONS * (explorer.dimensions + 1) * len(rows)), 1, MAX_STARTS))
-    checks = SQUARES_CHECK_EVALUATIONS if any(part.squares for part in explorer.parts) else CHECK_EVALUATIONS
-    last = min(budget // 4, checks * slope * len(rows))
-    begins = []
-    for k, own in enumerate(rng.spawn(starts)):
-        begins.append(budget - explorer.left)
-        explorer.reserve = last + (budget - last) * (starts - 1 - k) // starts
-        _start(explorer, smallest, rows, own, begins[-1], use_all)
-        known, done = explorer.known, [*begins, budget - explorer.left]
-        if not known.feasible.any():
-            # Too few for anything but to look around.
-            explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
-        elif not use_all:
-            objectives = [_weighted(known, smallest, row) for row in rows]
-            if all(_agree(known, objective, _ends(known, objective, done)) for objective in objectives):
-                break
-    begins.append(budget - explorer.left)
+    visits: list[Ints] = []
+    explorer.reserve = min(budget // 4, CHECK_EVALUATIONS * slope * len(rows))
+    _starts(explorer, smallest, rows, rng, visits, use_all)
     explorer.reserve = 0
     try:
         checked = _confirmed(explorer, [_weighted(explorer.known, smallest, row) for row in rows], rng)
     except Spent:
         checked = False
+    size = len(explorer.known.u)
+    if use_all:
+        _starts(explorer, smallest, rows, rng, visits, use_all)
     known = explorer.known
     objectives = [_weighted(known, smallest, row) for row in rows]
-    merits = [known.merit(each) for each in objectives if known.feasible.any()]
+    checked &= all(_reached(known, objective, visits) for objective in objectives)
+    # What was evaluated after the last steps from the optima has not improved them.
+    checked &= all(_best(known, objective) < size for objective in objectives)
+    merits = [known.merit(objective) for objective in objectives if known.feasible.any()]
     rounding = [_rounding(known, merit, merit.min()) for merit in merits] or [0.0] * len(rows)
-    best = [float(_ends(known, each, [0, len(known.u)])[0]) for each in objectives]
-    return Ending(checked, [_ends(known, each, begins) for each in objectives], rounding, best)
+    best = [float(_ends(known, objective, [np.arange(len(known.u))])[0]) for objective in objectives]
+    return Ending(checked, [_ends(known, objective, visits) for objective in objectives], rounding, best)
+
+
+def _starts(
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
+    visits: list[Ints], use_all: bool,
+) -> None:  # fmt: skip
+    """Start until each row's optimum is confirmed, or with `use_all` until evaluations, or designs, are used up.
+
+    The rows of `explorer.known` that each start visits are added to `visits`.
+    """
+    open_ = list(rows)
+    while open_ and explorer.left > explorer.reserve:
+        (own,) = rng.spawn(1)
+        explorer.forget()
+        left = explorer.left
+        try:
+            _start(explorer, smallest, open_, own, first=not visits)
+            visits.append(explorer.visited)
+        except Spent:
+            # Too few for anything but to look around; they are not of a start of their own.
+            explorer(own.random((explorer.left - explorer.reserve, explorer.dimensions)))
+            visits[-1:] = [np.concatenate([*visits[-1:], explorer.visited])]
+            return
+        if explorer.left == left:
+            return
+        if not use_all:
+            known = explorer.known
+            open_ = [row for row in open_ if not _reached(known, _weighted(known, smallest, row), visits)]
 
 
 def _start(
-    explorer: Explorer,
-    smallest: Sequence[bool],
-    rows: Sequence[Sequence[float]],
-    rng: np.random.Generator,
-    begin: int,
-    use_all: bool,
-) -> None:
-    """Search from points of its own, rows of `explorer.known` from `begin` on, until its evaluations are used up.
-
-    Where not all need be used it ends after `MIN_ROUNDS` of descents, or one in which two came to the same.
-    """
+    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
+    *, first: bool,
+) -> None:  # fmt: skip
+    """Search from points of its own; the first start looks for the ends of several goals, too."""
     n, allowed = explorer.dimensions, explorer.left - explorer.reserve
-    ladder = ROUGH_LADDER if explorer.rough else LADDER
-    tried: list[list[int]] = [[] for _ in rows]
-    try:
-        explorer(sample(n, rng, max(SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE), allowed // 3))
-        if begin == 0 and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT_EVALUATIONS * (2 * n + 1):
-            _extremes(explorer, smallest, rng, allowed)
-        for row in rows:
-            most = int(EVOLUTION_PART * allowed) // len(rows)
-            evolve(explorer, _weighted(explorer.known, smallest, row), rng, begin, most)
-        for _ in range(MAX_ROUNDS if use_all else MIN_ROUNDS):
-            room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
-            objectives = [_weighted(explorer.known, smallest, row) for row in rows]
-            promising = [
-                _apart(explorer.known, objective, done, begin, int(np.clip(room, 1, MAX_DESCENTS)))
-                for objective, done in zip(objectives, tried, strict=True)
-            ]
-            found = [(each, k) for each, points in zip(objectives, promising, strict=True) for k in points]
-            ends = descend(explorer, found, ladder)
-            agreed = True
-            for objective, points, done in zip(objectives, promising, tried, strict=True):
-                own, ends = ends[: len(points)], ends[len(points) :]
-                done += [*points, *own]
-                agreed &= _agree(explorer.known, objective, explorer.known.merit(objective)[own])
-            if agreed and not use_all:
-                break
-            if len(found) < len(rows) * MAX_DESCENTS:
-                explorer(rng.random((SAMPLE_POINTS, n)))
-    except Spent:
-        pass
+    if allowed < SMALLEST_POPULATION:
+        raise Spent
+    begin = explorer(sample(n, rng, SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE))
+    if first and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT_EVALUATIONS * (2 * n + 1):
+        _extremes(explorer, smallest, rng, allowed)
+    for row in rows:
+        most = min(EVOLUTION * (n + 1), int(EVOLUTION_PART * allowed) // len(rows))
+        evolve(explorer, _weighted(explorer.known, smallest, row), rng, most)
+    room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
+    most = int(np.clip(room // 2, 1, ROUGH_MAX_DESCENTS if explorer.rough else MAX_DESCENTS))
+    known, descents = explorer.known, []
+    for row in rows:
+        objective = _weighted(known, smallest, row)
+        apart = _apart(known, objective, explorer.visited, most, START_DISTANCE)
+        apart += _apart(known, objective, np.setdiff1d(begin, apart), most, SAMPLE_DISTANCE)
+        descents += [(objective, k) for k in apart]
+    descend(explorer, descents)
 
 
 def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
@@ -185,35 +187,32 @@ def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Gener
     goals = len(smallest)
     ends = [sign * line for line in np.eye(goals) for sign in (1.0, -1.0)]
     for goal, down in enumerate(smallest):
-        evolve(explorer, ends[2 * goal + (not down)], rng, 0, int(EVOLUTION_PART * allowed) // (4 * goals))
-    descend(explorer, [(end, k) for end in ends for k in _apart(explorer.known, end, [], 0, 1)], ROUGH_LADDER[1:])
+        evolve(explorer, ends[2 * goal + (not down)], rng, int(EVOLUTION_PART * allowed) // (4 * goals))
+    descend(explorer, [(end, k) for end in ends for k in [_best(explorer.known, end)]])
 
 
-def _apart(known: Known, objective: Floats, tried: Sequence[int], begin: int, most: int) -> list[int]:
-    """Rows of the best points with a value that lie apart from each other and from those that were tried."""
-    merit = known.merit(objective)[begin:]
+def _apart(known: Known, objective: Floats, rows: Ints, most: int, distance: float) -> list[int]:
+    """The best of some rows that lie apart from each other."""
+    merit, u = known.merit(objective)[rows], known.u[rows]
     found: list[int] = []
-    free = np.isfinite(merit) & known.valid[begin:]
-    for k in tried:
-        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > START_DISTANCE
+    free = np.isfinite(merit)
     while free.any() and len(found) < most:
-        k = begin + int(np.argmin(np.where(free, merit, np.inf)))
-        found.append(k)
-        free &= np.abs(known.u[begin:] - known.u[k]).max(axis=1) > START_DISTANCE
+        k = int(np.argmin(np.where(free, merit, np.inf)))
+        found.append(int(rows[k]))
+        free &= np.abs(u - u[k]).max(axis=1) > distance
     return found
 
 
 def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.Generator) -> bool:
     """Whether no small step improves the best point of any objective; descends from where one does."""
     n, open_ = explorer.dimensions, list(objectives)
-    ladder: Sequence[tuple[float, float]] = ROUGH_LADDER[-1:] if explorer.rough else LADDER
     for _ in range(MAX_CHECKS):
         known = explorer.known
         starts = [_best(known, each) for each in open_]
         if not known.feasible[starts].all():
             return False
         before = [known.merit(each)[start] for each, start in zip(open_, starts, strict=True)]
-        descend(explorer, list(zip(open_, starts, strict=True)), ladder, final=True)
+        descend(explorer, list(zip(open_, starts, strict=True)), width=CHECK_WIDTH)
         bests = [_best(explorer.known, each) for each in open_]
         steps = [np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))]) for _ in open_]
         points = [explorer.known.u[best] + CHECK_STEP * around for best, around in zip(bests, steps, strict=True)]
@@ -227,7 +226,7 @@ def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.
                 moving.append(each)
         if not moving:
             return True
-        open_, ladder = moving, ladder[-1:]
+        open_ = moving
     return False
 
 
@@ -241,17 +240,28 @@ def _rounding(known: Known, merit: Floats, value: float, part: float = ROUNDING)
     return part * abs(value) + RANGE_ROUNDING * float(np.ptp(inside) if inside.size else 0.0)
 
 
-def _ends(known: Known, objective: Floats, begins: Sequence[int]) -> Floats:
+def _ends(known: Known, objective: Floats, visits: Sequence[Ints]) -> Floats:
     """The best that each start found, nan where that is not feasible."""
-    merit = np.where(known.feasible, known.merit(objective), np.nan)
-    parts = [merit[a:b] for a, b in pairwise(begins)]
-    return np.array([np.nan if np.isnan(part).all() else np.nanmin(part) for part in parts])
+    merit = np.where(known.feasible, known.merit(objective), np.inf)
+    ends = np.array([merit[rows].min(initial=np.inf) for rows in visits])
+    return np.where(np.isfinite(ends), ends, np.nan)
 
 
-def _agree(known: Known, objective: Floats, found: Floats) -> bool:
-    """Whether the two smallest of some values of an objective are feasible and the same."""
-    two = np.sort(found[found < CONDITION_MISSED])[:2]
-    return len(two) == 2 and bool(np.ptp(two) <= _rounding(known, known.merit(objective), two[0]))
+def _reached(known: Known, objective: Floats, visits: Sequence[Ints]) -> bool:
+    """Whether `CONFIRMATIONS` starts, and half of all, came to the best value of an objective.
+
+    Where nothing is feasible twice as many are to come to the least that conditions are missed by.
+    """
+    if known.feasible.any():
+        ends, needed = _ends(known, objective, visits), CONFIRMATIONS
+        least = float(known.merit(objective).min())
+        same = max(SAME_OPTIMUM * abs(least), _rounding(known, known.merit(objective), least))
+    else:
+        merit, needed = known.merit(objective), 2 * CONFIRMATIONS
+        ends = np.array([merit[rows].min(initial=np.inf) for rows in visits]) / CONDITION_MISSED - 1
+        least = float(ends.min())
+        same = SAME_OPTIMUM * least
+    return bool(np.isfinite(least)) and int((ends <= least + same).sum()) >= max(needed, len(ends) / 2)
 
 
 def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> Floats:
@@ -275,11 +285,11 @@ def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> F
     return np.asarray(np.asarray(row) * signs / np.where(span > 0, span, np.inf))
 
 
-def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begin: int = 0, most: int = 1000) -> None:
-    """Differential evolution, a generation a batch, begun with the best known points and some others.
+def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, most: int) -> None:
+    """Differential evolution, a generation a batch, begun with the best visited points and some others.
 
-    It begins with rows of `explorer.known` from `begin` on, and evaluates `most` points.
-    [Storn & Price, Differential evolution, 1997; scipy.optimize.differential_evolution.]
+    It evaluates at most `most` points. [Storn & Price, Differential evolution, 1997;
+    scipy.optimize.differential_evolution.]
     """
     from scipy.optimize import differential_evolution
 
@@ -289,30 +299,31 @@ def evolve(explorer: Explorer, objective: Floats, rng: np.random.Generator, begi
     size = max(SMALLEST_POPULATION, POPULATION * explorer.dimensions)
     if most < size:
         return
-    order = begin + np.argsort(explorer.known.merit(objective)[begin:], kind="stable")
+    rows = explorer.visited
+    order = rows[np.argsort(explorer.known.merit(objective)[rows], kind="stable")]
     best, others = order[: size // 2], order[size // 2 :]
     chosen = np.concatenate([best, rng.permutation(others)[: size - len(best)]])
-    first = explorer.known.u[chosen]
-    if len(first) < size:
-        first = np.concatenate([first, rng.random((size - len(first), explorer.dimensions))])
-    merits: list[float] = []
+    population = explorer.known.u[chosen]
+    if len(population) < size:
+        population = np.concatenate([population, rng.random((size - len(population), explorer.dimensions))])
+    lowest: list[float] = []
     most_stalled = ROUGH_STALLED_GENERATIONS if explorer.rough else STALLED_GENERATIONS
 
     def energies(u: Floats) -> Floats:
         rows = explorer(u.T)
         merit = explorer.known.merit(objective)[rows]
+        lowest.append(min([float(merit.min()), *lowest[-1:]]))
         return np.asarray(np.where(np.isfinite(merit), merit, UNKNOWN))
 
     def stalls(x: Floats, convergence: float) -> bool:
-        merit = explorer.known.merit(objective)[begin:]
-        merits.append(float(merit.min()))
-        if len(merits) <= most_stalled:
+        if len(lowest) <= most_stalled:
             return False
-        inside = merit[merit < CONDITION_MISSED]
-        gained = merits[-1 - most_stalled] - merits[-1]
-        return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(merits[-1])))
+        known = explorer.known
+        inside = known.merit(objective)[known.feasible]
+        gained = lowest[-1 - most_stalled] - lowest[-1]
+        return bool(gained <= STALLED_GAIN * (float(np.ptp(inside)) if inside.size else abs(lowest[-1])))
 
     begin_evolution(
-        energies, [(0.0, 1.0)] * explorer.dimensions, init=first, vectorized=True, updating="deferred",
+        energies, [(0.0, 1.0)] * explorer.dimensions, init=population, vectorized=True, updating="deferred",
         maxiter=most // size, polish=False, tol=1e-3, recombination=0.9, callback=stalls, seed=rng,
     )  # fmt: skip

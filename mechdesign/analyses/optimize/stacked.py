@@ -2,47 +2,43 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics import analysis as kinematics
 from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.answers import along_of
+from mechdesign.analyses.kinematics.courses import course_of
 from mechdesign.analyses.kinematics.extremes import extremes, targets_table
-from mechdesign.analyses.kinematics.loops import loops_table
-from mechdesign.analyses.kinematics.motion import Motion, motion_question, move
+from mechdesign.analyses.kinematics.loops import loops_table, measured
+from mechdesign.analyses.kinematics.motion import motion_question, move
+from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.analyses.kinematics.targets import followed
-from mechdesign.analyses.poses import SolvedPoses, study_poses
+from mechdesign.analyses.poses import SolvedPoses, alike, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.expressions import Expression
+from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.four_bars import four_bars
-from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.results import Result, Table
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.results import Result, Scope
+from mechdesign.statistics import Asked
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, stacked
-from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import follows
+from mechdesign.study.designs import Designs
+from mechdesign.study.poses import Poses
+from mechdesign.study.variants import remeasured
 
-_OF_MOTION: Mapping[str, Callable[[Motion], Table]] = {
-    "motion": kinematics.motion_table,
-    "jacobian": kinematics.jacobian_table,
-    "instant_centres": kinematics.centres_table,
-}
 TABLES: Mapping[str, Collection[str]] = {
-    "kinematics": (*_OF_MOTION, "extremes", "loops", "targets"),
-    "stiffness": ("stiffness", "compliance", "deflections"),
+    "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
+    # A design may have more springs than another.
+    "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
-# Sections beside a command's own whose numbers it reads.
-ALSO_READ: Mapping[str, Collection[str]] = {
-    "kinematics": ("workspace",), "stiffness": ("kinematics",), "reliability": ("kinematics", "stiffness"),
-}  # fmt: skip
 
 
 class Stack(NamedTuple):
@@ -67,99 +63,52 @@ class Stack(NamedTuple):
     solved: list[SolvedPoses]
 
 
-def possible(study: Study, command: str, names: Collection[str]) -> bool:
-    """Whether a command's answers for designs that differ in parameters or places are found at once.
+def complete(study: Study, command: str) -> bool:
+    """Whether these tables are all of a command's answer that costs much: not where methods sample."""
+    return command != "reliability" or (
+        study.reliability is not None and set(study.reliability.methods) == {"analytic"}
+    )
 
-    They are not where more than the geometry of the poses depends on them.
+
+def shared(study: Study, command: str, names: Collection[str]) -> bool:
+    """Whether designs that differ in parameters or places share one mechanism and one set of sections.
+
+    They do not where what differs decides how the mechanism is put together: each is a study of its own then.
     """
-    mechanism, section = study.mechanism, getattr(study, command)
-    graph, joints, links = mechanism.graph, mechanism.description.joints, mechanism.description.links
-    places = study.parameters.moved_places(names)
-    if follows(_without_poses(study), names, (command, *ALSO_READ[command])):
-        return False
-    # Angles of slides and clamps in a ring may contradict each other, which is found design by design.
-    turned = any(place.rpartition(".")[0] in joints or place.endswith((".x", ".y")) for place in places)
-    if turned and len(graph.ties) > len(graph.bodies) - graph.classes:
-        return False
-    asked_of = [each for each in (section, study.kinematics) if each is not None]
-    # Without poses the drive moves between its limits.
-    given = any(each.poses or each.sweep or each.path for each in asked_of)
-    if not given and any(place.startswith("limits.") for place in places):
+    if remeasured(study, names):
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
-    if any(each.at_nodes for each in asked_of) or any(
-        mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
-    ):
-        return False
-    if command == "reliability" and not _first_order(study, names):
-        return False
-    # The order of the points along an elastic link is found once; loads deflect what is made, too.
-    elastic = study.stiffness.elastic if command != "kinematics" and study.stiffness is not None else ()
-    bent = tuple(f"{name}." for name in elastic if len(links[name].points) > 2)
-    return not any(place.startswith(bent) for place in places)
+    asked = [each for each in (getattr(study, command), study.kinematics) if each is not None]
+    return not any(each.at_nodes for each in asked) and not any(
+        study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
+    )
 
 
-def _without_poses(study: Study) -> Study:
-    """The study without its listed poses, whose numbers may differ from design to design."""
-    resolved = dict(study.resolved)
-    for name, part in resolved.items():
-        if isinstance(part, dict) and part.get("poses", "workspace") != "workspace":
-            resolved[name] = {key: value for key, value in part.items() if key != "poses"}
-    return dataclasses.replace(study, resolved=resolved)
+def grouped(
+    designs: Designs, command: str, rows: Ints, failed: Callable[[Ints, MechdesignError], None]
+) -> Iterator[tuple[Ints, Study, Poses]]:
+    """Some designs in groups that share a study and have as many poses: their rows, the study, and the poses.
 
-
-def _first_order(study: Study, names: Collection[str]) -> bool:
-    """Whether only the first order is asked, and what a source moves does not depend on parameters or places."""
-    section = study.reliability
-    if section is None or set(section.methods) != {"analytic"}:
-        return False
-    reached = {name for name in section.dimensions if name in study.parameters.nominal}
-    for name, formula in {**study.parameters.formulas, **study.parameters.dependent}.items():
-        if formula.names & reached:
-            if not formula.is_linear() or name in names:
-                return False
-            reached.add(name)
-    return True
-
-
-def poses_of(
-    study: Study, command: str
-) -> Callable[[int, Mapping[str, ArrayLike], Mapping[str, ArrayLike]], Poses]:  # fmt: skip
-    """A function of a number of designs and their places and parameters, of shape (designs,), to a command's poses."""
-    one, formulas = study_poses(study, command), _formulas(study, command)
-
-    def of(designs: int, places: Mapping[str, ArrayLike], parameters: Mapping[str, ArrayLike]) -> Poses:
-        poses = stacked(one, designs, places, parameters)
-        values: Mapping[str, Any] = {**study.parameters.nominal, **parameters}
-        for group in poses.groups if formulas else ():
-            which = group.rows.reshape(designs, -1)[0]
-            for column, k in enumerate(which.tolist()):
-                for name in group.names:
-                    if (k, name) in formulas:
-                        group.values[name].reshape(designs, -1)[:, column] = formulas[k, name].evaluate(values)
-        return poses
-
-    return of
-
-
-def _formulas(study: Study, command: str) -> Mapping[tuple[int, str], Expression]:
-    """Expressions of a command's listed poses, by the pose's number and the coordinate."""
-    for name in dict.fromkeys((command, "kinematics")):
-        section = getattr(study, name)
-        if section is not None and section.poses:
-            given = enumerate(study.resolved[name]["poses"])
-            texts = {(k, c): text for k, pose in given for c, text in pose.items() if isinstance(text, str)}
-            factor = study.units.angle_factor
-            parsed = {at: Expression.parse(text, factor) for at, text in texts.items() if not QUANTITY.fullmatch(text)}
-            return {at: formula for at, formula in parsed.items() if formula.names}
-        if section is not None and (section.sweep or section.path):
-            break
-    return {}
+    `failed` is told of designs whose numbers make no study or no poses.
+    """
+    if shared(designs.study, command, designs.changed):
+        for some in alike(designs, command, rows):
+            try:
+                yield some, designs.study, study_poses(designs.study, command, designs.take(some).numbers)
+            except MechdesignError as error:
+                failed(some, error)
+        return
+    for k in rows.tolist():
+        try:
+            study = designs.one(k)
+            yield np.array([k]), study, study_poses(study, command)
+        except MechdesignError as error:
+            failed(np.array([k]), error)
 
 
 def tables(
     study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None,
-    columns: Collection[str] = (),
+    asked: Collection[Asked] = (),
 ) -> Stack:  # fmt: skip
     """Answers of a command for the poses of several designs.
 
@@ -169,24 +118,24 @@ def tables(
         Names of tables.
     outputs : collection of str, optional
         Of the extremes; all where left out.
-    columns : collection of str
-        Others that are followed between the poses.
+    asked : collection of Asked
+        Columns that are followed between the poses.
     """
     solved: list[SolvedPoses] = []
     absent: Mapping[str, str] = {}
     along = None
     if command == "kinematics":
-        motion = move(dataclasses.replace(motion_question(study), poses=poses), also=solved.append)
+        motion = move(motion_question(study, poses), also=solved.append)
         question, absent = motion.question, motion.question.absent
-        known = {"motion": True, "jacobian": question.square, "instant_centres": bool(question.centres)}
-        found = {name: make(motion) for name, make in _OF_MOTION.items() if name in wanted and known[name]}
         loops = four_bars(study.mechanism) if "loops" in wanted else ()
         errors = [name for name, _ in followed(study, poses)] if "targets" in wanted else []
-        along = kinematics.along_of(question, outputs, loops, also=[*columns, *errors])
+        along = along_of(question, outputs, loops, also=errors, asked=asked)
+        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}
         if "extremes" in wanted:
             found["extremes"] = extremes(motion, along, outputs)
         if loops:
-            found["loops"] = loops_table(question, loops, along)
+            found["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
         if motion.errors and "targets" in wanted:
             found["targets"] = targets_table(motion, along)
         reason = motion.reason
@@ -194,9 +143,8 @@ def tables(
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
         body = stiffness.ask(study)
-        held = stiffness.solve(study, body, poses)
-        found, reason = stiffness.tables(study, body, poses, held), held.reason
-        found = {name: table for name, table in found.items() if name in TABLES[command]}
+        held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
+        found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
     return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.judge import Designs, Judge
-from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, steps
+from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, ranges, steps
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -34,7 +34,9 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
         if name not in variables and np.ndim(value) and all(name != each.name for each in designs.goals)
     }
     weights = zip(designs.goals, designs.weights.T, strict=True)
+    marks = (Column("what", np.array(designs.marks, dtype=object), "", "what the design is on the Pareto front"),)
     columns = (
+        *(marks if designs.marks else ()),
         *(Column(f"w_{each.name}", column, "", f"weight of {each.name}") for each, column in weights),
         *designs.columns(rows),
         *(
@@ -69,6 +71,26 @@ def designs_table(designs: Designs) -> Table:
     return Table("designs", columns, "every design that was evaluated")
 
 
+def nearest_table(designs: Designs, row: int) -> Table:
+    """What a design that is not feasible has of each condition, and what it misses."""
+    if word := designs.words[designs.codes[row]]:
+        found = [(word, np.nan, np.nan, designs.shortfall[row], "")]
+    else:
+        found = [
+            (each.name, value := designs.found[each][row], each.bound, max(0.0, -each.margin(value)), unit)
+            for each, unit in zip(designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True)
+        ]
+    names, values, bounds_of, missing, units = zip(*found, strict=True)
+    columns = (
+        Column("condition", np.array(names, dtype=object), "", "what is asked, or why it cannot be built"),
+        Column("value", np.array(values), "", "what the design has, in `unit`"),
+        Column("bound", np.array(bounds_of), "", "what is asked for, in `unit`"),
+        Column("missing", np.array(missing), "", "by how much the bound is missed, in `unit`; 0 where it is met"),
+        Column("unit", np.array(units, dtype=object), "", "unit of the three columns before"),
+    )
+    return Table("nearest", columns, "conditions of the design that is nearest to a feasible one")
+
+
 def bounds_table(designs: Designs) -> Table:
     """Extremes of each goal, by which it is normalised, and where they are."""
     names = [*(each.name for each in designs.goals), "CPI"]
@@ -79,8 +101,8 @@ def bounds_table(designs: Designs) -> Table:
         Column("min", values[low, np.arange(len(names))], "", "smallest value"),
         Column("max", values[high, np.arange(len(names))], "", "largest value"),
     ]
-    for name, column in designs.variables.items():
-        unit = designs.unit_of(name)
+    for name in designs.variables:
+        unit, column = designs.unit_of(name), designs.shown(name)
         columns += [
             Column(f"{name}_at_min", column[low], unit, f"{name} of the design with the smallest value"),
             Column(f"{name}_at_max", column[high], unit, f"{name} of the design with the largest value"),
@@ -103,7 +125,10 @@ def best_table(designs: Designs) -> Table:
             chosen.append((row + 1, rank + 1, k, float(score[k])))
             near = np.ones(len(score), dtype=bool)
             for name, column in designs.variables.items():
-                apart = max(BEST_DISTANCE * float(np.ptp(column)), gridded * float(step[name][row]) * (1 + 1e-6))
+                # Another choice is another design.
+                apart = 0.0
+                if name in step:
+                    apart = max(BEST_DISTANCE * float(np.ptp(column)), gridded * float(step[name][row]) * (1 + 1e-6))
                 near &= np.abs(column - column[k]) <= apart
             score[near] = -np.inf
     row_numbers, ranks, picked, scores = (np.array(column) for column in zip(*chosen, strict=True))
@@ -126,7 +151,7 @@ def _active(designs: Designs) -> NDArray[np.object_]:
     at = {name: column[rows] for name, column in designs.variables.items()}
     step = steps(study, at)
     held: list[list[str]] = [[] for _ in rows]
-    for name in at:
+    for name in step:
         low, high = bounds(study, at, name, len(rows))
         near = AT_BOUND * (high - low) + BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         above = np.maximum(near, step[name] * (1 - 1e-6)) if study.optimize.method == "grid" else near
@@ -142,19 +167,21 @@ def _active(designs: Designs) -> NDArray[np.object_]:
 
 
 def sensitivity_table(designs: Designs, judge: Judge) -> Table:
-    """How the score changes a step down and a step up each variable, the others held."""
-    study, names = designs.study, list(designs.variables)
+    """How the score changes a step down and a step up each variable that has a range, the others held."""
+    study, variables, names = designs.study, list(designs.variables), ranges(designs.study)
     at = {name: column[designs.winners] for name, column in designs.variables.items()}
-    step = np.stack([*steps(study, at).values()], axis=1)
     optima = np.stack([*at.values()], axis=1)
-    # By optimum, variable and direction.
-    moves = np.array([-1.0, 1.0])[:, None] * np.eye(len(names))[:, None]
-    moved = optima[:, None, None] + moves * step[:, None, None]
-    inside = _inside(study, dict(zip(names, moved.reshape(-1, len(names)).T, strict=True))).reshape(moved.shape[:-1])
+    step = np.array([*steps(study, at).values()]).reshape(len(names), len(optima)).T
+    # By optimum, range and direction.
+    ranged = [variables.index(name) for name in names]
+    moves = np.array([-1.0, 1.0])[:, None] * np.eye(len(variables))[ranged][:, None]
+    moved = optima[:, None, None] + moves * step[:, :, None, None]
+    neighbours = dict(zip(variables, moved.reshape(-1, len(variables)).T, strict=True))
+    inside = _inside(study, neighbours).reshape(moved.shape[:-1])
     inside &= (moved != optima[:, None, None]).any(axis=-1)
     asked, back = np.unique(moved[inside], axis=0, return_inverse=True)
     judge.progress.start(len(asked), "neighbours of the optimum")
-    found, layout = judge.evaluate(dict(zip(names, asked.T, strict=True))), judge.layout
+    found, layout = judge.evaluate(dict(zip(variables, asked.T, strict=True))), judge.layout
     values, feasible = found[:, layout.values], found[:, layout.code] == 0
     for each in judge.conditions:
         feasible &= each.met(values[:, layout.column[each]])
@@ -168,9 +195,9 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
     meaning = "change of the score one step {}, nan where that leaves the bounds or is infeasible"
     columns = (
         Column("optimum", np.repeat(np.arange(len(optima)) + 1, len(names)), "", "row of optimum.csv"),
-        Column("variable", np.array(names * len(optima)), "", "design variable; the others are held"),
-        Column("value", optima.ravel(), "", "at the optimum, in `unit`"),
-        Column("step", step.ravel(), "", "the grid's, else a hundredth of the range, in `unit`"),
+        Column("variable", np.array(names * len(optima)), "", "design variable that has a range; the others are held"),
+        Column("value", optima[:, ranged].ravel(), "", "at the optimum, in `unit`"),
+        Column("step", step.ravel(), "", "the variable's own, else a hundredth of the range, in `unit`"),
         Column(
             "unit",
             np.array([designs.unit_of(name) for name in names] * len(optima)),
@@ -186,7 +213,8 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
 def _inside(study: Study, designs: Batch) -> Flags:
     """Which designs lie inside all bounds."""
     found = np.ones(len(next(iter(designs.values()))), dtype=bool)
-    for name, values in designs.items():
+    for name in ranges(study):
+        values = designs[name]
         low, high = bounds(study, designs, name, len(values))
         slack = BOUND_ROUNDING * np.maximum(np.abs(low), np.abs(high))
         found &= (low - slack <= values) & (values <= high + slack)

@@ -1,14 +1,22 @@
-"""Design variables, whose bounds may depend on each other: their grid, and their map to the unit cube."""
+"""Design variables, whose bounds may depend on each other: their grid, their map to the unit cube, and their studies.
+
+A design is a number of each variable; of a variable whose choices are no numbers that is the number of the choice.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
+from mechdesign.study.designs import variant
+from mechdesign.study.schema.variable import Variable, plainly
+from mechdesign.study.variants import entry_unit, faults, with_entries
 
 # A step that ends this little (as a fraction of it) beyond the bound is still taken, as in sweeps.
 BOUND_ROUNDING = 1e-9
@@ -16,38 +24,109 @@ MAX_DESIGNS = 50_000_000
 
 # Designs by the values of their variables, each of shape (designs,).
 Batch = Mapping[str, Floats]
+# One design by its variables: numbers, and the words of choices that are none.
+Design = Mapping[str, float | str]
+
+
+def variables_of(study: Study) -> Mapping[str, Variable]:
+    """The design variables of a study."""
+    assert study.optimize is not None
+    return study.optimize.variables
+
+
+def ranges(study: Study) -> list[str]:
+    """Variables that have a range rather than choices."""
+    return [name for name, variable in variables_of(study).items() if variable.choices is None]
+
+
+def stepped(study: Study) -> Flags:
+    """Which variables have nothing between their values, shape (variables,): whole numbers and choices."""
+    return np.array([variable.stepped for variable in variables_of(study).values()])
 
 
 def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats]:
-    """Bounds of a variable where those above it have these values; each of shape (count,)."""
-    assert study.optimize is not None
-    variable = study.optimize.variables[name]
+    """Bounds of a range where the variables above it have these values; each of shape (count,).
+
+    Those of whole numbers are the first and the last between the bounds given.
+    """
+    variable = variables_of(study)[name]
+    assert variable.from_ is not None
+    assert variable.to is not None
     parameters = {key: value for key, value in designs.items() if key in study.parameters.nominal}
     env = {**study.parameters.values(parameters), **designs}
     with np.errstate(all="ignore"):
         low, high = (np.asarray(bound.evaluate(env), dtype=float) for bound in (variable.from_, variable.to))
+        if variable.integer:
+            slack = BOUND_ROUNDING * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
+            low, high = np.ceil(low - slack), np.floor(high + slack)
     return np.broadcast_to(low, count), np.broadcast_to(high, count)
 
 
+def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats, Floats]:
+    """First value, step and number of values of a variable that has steps, each of shape (count,).
+
+    Of choices they number the choices. The number is 0 where no value lies between the bounds.
+    """
+    variable = variables_of(study)[name]
+    if variable.choices is not None:
+        return np.zeros(count), np.ones(count), np.full(count, float(len(variable.choices)))
+    low, high = bounds(study, designs, name, count)
+    with np.errstate(invalid="ignore"):
+        if variable.step is not None or variable.integer:
+            step = np.full(count, float(variable.step or 1))
+            counts = np.floor((high - low) / step + BOUND_ROUNDING) + 1
+        else:
+            counts = np.where(high >= low, float(variable.number or 1), 0.0)
+            step = (high - low) / np.maximum(counts - 1, 1)
+    return low, step, np.where(np.isfinite(counts), np.maximum(counts, 0), 0)
+
+
+def _valued(variable: Variable, numbers: Floats) -> Floats:
+    """Values of a variable by what `_spaced` numbers them."""
+    if variable.choices is None or not variable.numeric:
+        return numbers
+    return np.array(variable.choices, dtype=float)[numbers.astype(np.intp)]
+
+
 def from_cube(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags]:
-    """Designs at points of the unit cube, and which of them have a range for every variable.
+    """Designs at points of the unit cube, and which of them have a value for every variable.
 
     Parameters
     ----------
     u : ndarray, shape (designs, variables)
-        Fractions of the way from each lower bound to the upper one.
+        Fractions of the way from each lower bound to the upper one; whole numbers and choices have equal shares of it.
     """
-    assert study.optimize is not None
+    return _placed(study, u)[:2]
+
+
+def snapped(study: Study, u: Floats) -> Floats:
+    """Points of the unit cube, shape (designs, variables), in the middle of the shares of whole numbers and choices.
+
+    Points that are the same design are the same point then.
+    """
+    return _placed(study, u)[2]
+
+
+def _placed(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags, Floats]:
+    """See `from_cube` and `snapped`."""
     designs: dict[str, Floats] = {}
-    given = np.ones(len(u), dtype=bool)
-    for k, name in enumerate(study.optimize.variables):
-        low, high = bounds(study, designs, name, len(u))
-        well = np.isfinite(low) & np.isfinite(high) & (high >= low)
+    given, middle = np.ones(len(u), dtype=bool), u.copy()
+    for k, (name, variable) in enumerate(variables_of(study).items()):
+        share = u[:, k]
+        if variable.stepped:
+            low, step, counts = _spaced(study, designs, name, len(u))
+            well = counts > 0
+            index = np.clip(np.floor(share * counts), 0, np.maximum(counts - 1, 0))
+            middle[well, k] = (index[well] + 0.5) / counts[well]
+            designs[name] = _valued(variable, np.where(well, low + index * step, 0.0))
+        else:
+            low, high = bounds(study, designs, name, len(u))
+            well = np.isfinite(low) & np.isfinite(high) & (high >= low)
+            low, high = np.where(well, low, 0.0), np.where(well, high, 0.0)
+            # The upper bound itself, not what rounding makes of it.
+            designs[name] = np.where(share == 1, high, low + share * (high - low))
         given &= well
-        low, high = np.where(well, low, 0.0), np.where(well, high, 0.0)
-        # The upper bound itself, not what rounding makes of it.
-        designs[name] = np.where(u[:, k] == 1, high, low + u[:, k] * (high - low))
-    return designs, given
+    return designs, given, middle
 
 
 def grid(study: Study) -> dict[str, Floats]:
@@ -58,42 +137,102 @@ def grid(study: Study) -> dict[str, Floats]:
     StudyError
         If the grid is empty, or larger than any computer would finish.
     """
-    assert study.optimize is not None
     columns: dict[str, Floats] = {}
-    for name, variable in study.optimize.variables.items():
-        rows = len(next(iter(columns.values()), [0]))
-        low, high = bounds(study, columns, name, rows)
-        with np.errstate(invalid="ignore"):
-            if variable.step is not None:
-                counts, step = np.floor((high - low) / variable.step + BOUND_ROUNDING) + 1, np.full(rows, variable.step)
-            else:
-                counts = np.where(high >= low, float(variable.number or 1), 0.0)
-                step = (high - low) / np.maximum(counts - 1, 1)
-        counts = np.where(np.isfinite(counts), np.maximum(counts, 0), 0)
+    for name, variable in variables_of(study).items():
+        low, step, counts = _spaced(study, columns, name, len(next(iter(columns.values()), [0])))
         total = int(counts.sum())
         if not 0 < total <= MAX_DESIGNS:
             message = "no value lies between 'from' and 'to' for any design"
             if total:
                 message = f"the grid has {total} designs; {MAX_DESIGNS} is the limit: take larger steps"
             raise StudyError((study.problem(message, "optimize", "variables", name),))
-        counts = counts.astype(int)
-        index = np.arange(total) - np.repeat(np.cumsum(counts) - counts, counts)
-        columns = {key: np.repeat(values, counts) for key, values in columns.items()}
-        columns[name] = np.repeat(low, counts) + index * np.repeat(step, counts)
+        each = counts.astype(int)
+        index = np.arange(total) - np.repeat(np.cumsum(each) - each, each)
+        columns = {key: np.repeat(values, each) for key, values in columns.items()}
+        columns[name] = _valued(variable, np.repeat(low, each) + index * np.repeat(step, each))
     return columns
 
 
 def steps(study: Study, at: Batch) -> dict[str, Floats]:
-    """A step of each variable at some designs: of the grid, else a hundredth of its range there."""
-    assert study.optimize is not None
+    """A step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range there."""
     found = {}
-    for name, variable in study.optimize.variables.items():
+    for name in ranges(study):
+        variable = variables_of(study)[name]
         low, high = bounds(study, at, name, len(at[name]))
         intervals = 100 if variable.number is None else max(variable.number - 1, 1)
-        found[name] = (high - low) / intervals if variable.step is None else np.full(len(low), variable.step)
+        fixed = variable.step or float(variable.integer)
+        found[name] = np.full(len(low), fixed) if fixed else (high - low) / intervals
     return found
 
 
-def in_words(row: Mapping[str, float]) -> str:
-    """``l_min = 1.15, l_a = 1``."""
-    return ", ".join(f"{name} = {value:g}" for name, value in row.items())
+def shown(study: Study, name: str, values: Floats) -> NDArray[Any]:
+    """Values of a variable as tables have them: numbers, or the words of its choices."""
+    words = variables_of(study)[name].words
+    return np.array(words)[values.astype(np.intp)] if words else values
+
+
+def unit_of(study: Study, name: str) -> str:
+    """Unit of a variable, where it is known; none of words."""
+    if name in study.parameters.known():
+        return study.unit_of(name) or ""
+    return entry_unit(study, name) if variables_of(study)[name].numeric else ""
+
+
+def entry_of(study: Study, name: str, value: float | str) -> tuple[str, Any]:
+    """The entry that a value of a variable changes, by the name that ``--set`` takes, and what stands there then.
+
+    The value is a number, or the word of a choice.
+    """
+    variable = variables_of(study)[name]
+    own = f"mechanism.parameters.{name}" if name in study.parameters.nominal else name
+    if isinstance(value, str):
+        assert variable.choices is not None
+        return own, variable.choices[variable.words.index(value)]
+    return own, plainly(value)
+
+
+def parted(study: Study, design: Design) -> tuple[Study, dict[str, float]]:
+    """The study with the entries of a design, and the parameters and dimensions in which the design differs from it.
+
+    Raises
+    ------
+    StudyError
+        If the entries make no study.
+    """
+    known = study.parameters.known()
+    changes = [entry_of(study, name, value) for name, value in design.items() if name not in known]
+    numbers = {name: float(value) for name, value in design.items() if name in known}
+    return with_entries(study, changes) if changes else study, numbers
+
+
+def study_of(study: Study, design: Design) -> Study:
+    """The study of a design; see `mechdesign.study.designs.Designs.one` of what it raises."""
+    return variant(*parted(study, design))
+
+
+def check_choices(study: Study) -> None:
+    """Load the study with each choice of an entry, alone.
+
+    Raises
+    ------
+    StudyError
+        Where the entry itself is wrong then, every mistake in one go; what is wrong only together with other choices
+        is the reason of an infeasible design.
+    """
+    # As they are written, for their units must fit.
+    choices = {
+        name: study.resolved["optimize"]["variables"][name]["choices"]
+        for name, variable in variables_of(study).items()
+        if variable.choices is not None and name not in study.parameters.known()
+    }
+    problems = [
+        study.problem(message, "optimize", "variables", name, "choices", k)
+        for name, values in choices.items() for k, message in faults(study, name, values)
+    ]  # fmt: skip
+    if problems:
+        raise StudyError(problems)
+
+
+def in_words(row: Design) -> str:
+    """``l_min = 1.15, section = tube``."""
+    return ", ".join(f"{name} = {value if isinstance(value, str) else f'{value:g}'}" for name, value in row.items())

@@ -21,6 +21,9 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 Places = Mapping[str, Value]
+# Names, beside those of dimensions, of what may differ from design to design: values of the held coordinates, by their
+# place among them, and the characteristic length. No name in a study has a colon.
+HELD, LENGTH = "held:", "length:"
 # Determinants below this part of the largest of those at some distances (of the mechanism's size) from the point's
 # place in the sketch are rounding.
 ROUNDING, SHARES = 1e-12, (0.03, 0.1, 0.3, 1.0)
@@ -62,7 +65,8 @@ class Field:
         Unlike `Plan.solve` this leaves finite what does not depend on a leg that cannot reach, so that margins keep
         their sign and smoothness there.
         """
-        given: list[Value] = [z.real, z.imag, *self.held]
+        held = [places.get(f"{HELD}{k}", value) for k, value in enumerate(self.held)]
+        given: list[Value] = [z.real, z.imag, *held]
         if self.plan.iterative:
             return self._poses(z, places)[0]
         vectors = self.mechanism.geometry.vectors(places)

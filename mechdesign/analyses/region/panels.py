@@ -12,7 +12,7 @@ import numpy as np
 
 from mechdesign.analyses.region.breaks import TOGETHER, all_breaks
 from mechdesign.analyses.region.raster import Raster
-from mechdesign.analyses.region.rays import FARTHEST_TURN, SAME_ROOT, Designs, Intervals, ray_through, trace
+from mechdesign.analyses.region.rays import FARTHEST_TURN, SAME_ROOT, Designs, Intervals, joined, ray_through, trace
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
@@ -36,6 +36,8 @@ class Panels:
     ----------
     design, low, high : ndarray, shape (panels,)
         Design and range of angle of each panel.
+    cut : ndarray of bool, shape (designs,)
+        Whether margins of the assembly leave out anything of a region that the others bound.
     reach : ndarray, shape (designs,)
         Radius beyond the whole region of each design.
     closes : ndarray of bool, shape (designs,)
@@ -52,6 +54,7 @@ class Panels:
     design: Ints
     low: Floats
     high: Floats
+    cut: Flags
     reach: Floats
     closes: Flags
     intervals: Ints
@@ -59,8 +62,15 @@ class Panels:
     unseen: Floats
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
-        """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`."""
-        return trace(self.designs, design, theta, self.reach[design], slack)
+        """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`.
+
+        Margins of the assembly are only looked at where they are known to cut something.
+        """
+        cut = self.cut[design]
+        parts = [(self.designs, np.flatnonzero(cut)), (self.designs.in_any_assembly, np.flatnonzero(~cut))]
+        parts = [(designs, own) for designs, own in parts if own.size] or parts[:1]
+        found = [trace(designs, design[own], theta[own], self.reach[design[own]], slack) for designs, own in parts]
+        return joined([own for _, own in parts], found)
 
     def through(self, design: Ints, z: Complexes) -> tuple[Floats, Intervals, Flags]:
         """Angles of rays through places, their intervals, and which of these hold the place; none does off the scan."""
@@ -106,12 +116,13 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     found, breaks = all_breaks(designs, reach, intervals, design, angle)
     every, fixed = np.repeat(every, 2 + len(cuts)), np.tile([*scan, *cuts], count)
     owner, low, high = _between(every, fixed, found, breaks)
-    some = np.arange(len(low))
+    some, cut = np.arange(len(low)), raster.cut | (np.bincount(design, intervals.cut, count) > 0)
     for _ in range(LOOKS):
         # Two rays may be alike though two breaks lie between them: then others between them are not, or links jump.
         of, rays = np.tile(owner[some], (len(PROBES), 1)), low[some] + (high - low)[some] * PROBES[:, None]
         wide = (high - low)[some] > TOGETHER / PROBES[0]
         traced = trace(designs, of.ravel(), rays.ravel(), reach[of.ravel()])
+        cut |= np.bincount(of.ravel(), traced.cut, count) > 0
         counts = traced.counts.reshape(rays.shape)
         unlike = (np.ptp(counts, axis=0) > 0) & wide
         panel, between, jumps = _turn_by_turn(designs, of, rays, traced, reach, wide & ~unlike)
@@ -133,7 +144,8 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     full = (counts > 0) | (high - low < NARROW)
     closes = np.bincount(design, intervals.counts, count) > 0
     area, doubt = raster.area
-    return Panels(designs, owner[full], low[full], high[full], reach, closes, counts[full], area - doubt, raster.unseen)
+    return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - doubt,
+                  raster.unseen)  # fmt: skip
 
 
 def _turn_by_turn(

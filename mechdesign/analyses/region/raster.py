@@ -28,6 +28,8 @@ AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 FARTHEST = 1.0
 # Times that a cell is divided in which a sliver may lie, and parts each way.
 DIVISIONS, PARTS = 3, 4
+# Cells around those of the scan that are looked at, too.
+RING = 2
 # Times that a box is doubled whose outermost cells lie inside, where the mechanism's dimensions give no bound.
 DOUBLINGS = 12
 
@@ -39,7 +41,8 @@ class Raster:
     A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
     lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
     the region, shape (designs, rows, columns). And places in holes, and in slivers of the region, that no centre met,
-    with their designs, and the area in which slivers may lie that are still thinner.
+    with their designs, and the area in which slivers may lie that are still thinner. And of which designs
+    margins of the assembly exclude a centre that no other margin does.
     """
 
     designs: Designs
@@ -49,26 +52,30 @@ class Raster:
     holes: tuple[Ints, Complexes]
     slivers: tuple[Ints, Complexes]
     unseen: Floats
+    cut: Flags
 
     @staticmethod
     def of(designs: Designs) -> Raster:
         """Look at places of each design, as many as the effort says each way, those within the scan."""
         cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
+        of_assembly = sum(name.startswith("assembly ") for _, name in designs.field.labels)
         for _ in range(DOUBLINGS):
             none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
-            blank = np.zeros((designs.count, cells, cells), dtype=bool)
+            blank, cut = np.zeros((designs.count, cells, cells), dtype=bool), np.zeros(designs.count, dtype=bool)
             found, holes = (
-                Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count)),
+                Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count), cut),
                 [none],
             )
             slivers = [none]
-            for some, z in found._centres(np.arange(designs.count)):
-                inside, margins = designs.look(z, some)
+            for some, part, z in found._centres(np.arange(designs.count)):
+                good, margins = designs.look(z.reshape(-1, len(some)), some)
+                inside, margins = good.reshape(z.shape), margins.reshape(-1, *z.shape)
+                scanned = ray_through(z - designs.about, begin) <= end
+                cut[some] = (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
                 holes.append(found._between_centres(some, z, margins, inside))
-                slivers.append(found._thin(some, z, margins, inside))
-                inside &= ray_through(z - designs.about, begin) <= end
-                found.inside[some] = inside.T.reshape(-1, cells, cells)
+                slivers.append(found._thin(some, z, margins, inside, scanned))
+                found.inside[some, *part] = np.moveaxis(scanned & inside, 2, 0)
             rim = found.inside.copy()
             rim[:, 1:-1, 1:-1] = False
             open_ = rim.any(axis=(1, 2)) & ~bounded
@@ -82,34 +89,31 @@ class Raster:
             slivers=(np.concatenate(thin), np.concatenate(within)),
         )  # fmt: skip
 
-    def _thin(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
+    def _thin(
+        self, some: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
+    ) -> tuple[Ints, Complexes]:  # fmt: skip
         """Designs and places in the region where no centre around is: cells that no margin excludes are divided.
 
         Once, and then as long as that takes no more places than the raster. Parts left are unseen where nothing is met
         in the cell and every margin is positive somewhere around.
         """
-        size = self.inside.shape[1]
-        shape = size, size, len(some)
-        place, centre = z.reshape(shape), inside.reshape(shape)
-        for axis in (0, 1):
-            ahead, behind = (np.roll(centre, step, axis) for step in (1, -1))
-            centre = centre | ahead | behind
-        row, column, lane = np.nonzero(_open(margins.reshape(len(margins), *shape)) & ~centre)
+        row, column, lane = _open(margins, *np.nonzero(scanned & ~_spread(inside)))
         design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
         owner, found, whole = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
         rises = np.zeros(len(lane), dtype=bool)
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
         for division in range(DIVISIONS):
-            if not len(design) or (division and len(design) * len(x) > z.size):
+            if not len(design) or (division and len(design) * len(x) > inside.size):
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
             good, margins = self.designs.look(part, design, assembly=True)
             met = good.any(axis=0)
             found[whole[met]] = part[good.argmax(axis=0), np.arange(len(design))][met]
-            left = _open(margins.reshape(len(margins), PARTS, PARTS, len(design))) & ~met
-            at, lane = np.nonzero(left.reshape(len(x), len(design)))
+            unmet = np.nonzero(np.broadcast_to(~met, (PARTS, PARTS, len(design))))
+            row, column, lane = _open(margins.reshape(len(margins), PARTS, PARTS, len(design)), *unmet)
+            at = row * PARTS + column
             design, place, cell, whole = design[lane], part[at, lane], cell[lane], whole[lane]
             rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
         met = ~np.isnan(found)
@@ -122,14 +126,12 @@ class Raster:
         From the lowest of neighbouring centres a parabola through the places around leads on: it is exact for squares
         of distances.
         """
-        size = self.inside.shape[1]
-        values = margins.reshape(len(margins), size, size, -1)
-        here = values[:, 1:-1, 1:-1]
-        low = np.repeat(inside.reshape(1, size, size, -1)[:, 1:-1, 1:-1], len(values), axis=0)
-        for beside in (values[:, 1:-1, :-2], values[:, 1:-1, 2:], values[:, :-2, 1:-1], values[:, 2:, 1:-1]):
+        here = margins[:, 1:-1, 1:-1]
+        low = np.repeat(inside[None, 1:-1, 1:-1], len(margins), axis=0)
+        for beside in (margins[:, 1:-1, :-2], margins[:, 1:-1, 2:], margins[:, :-2, 1:-1], margins[:, 2:, 1:-1]):
             low &= here <= beside
         margin, row, column, lane = np.nonzero(low)
-        place, cell = z[(row + 1) * size + column + 1, lane], self.cell[some[lane]]
+        place, cell = z[row + 1, column + 1, lane], self.cell[some[lane]]
         each, places = np.arange(len(lane)), self.designs.of(some[lane])
         good = np.ones(len(lane), dtype=bool)
         for step in PARABOLAS:
@@ -168,9 +170,9 @@ class Raster:
     def farthest(self) -> Floats:
         """Distance from the centre within which all cells inside lie, shape (designs,); 0 where there is none."""
         found = np.zeros(len(self.low))
-        for some, z in self._centres(np.arange(len(self.low))):
-            inside = self.inside[some].reshape(len(some), -1).T
-            distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=0)
+        for some, part, z in self._centres(np.arange(len(self.low))):
+            inside = np.moveaxis(self.inside[some, *part], 0, 2)
+            distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=(0, 1))
             found[some] = np.where(distance > 0, distance + np.abs(self.cell[some]), 0.0)
         return found
 
@@ -202,39 +204,92 @@ class Raster:
 
     def _looked_at(self, designs: Ints) -> Iterator[tuple[Ints, Complexes, Flags]]:
         """Designs, places, and whether they lie inside: centres of the cells of some designs, and in slivers."""
-        for some, z in self._centres(designs):
-            yield np.tile(some, len(z)), z.ravel(), self.inside[some].reshape(len(some), -1).T.ravel()
+        for some, part, z in self._centres(designs):
+            yield np.broadcast_to(some, z.shape).ravel(), z.ravel(), np.moveaxis(self.inside[some, *part], 0, 2).ravel()
         owner, place = self.slivers
         own = np.isin(owner, designs)
         yield owner[own], place[own], np.ones(int(own.sum()), dtype=bool)
 
-    def _centres(self, designs: Ints) -> Iterator[tuple[Ints, Complexes]]:
-        """Some of the designs, and centres of their cells, shape (cells, designs), row by row."""
-        size = self.inside.shape[1]
-        place = np.arange(size) + 0.5
-        x, y = np.tile(place, size)[:, None], np.repeat(place, size)[:, None]
+    def _centres(self, designs: Ints) -> Iterator[tuple[Ints, tuple[slice, slice], Complexes]]:
+        """Some of the designs, the rows and columns around the scan, and centres of the cells there.
+
+        They are of shape (rows, columns, designs).
+        """
+        size, about = self.inside.shape[1], self.designs.about
+        place, (least, most) = np.arange(size) + 0.5, _sides(self.designs.scan)
         step = max(1, BLOCK // size**2)
         for k in range(0, len(designs), step):
             some = designs[k : k + step]
             low, cell = self.low[some], self.cell[some]
-            yield some, low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
+            part = []
+            for begin, width, centre, first, last in (
+                (low.imag, cell.imag, about.imag, least.imag, most.imag),
+                (low.real, cell.real, about.real, least.real, most.real),
+            ):
+                at = (centre - begin) / width
+                start = int(np.clip(at.min() - RING, 0, size - 1)) if first == 0 else 0
+                stop = int(np.clip(at.max() + 1 + RING, 1, size)) if last == 0 else size
+                part.append(slice(start, stop))
+            y, x = place[part[0], None, None], place[part[1], None]
+            yield some, (part[0], part[1]), low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
 
 
-def _open(margins: Floats) -> Flags:
-    """Cells (rows, columns, lanes) none of whose margins falls so far below zero as it changes to the next cell."""
-    change = np.zeros_like(margins)
+def _sides(scan: tuple[float, float]) -> tuple[complex, complex]:
+    """Least and largest x and y of the directions of a scan, or 0 if that is beyond."""
+    begin, end = scan
+    quarters = 0.5 * np.pi * np.arange(np.ceil(begin / (0.5 * np.pi)), np.floor(end / (0.5 * np.pi)) + 1)
+    way = np.round(np.exp(1j * np.array([begin, *quarters, end])), 9)
+    return complex(way.real.min(initial=0), way.imag.min(initial=0)), complex(
+        way.real.max(initial=0), way.imag.max(initial=0)
+    )
+
+
+def _spread(cells: Flags) -> Flags:
+    """Cells (rows, columns, designs) with those around them."""
+    for axis in (0, 1):
+        before = np.moveaxis(cells, axis, 0)
+        after = before.copy()
+        after[1:] |= before[:-1]
+        after[:-1] |= before[1:]
+        cells = np.moveaxis(after, 0, axis)
+    return cells
+
+
+def _open(margins: Floats, row: Ints, column: Ints, lane: Ints) -> tuple[Ints, Ints, Ints]:
+    """Those of the given cells none of whose margins falls so far below zero as it changes to the next cell.
+
+    Margins are of shape (margins, rows, columns, lanes).
+    """
+    for margin in margins:
+        most = margin[row, column, lane]
+        below = np.flatnonzero(~(most > 0))
+        most[below] = _most(margin, row[below], column[below], lane[below])
+        unknown = np.flatnonzero(np.isnan(most))
+        if unknown.size:
+            # What is unknown beside where a leg is stretched is as it is at the next cell.
+            beside = _beside(margin, row[unknown], column[unknown])
+            most[unknown] = np.fmax.reduce([_most(margin, *place, lane[unknown]) for place in beside])
+        keep = most > 0
+        row, column, lane = row[keep], column[keep], lane[keep]
+    return row, column, lane
+
+
+def _most(margin: Floats, row: Ints, column: Ints, lane: Ints) -> Floats:
+    """A margin at cells, and its change to the next cell, whichever is the largest."""
+    here, change = margin[row, column, lane], np.zeros(len(row))
     with np.errstate(invalid="ignore"):
-        for axis in (1, 2):
-            step = np.nan_to_num(np.abs(np.diff(margins, axis=axis)))
-            last = [(0, 0)] * 4
-            for pad in ((1, 0), (0, 1)):
-                last[axis] = pad
-                change = np.maximum(change, np.pad(step, last))
-        most = margins + change
-        around = [np.roll(most, step, axis) for axis in (1, 2) for step in (1, -1)]
-        # What is unknown beside where a leg is stretched is as it is at the next cell.
-        most = np.where(np.isnan(most), np.fmax.reduce(around), most)
-        return np.asarray((most > 0).all(axis=0))
+        for place in _beside(margin, row, column):
+            change = np.fmax(change, np.abs(margin[*place, lane] - here))
+        return here + np.minimum(change, np.finfo(float).max)
+
+
+def _beside(margin: Floats, row: Ints, column: Ints) -> list[tuple[Ints, Ints]]:
+    """Rows and columns of the cells beside some; at the rim those themselves."""
+    rows, columns = margin.shape[:2]
+    return [
+        (np.maximum(row - 1, 0), column), (np.minimum(row + 1, rows - 1), column),
+        (row, np.maximum(column - 1, 0)), (row, np.minimum(column + 1, columns - 1)),
+    ]  # fmt: skip
 
 
 def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:

@@ -8,9 +8,9 @@ their roots.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -97,6 +97,11 @@ class Designs:
     effort: Effort
     centres: Complexes | None = None
 
+    @cached_property
+    def in_any_assembly(self) -> Designs:
+        """The same without margins of the assembly."""
+        return replace(self, field=replace(self.field, same_assembly=False))
+
     def of(self, index: Ints) -> Places:
         """Dimensions of the designs `index`, in the shape of `index`."""
         return {name: np.asarray(value)[index] for name, value in self.places.items()}
@@ -147,6 +152,8 @@ class Intervals:
         Margin that is zero there; -1 where it begins at the centre or is not closed within the reach.
     beyond : ndarray of bool, shape (rays,)
         Rays still inside at their reach.
+    cut : ndarray of bool, shape (rays,)
+        Rays of which margins that are not quadratic along them, such as those of the assembly, leave out something.
     """
 
     ray: Ints
@@ -155,6 +162,7 @@ class Intervals:
     enters: Ints
     leaves: Ints
     beyond: Flags
+    cut: Flags
 
     @property
     def counts(self) -> Ints:
@@ -194,15 +202,20 @@ def trace(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: f
         designs.traced(design[k : k + BLOCK], theta[k : k + BLOCK], reach[k : k + BLOCK], slack)
         for k in range(0, max(len(theta), 1), BLOCK)
     ]
+    starts = np.arange(len(parts)) * BLOCK
+    return joined([start + np.arange(len(part.beyond)) for start, part in zip(starts, parts, strict=True)], parts)
+
+
+def joined(rays: Sequence[Ints], parts: Sequence[Intervals]) -> Intervals:
+    """Intervals of rays of which parts were traced apart; `rays` are the numbers of the rays of each part."""
     if len(parts) == 1:
         return parts[0]
-    starts = np.arange(len(parts)) * BLOCK
-
-    def join(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    first = np.repeat(starts, [len(part.ray) for part in parts])
-    return Intervals(join("ray") + first, *(join(end) for end in ("inner", "outer", "enters", "leaves", "beyond")))
+    ray = np.concatenate([own[part.ray] for own, part in zip(rays, parts, strict=True)])
+    of_ray, order = np.argsort(np.concatenate(rays)), np.argsort(ray, kind="stable")
+    each = ([getattr(part, name) for part in parts] for name in ("inner", "outer", "enters", "leaves"))
+    whole = ([getattr(part, name) for part in parts] for name in ("beyond", "cut"))
+    ends, flags = ([np.concatenate(values)[at] for values in some] for some, at in ((each, order), (whole, of_ray)))
+    return Intervals(ray[order], *ends, *flags)
 
 
 def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
@@ -218,6 +231,7 @@ def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, s
         a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
     margin, ray, turn, x, start = _quadratic_roots(a, b, c)
     found = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
+    found = replace(found, cut=np.zeros(len(theta), dtype=bool))
     if not (quadratic.all() and not designs.field.same_assembly):
         found = _others(designs, places, start_of, direction, found, quadratic, slack, reach)
     return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
@@ -457,20 +471,31 @@ def _replace(found: Intervals, lanes: Ints, part: Intervals, tie: Floats) -> Int
     order = np.lexsort((inner, owner))
     beyond = np.zeros(len(found.beyond), dtype=bool)
     beyond[owner[leaves < 0]] = True
-    return Intervals(owner[order], inner[order], outer[order], enters[order], leaves[order], beyond)
+    cut = found.cut.copy()
+    cut[found.ray[lanes]] = True
+    return Intervals(owner[order], inner[order], outer[order], enters[order], leaves[order], beyond, cut)
 
 
 def intervals_between(
     margin: Ints, ray: Ints, turn: Ints, radius: Floats, start: Ints, reach: Floats, slack: float
 ) -> Intervals:
-    """Put the roots of each ray in order and keep the stretches where no margin is negative."""
+    """Put the roots of each ray in order and keep the stretches where no margin is negative; all may be `cut`."""
     rays = len(reach)
     key = radius + np.where(turn < 0, slack * reach[ray], 0.0)
-    order = np.lexsort((margin, -turn, key, ray))
-    margin, ray, turn, radius = margin[order], ray[order], turn[order], radius[order]
-    first = np.searchsorted(ray, np.arange(rays))
+    order = _ascending(margin + np.where(turn < 0, margin.max(initial=0) + 1, 0))
+    order = order[_ascending(ray[order])]
+    margin, ray, turn = (values[order] for values in (margin, ray, turn))
+    radius, key = radius[order], key[order]
+    number = np.bincount(ray, minlength=rays)
+    first, slot = np.cumsum(number) - number, np.arange(number.max(initial=0))
+    # One row a ray: it has few roots.
+    has = slot < number[:, None]
+    rows = np.full(has.shape, np.inf)
+    rows[has] = key
+    order = (first[:, None] + np.argsort(rows, axis=1, kind="stable"))[has]
+    margin, turn, radius = margin[order], turn[order], radius[order]
     total = np.cumsum(-turn)
-    before = np.where(first > 0, total[first - 1], 0) if len(total) else np.zeros(rays, dtype=int)
+    before = np.append(0, total)[first]
     negative = total - before[ray] + start[ray]
     # An interval begins at a root after which nothing is negative, or at the centre.
     begins = np.nonzero(negative == 0)[0]
@@ -481,18 +506,23 @@ def intervals_between(
     inner = np.concatenate([np.zeros(len(central)), radius[begins]])
     enters = np.concatenate([np.full(len(central), -1), margin[begins]])
     owner = np.concatenate([central, ray[begins]])
-    has = ends[np.minimum(first[central], len(ray))] == central
-    last = np.concatenate([np.where(has, first[central], -1), np.where(closed, after, -1)]).astype(np.intp)
+    last = np.append(np.where(number[central] > 0, first[central], -1), np.where(closed, after, -1)).astype(np.intp)
     outer = np.where(last >= 0, np.append(radius, 0.0)[last], reach[owner])
     leaves = np.where(last >= 0, np.append(margin, -1)[last], -1)
-    sort = np.lexsort((inner, owner))
-    owner, inner, outer, enters, leaves = (v[sort] for v in (owner, inner, outer, enters, leaves))
+    if central.size:
+        sort = np.lexsort((inner, owner))
+        owner, inner, outer, enters, leaves = (v[sort] for v in (owner, inner, outer, enters, leaves))
     beyond = np.zeros(rays, dtype=bool)
     beyond[owner[leaves < 0]] = True
     tie = SAME_ROOT * reach
     enters = _first_named(owner, inner, enters, margin[turn > 0], ray[turn > 0], radius[turn > 0], tie)
     leaves = _first_named(owner, outer, leaves, margin[turn < 0], ray[turn < 0], radius[turn < 0], tie)
-    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond)
+    return Intervals(owner, inner, np.maximum(outer, inner), enters, leaves, beyond, np.ones(rays, dtype=bool))
+
+
+def _ascending(values: Ints) -> Ints:
+    """Stable order of small numbers."""
+    return np.argsort(values.astype(np.min_scalar_type(values.max(initial=0))), kind="stable")
 
 
 def _first_named(owner: Ints, at: Floats, label: Ints, margin: Ints, ray: Ints, radius: Floats, tie: Floats) -> Ints:

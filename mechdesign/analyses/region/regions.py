@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.field import HELD, LENGTH, Field
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism.derivatives import mixes
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study import Study
+from mechdesign.study.expansion import Numbers
 from mechdesign.study.schema.workspace import Over, WorkspaceSection
+from mechdesign.study.text.units import Amount
 
 # Rays of the tables of local indices and of the boundary, unless the study says how many.
 RAYS = 181
@@ -31,6 +35,8 @@ class Region:
         First and last angle of the rays (radians).
     rays : int or None
         As the study asks.
+    followed : mapping of str to Amount
+        Numbers of the field that follow parameters, by the names under which it takes them beside the dimensions.
     """
 
     field: Field
@@ -38,6 +44,12 @@ class Region:
     about: complex
     scan: tuple[float, float]
     rays: int | None
+    followed: dict[str, Amount]
+
+    def places(self, numbers: Numbers) -> dict[str, Floats]:
+        """What differs from design to design as the field takes it, each of shape (designs,)."""
+        moved = {name: amount for name, amount in self.followed.items() if numbers.moves(amount)}
+        return {**numbers.places, **{name: numbers.of(amount) for name, amount in moved.items()}}
 
 
 def regions(study: Study) -> list[Region]:
@@ -87,9 +99,22 @@ def regions(study: Study) -> list[Region]:
         Region(
             replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
             dict(zip(section.at, values, strict=True)), about, _scan(section, unit), section.scan.rays,
+            _followed(values, factors, section.characteristic_length),
         )
         for values in itertools.product(*held)
     ]  # fmt: skip
+
+
+def _followed(held: Sequence[float], factors: Sequence[float], length: float | None) -> dict[str, Amount]:
+    """Held values, each with its factor from the study's units, and the characteristic length, that follow parameters.
+
+    They are amounts, if they do.
+    """
+    found = {f"{HELD}{k}": Amount.by("value*factor", value=v, factor=f)
+             for k, (v, f) in enumerate(zip(held, factors, strict=True))}  # fmt: skip
+    if length is not None:
+        found[LENGTH] = Amount.of(length)
+    return {name: amount for name, amount in found.items() if amount.expression is not None}
 
 
 def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:

@@ -125,8 +125,10 @@ def first_order_tables(
     StudyError
         If nothing varies.
     """
-    task, _, _ = _first_order(study, poses, find_sources(study)[0])
-    found = [methods.run("analytic", task)]
+    task, _, _ = _first_order(study, poses, find_sources(study, poses)[0])
+    found = [MethodResult("analytic", normal=(task.linear.shift(), task.linear.covariance()))]
+    if "reliability" in wanted:
+        found = [with_cycle(methods.run("analytic", task), task, ())]
     made = [tables.moments(task, found)] if "moments" in wanted else []
     if "reliability" in wanted and task.question.limited:
         made.append(tables.success(task, found))
@@ -144,8 +146,8 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
     """
     mechanism, section = study.mechanism, study.reliability
     assert section is not None
-    question = ask(study, section)
-    bent, doubts = elasticity(study)
+    question = ask(study, poses.section(section))
+    bent, doubts = elasticity(study, poses)
     channels = question.channels
     reason = np.zeros(poses.count, dtype=np.int8)
     nominal = np.full((len(channels), poses.count), np.nan)
@@ -166,11 +168,12 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
             block = np.arange(begin, min(begin + _POSES_TOGETHER, len(rows)))
             part, here = configuration.take(block), None
             if bent is not None and elastic is not None:
-                here = bent.at(part, channels)
+                here = bent.at(part, channels, rows[block])
                 elastic.flexibility[:, :, rows[block]] = here.flexibility
             with np.errstate(invalid="ignore", divide="ignore"):
-                found = linear_errors(mechanism, part, channels, sources, rates.take(block), here)
-                margins = linear_margins(mechanism, part, sources)
+                own = sources.take(rows[block])
+                found = linear_errors(mechanism, part, channels, own, rates.take(block), here)
+                margins = linear_margins(mechanism, part, own)
             linear.components[:, :, rows[block]] = found.components
             if not len(closing.components):
                 closing = FirstOrder.unknown(sources, len(margins.components), poses.count)

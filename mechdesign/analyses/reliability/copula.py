@@ -15,9 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import Marginal, Normal
+from mechdesign.analyses.reliability.laws import Marginal, Normal, taken
 from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Floats
+from mechdesign.expressions import Number
+from mechdesign.numerics.arrays import Floats, Ints
 
 # Panels over a normal variable, besides the kinks of its law, and nodes in each.
 _EDGES = np.linspace(-9.0, 9.0, 241)
@@ -32,15 +33,34 @@ _MAX_CORRELATION = 0.999999
 class Correlation:
     """Coefficients of the deviations, and the root of those of the normal variables behind them, shape (laws, laws).
 
-    ``root @ u`` are correlated normal variables of independent ones.
+    ``root @ u`` are correlated normal variables of independent ones. Where designs differ in them, (poses, laws, laws).
     """
 
     coefficients: Floats
     root: Floats
 
+    def take(self, rows: Sequence[int] | Ints) -> Correlation:
+        """At some of many poses."""
+        return self if self.root.ndim == 2 else Correlation(self.coefficients[rows], self.root[rows])
+
     @staticmethod
-    def of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], float]) -> Correlation:
+    def of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], Number]) -> Correlation:
         """Correlation of these pairs of laws; a StudyError where no variables of these laws have the coefficients."""
+        bent = [laws[k] for i, j in pairs if not (isinstance(laws[i], Normal) and isinstance(laws[j], Normal))
+                for k in (i, j)]  # fmt: skip
+        numbers = np.broadcast_arrays(*pairs.values(), *(number for law in bent for number in law.numbers))
+        if not numbers[0].ndim:
+            return Correlation._of(laws, {pair: float(coefficient) for pair, coefficient in pairs.items()})
+        # Alike at all poses of a design, and often in all designs.
+        _, first, alike = np.unique(np.stack(numbers), axis=1, return_index=True, return_inverse=True)
+        found = [Correlation._of([law.take(row) for law in laws],
+                                 {pair: float(taken(each, row)) for pair, each in pairs.items()})
+                 for row in first]  # fmt: skip
+        rows = alike.ravel()
+        return Correlation(np.stack([f.coefficients for f in found])[rows], np.stack([f.root for f in found])[rows])
+
+    @staticmethod
+    def _of(laws: Sequence[Marginal], pairs: Mapping[tuple[int, int], float]) -> Correlation:
         wanted, behind = np.eye(len(laws)), np.eye(len(laws))
         for (i, j), coefficient in pairs.items():
             wanted[i, j] = wanted[j, i] = coefficient

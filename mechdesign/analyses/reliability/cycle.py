@@ -19,6 +19,7 @@ from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints
 from mechdesign.parallel import map_chunks
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
 
 # Stream of random numbers: no other name has four numbers.
@@ -40,25 +41,27 @@ def with_cycle(found: MethodResult, task: Task, before: Sequence[MethodResult]) 
     Partial
         On an interrupt, with what was counted so far.
     """
-    if not task.settings or not task.question.limited or not task.poses.motion:
+    if not task.question.limited or not task.poses.motion:
         return found
-    if len(task.settings) < task.poses.count:
-        # The nominal mechanism itself does not reach some pose.
-        return replace(found, cycle=Estimate(np.nan, np.nan, np.nan, 0))
     method = METHODS[found.method]
-    if not method.errors:
-        return replace(found, cycle=bounds([found.estimates[setting.pose] for setting in task.settings]))
-    known = [each.cycle for each in before if METHODS[each.method].errors and not METHODS[each.method].precise]
+    if not method.errors or not task.assembled.all():
+        return replace(found, cycles=bounds(found, task.poses))
+    known = [each.cycles for each in before if METHODS[each.method].errors and not METHODS[each.method].precise]
     if known and not method.precise:
-        return replace(found, cycle=known[0])
+        return replace(found, cycles=known[0])
     return _simulated(found, task)
 
 
-def bounds(estimates: Sequence[Estimate]) -> Estimate:
-    """A cycle fails at least as often as the worst pose and at most as their sum, its value [Boole's inequality]."""
-    low = float(np.max([each.low for each in estimates]))
-    high = float(np.minimum(1.0, np.sum([each.high for each in estimates])))
-    return Estimate(high, low, high, 0)
+def bounds(found: MethodResult, poses: Poses) -> tuple[Estimate, ...]:
+    """Bounds of the cycle of each design, nan where the nominal mechanism itself does not reach some pose.
+
+    A cycle fails at least as often as the worst pose and at most as their sum, its value [Boole's inequality].
+    """
+    ends = np.full((2, poses.count), np.nan)
+    ends[:, list(found.estimates)] = np.array([(each.low, each.high) for each in found.estimates.values()]).T
+    low, high = ends.reshape(2, poses.designs, -1)
+    highest = np.minimum(1.0, high.sum(axis=1)).tolist()
+    return tuple(Estimate(most, least, most, 0) for least, most in zip(low.max(axis=1).tolist(), highest, strict=True))
 
 
 def _simulated(found: MethodResult, task: Task) -> MethodResult:
@@ -81,8 +84,8 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
             if precise and reached(task.precision, estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
-        raise Partial(replace(found, cycle=counted(*total.tolist()) if total[1] else None)) from None
-    return replace(found, cycle=counted(*total.tolist()))
+        raise Partial(replace(found, cycles=(counted(*total.tolist()),) if total[1] else ())) from None
+    return replace(found, cycles=(counted(*total.tolist()),))
 
 
 def _counted(settings: Sequence[Setting], sources: Sources, seed: int, samples: int, size: int, chunk: int) -> Ints:

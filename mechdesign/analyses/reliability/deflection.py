@@ -23,6 +23,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 from mechdesign.study.schema.reliability import links_meant
 from mechdesign.study.schema.variation import LOADS
 
@@ -31,7 +32,7 @@ from mechdesign.study.schema.variation import LOADS
 class Elastic:
     """Errors of channels by each of fx, fy, mz, shape (channels, 3, poses), nan where the load is not held.
 
-    `load` is the mean one, shape (3,).
+    `load` is the mean one, shape (3, poses), or (3, 1) where poses do not differ.
     """
 
     flexibility: Floats
@@ -40,7 +41,7 @@ class Elastic:
     @property
     def offset(self) -> Floats:
         """Mean errors, shape (channels, poses)."""
-        return np.asarray(np.einsum("ckp,k->cp", self.flexibility, self.load))
+        return np.asarray((self.flexibility * self.load).sum(axis=1))
 
     @property
     def held(self) -> Flags:
@@ -49,7 +50,7 @@ class Elastic:
 
     def take(self, poses: Sequence[int] | Ints) -> Elastic:
         """Some of the poses."""
-        return replace(self, flexibility=self.flexibility[:, :, poses])
+        return Elastic(self.flexibility[:, :, poses], _of_poses(self.load, poses))
 
     def only(self, channels: Sequence[int]) -> Elastic:
         """Some of the channels."""
@@ -57,7 +58,7 @@ class Elastic:
 
     def errors(self, loads: Mapping[str, Floats], count: int) -> Floats:
         """Deflections of `count` mechanisms at a single pose, shape (channels, count), from deviations of the load."""
-        force = np.repeat(self.load[:, None], count, axis=1)
+        force = np.repeat(self.load, count, axis=1)
         for row, name in zip(force, LOADS, strict=True):
             row += loads.get(name, 0.0)
         return np.asarray(self.flexibility[:, :, 0] @ force)
@@ -103,29 +104,30 @@ class Elasticity:
         points = ((link, node) in self.ends if link else node in self.pins for link, node in coordinate.ends)
         return kind != "slide" and all(points)
 
-    def at(self, configuration: Configuration, channels: Sequence[Channel]) -> Elastic:
-        """How channels yield in a flat batch of configurations; nan where one is not assembled."""
+    def at(self, configuration: Configuration, channels: Sequence[Channel], poses: Ints | None = None) -> Elastic:
+        """How channels yield in a flat batch of configurations; nan where one is not assembled.
+
+        Where poses differ in the load or in what yields, `poses` are those of the batch.
+        """
         flexibility = np.zeros((len(channels), 3, *configuration.shape))
         known = [k for k, channel in enumerate(channels) if self.knows(channel)]
-        assembled = np.flatnonzero(np.isfinite(configuration.point(self.asked.section.at)))
+        assembled = np.flatnonzero(np.isfinite(configuration.point(self.asked.given.at)))
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
             part = configuration.take(assembled)
-            rates, held = self._rates(part)
+            rates, held = self._rates(part, self.asked if poses is None else self.asked.take(poses[assembled]))
             for k in known:
                 moved = np.broadcast_to(first(part, channels[k].coordinate, rates), (self.asked.size, len(assembled)))
                 flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
-        return Elastic(flexibility, self.load)
+        return Elastic(flexibility, self.load if poses is None else _of_poses(self.load, poses))
 
-    def _rates(self, configuration: Configuration) -> tuple[Rates, Flags]:
+    def _rates(self, configuration: Configuration, asked: Body) -> tuple[Rates, Flags]:
         """What moves by unit loads, which are the leading axis, and which poses hold them."""
-        from mechdesign.analyses.stiffness.force_method import load, twists_of
+        from mechdesign.analyses.stiffness.analysis import by_forces
 
-        asked = self.asked
-        twists = twists_of(asked.network, asked.section, configuration, asked.length)
-        loaded = load(twists, asked.size)
+        loaded = by_forces(asked, configuration)
         moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
-        origin = configuration.point(asked.section.at)
+        origin = configuration.point(asked.given.at)
         graph, places = self.mechanism.graph, configuration.nodes
 
         def shift(node: int, vertex: str) -> Value:
@@ -144,25 +146,32 @@ class Elasticity:
         return Rates(nodes, [0.0] * graph.classes, [0.0] * len(graph.slides), turned, ends=ends), held
 
 
-def elasticity(study: Study) -> tuple[Elasticity | None, list[str]]:
-    """The loaded mechanism of a study, None where nothing loads it, and what is doubtful."""
+def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
+    return load if load.shape[1] == 1 else load[:, poses]
+
+
+def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[str]]:
+    """The loaded mechanism of a study, None where nothing loads it, and what is doubtful; of designs at their poses."""
     section, stiffness = study.reliability, study.stiffness
     assert section is not None
+    section = section if poses is None else poses.section(section)
     if stiffness is None:
         return None, []
-    loads = stiffness.loads if section.load is None else (section.load,)
+    own = stiffness if poses is None else poses.section(stiffness)
+    loads = own.loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:
         notes.append(
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0])}]"
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in stiffness.loads[0])}]"
         )
-    load = np.array(loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))
+    load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
     from mechdesign.analyses.stiffness.analysis import ask
 
     asked, mechanism = ask(study), study.mechanism
+    asked = asked if poses is None else asked.at(poses, np.arange(poses.count))
     network, graph, links = asked.network, mechanism.graph, mechanism.description.links
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
@@ -195,7 +204,7 @@ def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> l
             f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
             "mechanism"
         )
-    graph, section = loaded.mechanism.graph, loaded.asked.section
+    graph, section = loaded.mechanism.graph, loaded.asked.given
     for point, links in links_meant(study.reliability, section, graph).items():
         about = [channel.name for channel in positions if ("", graph.node(point)) in channel.coordinate.ends]
         if about and len(links) > 1 and point in section.bearings and point != section.at:

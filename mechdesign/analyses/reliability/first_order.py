@@ -15,6 +15,7 @@ from mechdesign.analyses.kinematics.rates import DriveRates
 from mechdesign.analyses.reliability.deflection import Elastic
 from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.reliability.sources import Pin, Sources
+from mechdesign.expressions import Number
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.margins import closures
@@ -54,21 +55,34 @@ class FirstOrder:
 
     def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
         """Some of the poses."""
-        return replace(self, components=self.components[:, :, poses], offset=self.offset[:, poses])
+        return replace(
+            self, sources=self.sources.take(poses), components=self.components[:, :, poses],
+            offset=self.offset[:, poses],
+        )  # fmt: skip
 
     @cached_property
-    def _spread(self) -> Floats:
-        """Mean and variance of each component, shape (2, components)."""
-        return np.array([source.spread for source in self.sources.all])[self.owner].T
+    def _spread(self) -> tuple[Floats, Floats]:
+        """Mean and variance of each component, shape (components, poses); (components, 1) where poses do not differ."""
+        each = [source.spread for source in self.sources.all]
+        mean, variance = (_rows([spread[k] for spread in each])[self.owner] for k in (0, 1))
+        return mean, variance
+
+    @cached_property
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Lowest and highest deviation of each source, likewise."""
+        each = [source.ends for source in self.sources.all]
+        return _rows([ends[0] for ends in each]), _rows([ends[1] for ends in each])
 
     @cached_property
     def _weighted(self) -> Floats:
         """Covariance of each component with the channels, in the shape of `components`."""
         variance, correlation = self._spread[1], self.sources.correlated()
         if correlation is None:
-            return np.asarray(variance[:, None] * self.components)
+            return np.asarray(variance * self.components)
         sigma = np.sqrt(variance)
-        return np.asarray(correlation * np.outer(sigma, sigma) @ self.components)
+        if correlation.ndim == 2:
+            return np.asarray(sigma * (correlation @ (sigma * self.components)))
+        return np.asarray(sigma * np.einsum("pzy,cyp->czp", correlation, sigma * self.components))
 
     def beside(self, other: FirstOrder) -> FirstOrder:
         """The channels of both."""
@@ -87,7 +101,7 @@ class FirstOrder:
 
     def shift(self) -> Floats:
         """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
-        return np.asarray(np.einsum("czp,z->cp", self.components, self._spread[0]) + self.offset)
+        return np.asarray((self._spread[0] * self.components).sum(axis=1) + self.offset)
 
     def distance(self) -> Floats:
         """Of each channel from zero, in standard deviations, shape (channels, poses); infinite where not known."""
@@ -121,14 +135,12 @@ class FirstOrder:
 
     def worst_case(self) -> Floats:
         """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
-        reach = np.array([max(abs(end) for end in source.ends) for source in self.sources.all])
-        return np.asarray(np.einsum("csp,s->cp", np.abs(self._steepest), reach))
+        reach = np.maximum(*map(np.abs, self._ends))
+        return np.asarray((np.abs(self._steepest) * reach).sum(axis=1))
 
     def worst_ends(self) -> tuple[Floats, Floats]:
         """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
-        low, high = (
-            self._steepest * np.array([source.ends[k] for source in self.sources.all])[:, None] for k in (0, 1)
-        )
+        low, high = (self._steepest * ends for ends in self._ends)
         return np.minimum(low, high).sum(axis=1) + self.offset, np.maximum(low, high).sum(axis=1) + self.offset
 
 
@@ -216,7 +228,7 @@ def linear_errors(
     names, slopes = _directions(sources)
     by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
     offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
-    return FirstOrder(sources, np.einsum("zn,cnp->czp", slopes, by_name), offset)
+    return FirstOrder(sources, _chained(slopes, by_name), offset)
 
 
 def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: Sources) -> FirstOrder:
@@ -227,12 +239,27 @@ def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: 
     names, slopes = _directions(sources)
     moved = [k for k, name in enumerate(names) if name not in LOADS]
     margins, by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
-    return FirstOrder(sources, np.einsum("zn,mnp->mzp", slopes[:, moved], by_name), margins)
+    return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
 
 
 def _directions(sources: Sources) -> tuple[list[str], Floats]:
-    """Places, drives and loads, and their derivatives by the components of the sources, shape (components, names)."""
+    """Places, drives and loads, and their derivatives by the components of the sources, shape (components, names).
+
+    Where these differ from pose to pose (components, names, poses).
+    """
     directions = [direction for source in sources.all for direction in source.directions]
     names = list(dict.fromkeys(name for direction in directions for name in direction))
-    slopes = np.array([[direction.get(name, 0.0) for name in names] for direction in directions])
-    return names, slopes.reshape(-1, len(names))
+    slopes = np.stack(np.broadcast_arrays(*(each.get(name, 0.0) for each in directions for name in names)))
+    return names, slopes.reshape(len(directions), len(names), *slopes.shape[1:])
+
+
+def _chained(slopes: Floats, by_name: Floats) -> Floats:
+    """Derivatives by components from those by names, shape (channels, names, poses); slopes as of `_directions`."""
+    if slopes.ndim == 2:
+        return np.asarray(slopes @ by_name)
+    return np.asarray(np.einsum("znp,cnp->czp", slopes, by_name))
+
+
+def _rows(values: Sequence[Number]) -> Floats:
+    """Numbers as rows of an array, shape (numbers, poses), or (numbers, 1) where poses do not differ."""
+    return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values)))

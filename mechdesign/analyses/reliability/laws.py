@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import ClassVar, Self
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Floats
+from mechdesign.expressions import Number
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.variation import Dimension
 
 # A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
@@ -39,14 +40,14 @@ def _normal_quantile(share: Floats | float) -> Floats:
 
 @dataclass(frozen=True)
 class Marginal(ABC):
-    """The law of one deviation from its nominal value.
+    """The law of one deviation from its nominal value; to the first order of many at once, each number an array.
 
     The tolerance [low, high] is the worst case: of unbounded laws three standard deviations about the middle.
     """
 
-    low: float
-    high: float
-    nominal: float = 0.0
+    low: Number
+    high: Number
+    nominal: Number = 0.0
 
     # Half the width of the tolerance in standard deviations; central moments of the law of standard deviation 1.
     reach: ClassVar[float] = SIGMAS
@@ -54,17 +55,26 @@ class Marginal(ABC):
     fourth: ClassVar[float] = 3.0
 
     @property
-    def mean(self) -> float:
+    def numbers(self) -> tuple[Number, ...]:
+        """All that it depends on."""
+        return self.low, self.high, self.nominal
+
+    def take(self, rows: Sequence[int] | Ints) -> Self:
+        """Some of many."""
+        return replace(self, low=taken(self.low, rows), high=taken(self.high, rows), nominal=taken(self.nominal, rows))
+
+    @property
+    def mean(self) -> Number:
         """The middle of the tolerance; of a law that may lean `moments` has the mean."""
         return 0.5 * (self.low + self.high)
 
     @property
-    def sigma(self) -> float:
+    def sigma(self) -> Number:
         """Standard deviation, of a truncated law before the cut; of a law that may lean `moments` has it."""
         return 0.5 * (self.high - self.low) / self.reach
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         """Mean, and second to fourth central moment."""
         return self.mean, self.second * self.sigma**2, 0.0, self.fourth * self.sigma**4
 
@@ -85,20 +95,31 @@ class Marginal(ABC):
         """Deviations so far from the end of the tolerance on the side of `u`, where small probabilities keep digits."""
         return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
 
-    def widened(self, factor: float) -> Self:
+    def widened(self, factor: Number) -> Self:
         """The law of a tolerance as many times as wide, about the same middle."""
         half = 0.5 * factor * (self.high - self.low)
         return replace(self, low=self.mean - half, high=self.mean + half)
 
-    def scaled(self, factor: float) -> Self:
+    def scaled(self, factor: Number) -> Self:
         """The law of so many times nominal + deviation, less so many times the nominal value."""
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
-def marginal(spread: Dimension, nominal: float, factor: float = 1.0) -> Marginal:
-    """The law that a study gives in its units; `nominal` is in the core's, `factor` of which are one of the study's."""
+def taken(value: Number, rows: Sequence[int] | Ints) -> Number:
+    """A number of some of many poses."""
+    return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
+
+
+def marginal(spread: Dimension, nominal: Number, factor: float = 1.0) -> Marginal:
+    """The law that a study gives in its units; `nominal` is in the core's, `factor` of which are one of the study's.
+
+    Raises
+    ------
+    ToleranceClassError
+        Where the tolerance is of a class that is not given for the nominal value.
+    """
     law = LAWS[spread.distribution]
-    low, high = spread.ends
+    low, high = spread.ends(nominal)
     if spread.sigma is not None:
         low, high = -law.reach * spread.sigma, law.reach * spread.sigma
     if spread.shape is not None:
@@ -160,12 +181,12 @@ class Triangular(Marginal):
     reach = math.sqrt(6.0)
 
     @property
-    def mode(self) -> float:
+    def mode(self) -> Number:
         """The deviation that is most likely."""
-        return min(max(0.0, self.low), self.high)
+        return np.minimum(np.maximum(0.0, self.low), self.high)
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         a, b, c = self.low, self.high, self.mode
         second = (a * a + b * b + c * c - a * b - a * c - b * c) / 18.0
         third = (a + b - 2 * c) * (2 * a - b - c) * (a - 2 * b + c) / 270.0
@@ -192,10 +213,10 @@ class Lognormal(Marginal):
     """nominal + deviation is lognormal, and positive."""
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         second = self.sigma**2
         w = 1.0 + second / (self.nominal + self.mean) ** 2
-        third = second**1.5 * (w + 2.0) * math.sqrt(w - 1.0)
+        third = second**1.5 * (w + 2.0) * np.sqrt(w - 1.0)
         return self.mean, second, third, second**2 * (w**4 + 2 * w**3 + 3 * w**2 - 3.0)
 
     def at(self, u: Floats) -> Floats:
@@ -212,7 +233,7 @@ class _OfFit(Marginal):
     hole: float = 0.5
 
     @property
-    def sigma(self) -> float:
+    def sigma(self) -> Number:
         return super().sigma * math.hypot(self.hole, 1.0 - self.hole)
 
 
@@ -226,7 +247,7 @@ class UniformFit(_OfFit):
     reach = Uniform.reach
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         hole, shaft = (0.5 * (self.high - self.low) * part / self.reach for part in (self.hole, 1.0 - self.hole))
         return self.mean, self.sigma**2, 0.0, Uniform.fourth * (hole**4 + shaft**4) + 6.0 * (hole * shaft) ** 2
 
@@ -254,14 +275,22 @@ def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Mar
 class Beta(Marginal):
     """Beta over the tolerance, of two shape parameters: equal ones do not lean, (1, 1) is uniform."""
 
-    shape: tuple[float, float] = (1.0, 1.0)
+    shape: tuple[Number, Number] = (1.0, 1.0)
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def numbers(self) -> tuple[Number, ...]:
+        return *super().numbers, *self.shape
+
+    def take(self, rows: Sequence[int] | Ints) -> Self:
+        one, other = self.shape
+        return replace(super().take(rows), shape=(taken(one, rows), taken(other, rows)))
+
+    @property
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         a, b = self.shape
         n, width = a + b, self.high - self.low
         second = width**2 * a * b / (n * n * (n + 1.0))
-        third = second**1.5 * 2.0 * (b - a) * math.sqrt((n + 1.0) / (a * b)) / (n + 2.0)
+        third = second**1.5 * 2.0 * (b - a) * np.sqrt((n + 1.0) / (a * b)) / (n + 2.0)
         excess = 6.0 * ((a - b) ** 2 * (n + 1.0) - a * b * (n + 2.0)) / (a * b * (n + 2.0) * (n + 3.0))
         return self.low + width * a / n, second, third, (3.0 + excess) * second**2
 
@@ -284,20 +313,21 @@ class Measured(Marginal):
     about their mean, so that the law has the sample's standard deviation (of n - 1).
     """
 
-    ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)
+    ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)  # beyond the least
 
     @staticmethod
-    def of(deviations: Floats, nominal: float) -> Measured:
-        """The law of deviations that are not all the same."""
-        ordered, mean = np.sort(deviations), float(deviations.mean())
-        ordered = mean + (ordered - mean) * deviations.std(ddof=1) / math.sqrt(_interpolated(ordered - mean, 2))
-        return Measured(float(ordered[0]), float(ordered[-1]), nominal, ordered)
+    def of(values: Floats, about: Number, nominal: Number) -> Measured:
+        """The law of the deviations of values that are not all the same from what they are `about`."""
+        ordered, mean = np.sort(values), float(values.mean())
+        ordered = mean + (ordered - mean) * values.std(ddof=1) / math.sqrt(_interpolated(ordered - mean, 2))
+        least, most = float(ordered[0]), float(ordered[-1])
+        return Measured(least - about, most - about, nominal, ordered - least)
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         mean = float(self.ordered.mean())
         second, third, fourth = (_interpolated(self.ordered - mean, power) for power in (2, 3, 4))
-        return mean, second, third, fourth
+        return self.low + mean, second, third, fourth
 
     @property
     def kinks(self) -> Floats:
@@ -310,7 +340,7 @@ class Measured(Marginal):
         return self._quantile(_normal_cdf(u))
 
     def _quantile(self, share: Floats) -> Floats:
-        return np.asarray(np.interp(share, self._shares, self.ordered))
+        return np.asarray(self.low + np.interp(share, self._shares, self.ordered))
 
     @property
     def _shares(self) -> Floats:
@@ -439,12 +469,12 @@ class SlideLaw:
     @property
     def variance(self) -> float:
         """Of each end."""
-        return self.end.moments[1]
+        return float(self.end.moments[1])
 
     @property
     def fourth(self) -> float:
         """E[x^4] of each end."""
-        return self.end.moments[3]
+        return float(self.end.moments[3])
 
     @property
     def mixed(self) -> float:

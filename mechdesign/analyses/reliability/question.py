@@ -11,13 +11,15 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
+from mechdesign.analyses.reliability.laws import taken
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import SUFFIXES, ReliabilitySection, links_meant, others, split_order
+from mechdesign.study.schema.limits import SUFFIXES, split_order
+from mechdesign.study.schema.reliability import ReliabilitySection, links_meant, others
 from mechdesign.study.text import fields
 
 
@@ -49,11 +51,11 @@ class Band:
 
 @dataclass(frozen=True)
 class Disc:
-    """Errors number `x` and `y` within a circle about zero."""
+    """Errors number `x` and `y` within a circle about zero; its radius may be of many poses."""
 
     x: int
     y: int
-    radius: float
+    radius: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,12 @@ class ReliabilityQuestion:
         """Whether a reliability is asked."""
         return bool(self.bands or self.discs)
 
+    def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
+        """The question at some poses, where limits are those of many."""
+        bands = tuple(replace(band, low=taken(band.low, poses), high=taken(band.high, poses)) for band in self.bands)
+        discs = tuple(replace(disc, radius=taken(disc.radius, poses)) for disc in self.discs)
+        return replace(self, bands=bands, discs=discs)
+
     @property
     def single(self) -> list[ReliabilityQuestion]:
         """The same with one limit at a time, in the order of `kept`."""
@@ -89,7 +97,7 @@ class ReliabilityQuestion:
 
     def _about(self, band: Band, value: Any) -> Band:
         channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
-        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle):
+        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle).all():
             value = value - TURN * np.round((value - middle) / TURN)
         return Band(band.output, band.low - value, band.high - value)
 
@@ -146,7 +154,7 @@ class ReliabilityQuestion:
 
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
-    """Channels and limits of a section; limited coordinates are outputs too."""
+    """Channels and limits of a section, perhaps with the numbers of many poses; limited coordinates are outputs too."""
     mechanism = study.mechanism
     limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
     limited = [
@@ -167,7 +175,7 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
             discs.append(Disc(begin + known.index(f"{base}.x"), begin + known.index(f"{base}.y"), limit.radius))
         else:
             low, high = (
-                float(radians(study, mechanism.coordinate(base), value)) if value is not None else bound
+                radians(study, mechanism.coordinate(base), value) if value is not None else bound
                 for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
             )
             bands.append(Band(begin + known.index(base), low, high, limit.absolute))

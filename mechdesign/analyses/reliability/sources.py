@@ -18,14 +18,20 @@ from mechdesign.analyses.reliability.laws import (
     SlideLaw,
     fit_law,
     marginal,
+    taken,
 )
 from mechdesign.errors import StudyError
+from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.schema.variation import LOADS, Clearance
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.clearances import Clearance
+from mechdesign.study.schema.iso_tolerances import ToleranceClassError
+from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.study.schema.variation import LOADS, Dimension
 
 # Largest deviation, in radians or in sizes of the mechanism.
 MAX_DEVIATION = 1e6
@@ -44,22 +50,27 @@ class Scalar:
     name: str
     kind: str
     law: Marginal
-    moves: Mapping[str, tuple[float, str]]
+    moves: Mapping[str, tuple[Number, str]]
     factor: float
     unit: str | None
 
+    def take(self, rows: Sequence[int] | Ints) -> Scalar:
+        """At some of many poses."""
+        moves = {name: (taken(slope, rows), quantity) for name, (slope, quantity) in self.moves.items()}
+        return replace(self, law=self.law.take(rows), moves=moves)
+
     @property
-    def directions(self) -> list[dict[str, float]]:
+    def directions(self) -> list[dict[str, Number]]:
         """Of the single component, derivatives of places, drives and loads."""
         return [{name: slope for name, (slope, _) in self.moves.items()}]
 
     @property
-    def spread(self) -> tuple[float, float]:
+    def spread(self) -> tuple[Number, Number]:
         """Mean and variance."""
         return self.law.moments[:2]
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def ends(self) -> tuple[Number, Number]:
         """Lowest and highest deviation: the tolerance."""
         return self.law.low, self.law.high
 
@@ -75,12 +86,18 @@ class Pin:
     """
 
     name: str
-    radius: float
+    radius: Number
     law: Marginal | None
     analytic: str
     sampled: str
     kind: str
-    directions: tuple[Mapping[str, float], ...]
+    directions: tuple[Mapping[str, Number], ...]
+
+    def take(self, rows: Sequence[int] | Ints) -> Pin:
+        """At some of many poses."""
+        directions = tuple({name: taken(slope, rows) for name, slope in each.items()} for each in self.directions)
+        law = None if self.law is None else self.law.take(rows)
+        return replace(self, radius=taken(self.radius, rows), law=law, directions=directions)
 
     @property
     def laws(self) -> Mapping[str, PinLaw] | Mapping[str, SlideLaw]:
@@ -93,19 +110,19 @@ class Pin:
         return self.sampled == "contact" and self.kind != "slide"
 
     @property
-    def moments(self) -> tuple[float, float, float, float]:
+    def moments(self) -> tuple[Number, Number, Number, Number]:
         """Mean of the radial clearance, and its second to fourth central moment."""
-        mean, second, third, fourth = (0.0,) * 4 if self.law is None else self.law.moments
+        mean, second, third, fourth = self.law.moments if self.law is not None else (0.0,) * 4
         return self.radius + mean, second, third, fourth
 
     @property
-    def spread(self) -> tuple[float, float]:
+    def spread(self) -> tuple[Number, Number]:
         """Mean and variance of each component [S2, eqs. 5, 6]."""
         mean, variance, _, _ = self.moments
         return 0.0, self.laws[self.analytic].variance * (variance + mean**2)
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def ends(self) -> tuple[Number, Number]:
         """The largest radial clearance in any direction, or of each end of a slider."""
         largest = self.radius + (0.0 if self.law is None else self.law.high)
         return -largest, largest
@@ -121,7 +138,7 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True)
 class Sources:
-    """All that varies in a study.
+    """All that varies in a study, or to the first order at poses of many designs of it: then numbers are arrays.
 
     Draws have the shape (variables, count): deviations of the scalars in their order (parameters first, then places,
     drives and loads), then each pin's radial clearance, and x and y of its place for a radial clearance of 1.
@@ -150,9 +167,18 @@ class Sources:
         ends = [len(owners) - owners[::-1].index(pin.name) for pin in self.pins if pin.directed]
         return [(end - 2, end - 1) for end in ends]
 
-    def widened(self, factors: Sequence[float] | Floats) -> Sources:
-        """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance."""
-        each = [float(factor) for factor in factors]
+    def take(self, rows: Sequence[int] | Ints) -> Sources:
+        """At some of many poses."""
+        scalars, pins = tuple(each.take(rows) for each in self.scalars), tuple(each.take(rows) for each in self.pins)
+        correlation = None if self.correlation is None else self.correlation.take(rows)
+        return replace(self, scalars=scalars, pins=pins, correlation=correlation)
+
+    def widened(self, factors: Sequence[Number] | Floats) -> Sources:
+        """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance.
+
+        Where factors are arrays, shape (sources, poses), at as many poses.
+        """
+        each: list[Number] = [float(factor) if np.ndim(factor) == 0 else np.asarray(factor) for factor in factors]
         scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, each, strict=False))
         pins = tuple(
             replace(p, radius=f * p.radius, law=None if p.law is None else p.law.scaled(f))
@@ -161,11 +187,16 @@ class Sources:
         return replace(self, scalars=scalars, pins=pins)
 
     def correlated(self) -> Floats | None:
-        """Correlation coefficients of the components of `all`; None where all are independent."""
+        """Correlation coefficients of the components of `all`, shape (components, components) or (poses, ...).
+
+        None where all are independent.
+        """
         if self.correlation is None:
             return None
-        found = np.eye(len(self.scalars) + sum(len(pin.directions) for pin in self.pins))
-        found[: len(self.scalars), : len(self.scalars)] = self.correlation.coefficients
+        given, count = self.correlation.coefficients, len(self.scalars)
+        size = count + sum(len(pin.directions) for pin in self.pins)
+        found = np.array(np.broadcast_to(np.eye(size), (*given.shape[:-2], size, size)))
+        found[..., :count, :count] = given
         return found
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
@@ -236,28 +267,34 @@ class Sources:
         return Made(places, by_kind["drive"], by_kind["load"])
 
 
-def find_sources(study: Study) -> tuple[Sources, list[str]]:
+def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[str]]:
     """Sources of a study, and warnings about parameters that vary several places together.
+
+    Where designs differ, at their `poses`: to the first order.
 
     Raises
     ------
     StudyError
-        If nothing varies, or the correlations do not go together.
+        If nothing varies, the correlations do not go together, or numbers of a design make no tolerance.
     """
     section = study.reliability
     if section is None or not (section.dimensions or section.clearances):
         message = "asks what varies: give 'dimensions' or 'clearances'"
         raise StudyError((study.problem(message, "reliability"),))
     mechanism: Mechanism = study.mechanism
+    poses = Poses.single({}) if poses is None else poses
+    section = poses.section(section)
+    sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
     scalars = []
+    slopes: Mapping[str, Number]
     warnings: list[str] = []
     together: list[str] = []
     for name, dimension in section.dimensions.items():
-        nominal = 0.0
+        nominal = sizes.get(name, 0.0)
         if name in study.parameters.nominal:
-            kind, nominal = "parameter", study.parameters.nominal[name]
-            slopes = _geometric(study.parameters.derivatives(name))
-            moved = [place for place, slope in slopes.items() if slope]
+            kind = "parameter"
+            slopes = _geometric(study.parameters.derivatives(name, poses.parameters, poses.changed))
+            moved = [place for place, slope in slopes.items() if np.any(slope)]
             dimensions = [place for place in moved if not place.startswith(MEASURED)]
             if not moved:
                 warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
@@ -266,25 +303,34 @@ def find_sources(study: Study) -> tuple[Sources, list[str]]:
         else:
             kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
             if kind == "place":
-                nominal = mechanism.nominal[name]
                 warnings += _twice(study, name, section.dimensions)
         moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
         turned = kind != "parameter" and moves[name][1] == "angle"
         factor = study.units.angle_factor if turned else 1.0
         unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
-        if dimension.measured is not None:
-            law: Marginal = Measured.of(factor * dimension.deviations(nominal / factor, study.folder), nominal)
-        else:
-            law = marginal(dimension, nominal, factor)
-        scalars.append(Scalar(name, kind, law, moves, factor, unit))
+        scalars.append(Scalar(name, kind, _law(study, name, dimension, nominal, factor), moves, factor, unit))
     if together:
         parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
         warnings.append(f"{parameters} several dimensions together: {'; '.join(together)}")
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
-    pins = tuple(_pin(mechanism, name, clearance) for name, clearance in section.clearances.items())
-    sources = Sources(study, tuple(scalars), pins, _correlation(study, scalars))
+    pins = tuple(_pin(study, name, clearance) for name, clearance in section.clearances.items())
+    sources = Sources(study, tuple(scalars), pins, _correlation(section, scalars))
     _check_sizes(sources)
     return sources, warnings
+
+
+def _law(study: Study, name: str, dimension: Dimension, nominal: Number, factor: float) -> Marginal:
+    """The law of a dimension, in the core's units."""
+    if dimension.measured is not None:
+        values, about = dimension.deviations(nominal / factor, study.folder)
+        return Measured.of(factor * values, factor * about, nominal)
+    try:
+        flaw = dimension.flaw(nominal)
+        if not flaw:
+            return marginal(dimension, nominal, factor)
+    except ToleranceClassError as error:
+        flaw = str(error)
+    raise StudyError((study.problem(flaw, "reliability", "dimensions", name),))
 
 
 def _quantity(mechanism: Mechanism, name: str) -> str:
@@ -301,11 +347,11 @@ def _check_sizes(sources: Sources) -> None:
     for scalar in sources.scalars:
         for slope, quantity in scalar.moves.values():
             allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
-            if not max(abs(slope * end) for end in scalar.ends) <= allowed:
+            if not max(np.max(np.abs(slope * end)) for end in scalar.ends) <= allowed:
                 message = f"varies by more than {words}"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
-        if not pin.ends[1] <= MAX_DEVIATION * size:
+        if not np.max(pin.ends[1]) <= MAX_DEVIATION * size:
             message = "is more than a million times the size of the mechanism"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 
@@ -321,9 +367,8 @@ def _twice(study: Study, place: str, varying: Collection[str]) -> list[str]:
     ]
 
 
-def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
-    assert study.reliability is not None
-    given = study.reliability.correlation
+def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Correlation | None:
+    given = section.correlation
     if not given:
         return None
     place = {scalar.name: k for k, scalar in enumerate(scalars)}
@@ -331,22 +376,24 @@ def _correlation(study: Study, scalars: Sequence[Scalar]) -> Correlation | None:
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
-def _pin(mechanism: Mechanism, name: str, clearance: Clearance) -> Pin:
-    spread, radius = clearance.radius_spread, clearance.radius
+def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
+    if flaw := clearance.flaw():
+        raise StudyError((study.problem(flaw, "reliability", "clearances", name),))
+    joints, spread, radius = study.mechanism.description.joints, clearance.radius_spread, clearance.radius
     law = None if spread is None else marginal(spread, radius)
     if clearance.fit is not None:
         law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
-    kind = "slide" if name in mechanism.description.joints else clearance.effect
+    kind = "slide" if name in joints else clearance.effect
     found = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
     if kind == "slide":
-        return replace(found, directions=_slider(mechanism.description.joints[name], clearance.length))
+        return replace(found, directions=_slider(joints[name], clearance.length))
     if clearance.link is None:
         raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
     moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
     return replace(found, directions=tuple({place: 1.0} for place in moved))
 
 
-def _slider(joint: Joint, length: float | None) -> tuple[dict[str, float], ...]:
+def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...]:
     """Of the rear and the front end of a slider: it shifts by their mean and tilts by their difference over its length.
 
     A pin in a slot only shifts.
@@ -357,6 +404,6 @@ def _slider(joint: Joint, length: float | None) -> tuple[dict[str, float], ...]:
     return tuple({offset: 0.5, str(joint.angle): slope} for slope in (-1.0 / length, 1.0 / length))
 
 
-def _geometric(values: Mapping[str, object]) -> dict[str, float]:
+def _geometric(values: Mapping[str, Number]) -> dict[str, Number]:
     """Leave out the limits of motion: they are judged on the nominal mechanism."""
-    return {name: value for name, value in values.items() if not name.startswith("limits.")}  # type: ignore[misc]
+    return {name: value for name, value in values.items() if not name.startswith("limits.")}

@@ -79,13 +79,16 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
 
 def success(task: Task, found: Sequence[MethodResult]) -> Table:
     """Reliability of every pose by every method, and of the whole cycle."""
-    entries = [(pose, each, each.estimates.get(pose, _UNKNOWN)) for pose in range(task.poses.count) for each in found]
-    cycles = [(0, each, each.cycle) for each in found if each.cycle is not None]
-    whole = np.arange(len(entries) + len(cycles)) >= len(entries)
-    pose = np.array([row for row, _, _ in entries + cycles])
-    used = [each.used.get(row, each.method) for row, each, _ in entries]
-    used += ["monte_carlo" if estimate.samples else "bounds" for _, _, estimate in cycles]
-    estimates = [estimate for _, _, estimate in entries + cycles]
+    entries = []
+    length = task.poses.count // task.poses.designs
+    for design in range(task.poses.designs):
+        first = design * length
+        entries += [(pose, each, each.estimates.get(pose, _UNKNOWN), each.used.get(pose, each.method), False)
+                    for pose in range(first, first + length) for each in found]  # fmt: skip
+        cycles = [(each, each.cycles[design]) for each in found if each.cycles]
+        entries += [(first, each, cycle, "monte_carlo" if cycle.samples else "bounds", True) for each, cycle in cycles]
+    poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
+    pose, whole = np.array(poses), np.array(cycle_of)
     failure, low, high, error = (
         np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
     )
@@ -98,7 +101,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         Column("scope", np.where(whole, "cycle", "pose"),
                meaning="a pose by itself, or one made mechanism at all poses, the steps between unseen"),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
-        *shared(task.study.units, method=[each.method for _, each, _ in entries + cycles]),
+        *shared(task.study.units, method=[each.method for each in methods_of]),
         Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
         Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
         Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
@@ -117,10 +120,11 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     ]  # fmt: skip
     if task.question.pair is not None:
         pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
-        rho = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1)
-        values = np.append(rho, np.full(len(cycles), np.nan))
+        values = np.full(len(whole), np.nan)
+        values[~whole] = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1).ravel()
         columns.append(Column("rho", values, meaning="correlation of the two outputs"))
-    valid = np.where(whole, (task.reason == 0).all(), task.reason[pose] == 0)
+    all_valid = (task.reason == 0).reshape(task.poses.designs, -1).all(axis=1)
+    valid = np.where(whole, all_valid[pose // length], task.reason[pose] == 0)
     columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
     return Table("reliability", tuple(columns), "probability that the errors keep their limits")
 
@@ -155,7 +159,8 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
         cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
         cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
     upper = np.where(np.isfinite(high), nominal + high, np.nan)
-    upper[:, :, bands:] = [disc.radius for disc in question.discs]
+    for k, disc in enumerate(question.discs, bands):
+        upper[..., k] = np.reshape(disc.radius, (-1, 1))
     estimates = [_each_limit(task, each, single) for each in known]
     failure, least, most = (
         np.array([[[getattr(each.get(row, _UNKNOWN), name) for each in of] for of in estimates]
@@ -190,7 +195,7 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
 
 def _each_limit(task: Task, found: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
     """Estimates by pose for each limit by itself; of methods that count failures from their plain samples."""
-    if len(single) == 1:
+    if len(single) == 1 and found.estimates:
         return [found.estimates]
     if found.normal is not None:
         return [methods.of_normal(task, question, *found.normal) for question in single]

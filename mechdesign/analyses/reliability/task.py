@@ -122,7 +122,12 @@ class MethodResult:
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
     normal: tuple[Floats, Floats] | None = None
-    cycle: Estimate | None = None
+    cycles: tuple[Estimate, ...] = ()
+
+    @property
+    def cycle(self) -> Estimate | None:
+        """Of the whole cycle, where one is asked."""
+        return self.cycles[0] if self.cycles else None
 
     def moments(self, task: Task) -> tuple[Floats, Floats]:
         """Mean and covariance of the errors, as `normal` has them, or of those that were drawn; nan where unknown."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.stiffness.screws import RIGID, screw_product
+from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Wrenches of unit size with a determinant above this are solved in closed form, the others by singular values.
@@ -84,17 +85,24 @@ def moved_to(arm: Complexes) -> Floats:
     return found
 
 
+def scales(length: Value, count: int, size: int = 3) -> Floats:
+    """Factors of moments and forces, shape (count, size), where a radian counts as a length, or as one in each pose."""
+    found = np.ones((count, size))
+    found[:, 2:] /= np.reshape(length, (-1, 1))
+    return found
+
+
 def by_wrenches(
-    wrenches: Sequence[Floats], compliances: Sequence[Floats], length: float, size: int = 3
+    wrenches: Sequence[Floats], compliances: Sequence[Floats], length: Value, size: int = 3
 ) -> tuple[Floats, Floats, Flags]:
     """Stiffness and compliance, shape (n, size, size), where as many wrenches as needed hold the body, and where so.
 
     Wrenches and compliances are those of all legs, shapes (3, m, n) and (m, m, n). Moments are divided by `length`
     wherever sizes are compared; on a pin (`size` 2) no leg exerts a moment.
     """
-    scale = np.array([1.0, 1.0, 1.0 / length])[:size]
-    outer = np.outer(scale, scale)
-    inverse, regular = _inverse(np.concatenate([w[:size] for w in wrenches], axis=1) * scale[:, None, None])
+    scale = scales(length, wrenches[0].shape[2], size)
+    outer = scale[:, :, None] * scale[:, None]
+    inverse, regular = _inverse(np.concatenate([w[:size] for w in wrenches], axis=1) * scale.T[:, None])
     total, first = np.zeros_like(inverse), 0
     for block in compliances:
         rows = inverse[first : first + len(block)]
@@ -125,11 +133,11 @@ def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:
     return inverse, regular
 
 
-def directional(soft: Floats, direction: float) -> Floats:
-    """Stiffness to a force in a direction (radians), the displacement counted along it."""
-    along = np.array([np.cos(direction), np.sin(direction)])
+def directional(soft: Floats, direction: Value) -> Floats:
+    """Stiffness to a force in a direction (radians, of all poses or of each), the displacement counted along it."""
+    x, y = np.cos(direction), np.sin(direction)
     with np.errstate(divide="ignore"):
-        return np.asarray(1 / np.einsum("i,nij,j->n", along, soft[:, :2, :2], along))
+        return np.asarray(1 / (x * x * soft[:, 0, 0] + 2 * x * y * soft[:, 0, 1] + y * y * soft[:, 1, 1]))
 
 
 def _inverse(matrix: Floats) -> tuple[Floats, Flags]:

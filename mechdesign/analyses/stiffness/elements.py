@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.screws import hinge_twist, slide_twist
+from mechdesign.analyses.stiffness.screws import RANK, hinge_twist, slide_twist
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.model import Link
@@ -132,7 +132,16 @@ def course_of(link: Link, configuration: Configuration) -> BeamLine:
     return BeamLine(names, corners, along, starts)
 
 
-def looked_at_from(points: Iterable[str], at: Complexes, configuration: Configuration, length: float) -> Complexes:
+def spread(points: Iterable[str], configuration: Configuration, size: float) -> Floats:
+    """How far joints lie apart in each pose, shape (n,); `size` where they lie in one place, but for rounding."""
+    places = [configuration.point(point) for point in dict.fromkeys(points)]
+    apart = np.zeros(configuration.shape)
+    for place in places[1:]:
+        np.maximum(apart, np.abs(place - places[0]), out=apart)
+    return np.where(apart > RANK * size, apart, size)
+
+
+def looked_at_from(points: Iterable[str], at: Complexes, configuration: Configuration, length: Value) -> Complexes:
     """From where joints are seen: the asked point, or their middle where that is far from them, and would hide them."""
     places = [configuration.point(point) for point in dict.fromkeys(points)]
     if not places:
@@ -195,7 +204,8 @@ def bending(
     area, inertia, factor = profile.extent
     # Shear compliance per length.
     shear = 1 / (factor * profile.G * area) if profile.shear and profile.G is not None else 0.0
+    stretching, bent = profile.E * area, profile.E * inertia
     for middle, along, length in course.between(low, high):
-        yield slide_twist(along), length / (profile.E * area)
-        yield slide_twist(1j * along), length**3 / (12 * profile.E * inertia) + length * shear
-        yield hinge_twist(middle - at), length / (profile.E * inertia)
+        yield slide_twist(along), length / stretching
+        yield slide_twist(1j * along), length**3 / (12 * bent) + length * shear
+        yield hinge_twist(middle - at), length / bent

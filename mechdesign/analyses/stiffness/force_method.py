@@ -20,7 +20,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.analyses.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, stiffness_of
+from mechdesign.analyses.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, scales, stiffness_of
 from mechdesign.analyses.stiffness.elements import bending, course_of, freedoms, looked_at_from
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import RANK, RIGID
@@ -50,6 +50,8 @@ class Twists:
         go together in each pose.
     arm : complex ndarray, shape (n,)
         From where the twists are seen to the asked point.
+    length : float or ndarray, shape (n,)
+        What a radian counts as.
     """
 
     network: Network
@@ -58,7 +60,12 @@ class Twists:
     free: Flags
     within: Floats
     arm: Complexes
-    length: float
+    length: Value
+
+    @property
+    def scale(self) -> Floats:
+        """Factors of wrenches, of which the twists and loads are scaled ones, shape (n, 3)."""
+        return scales(self.length, len(self.twist))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +93,8 @@ class Loaded:
         stress = self.stress.reshape(len(self.stress), len(around), 3, size)
         # The load's where the edge is on its way, less the loops'.
         through = onward[:, None, None] * np.eye(3)[:, :size] - np.einsum("le,nlis->neis", around, stress)
-        scale = np.array([1.0, 1.0, 1.0 / self.twists.length])
-        plain = through / scale[:, None] * scale[:size]
+        scale = self.twists.scale
+        plain = through / scale[:, None, :, None] * scale[:, None, None, :size]
         back = moved_to(-self.twists.arm).swapaxes(1, 2)
         return np.asarray(back[:, None] @ plain @ self._loads[:, None])
 
@@ -95,8 +102,8 @@ class Loaded:
     def displacements(self) -> dict[str, Floats]:
         """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
         twists, size = self.twists, self.stress.shape[2]
-        scale = np.array([1.0, 1.0, 1.0 / twists.length])
-        there, shift = moved_to(twists.arm) * scale, self.shift * scale[:size] @ self._loads
+        scale = twists.scale
+        there, shift = moved_to(twists.arm) * scale[:, None], (self.shift * scale[:, None, :size]) @ self._loads
         found = {}
         for vertex, path in twists.network.paths.items():
             signs = twists.network.signs(path) @ twists.within
@@ -111,8 +118,8 @@ class Loaded:
         return moved_to(self.twists.arm).swapaxes(1, 2)[:, :size, :size]
 
 
-def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: float) -> Twists:
-    """Freedoms of all edges, with rotations counted as lengths by `length`."""
+def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: Value) -> Twists:
+    """Freedoms of all edges, with rotations counted as lengths by `length`, one or one a pose."""
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else looked_at_from(joints, at, configuration, length)
@@ -128,7 +135,7 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
         twist[:, :, j] = np.broadcast_to(each, (3, n)).T
         if soft is not None:
             compliance[:, j] = soft
-    twist[:, 2] *= length
+    twist[:, 2] *= np.reshape(length, (-1, 1))
     free = np.array([soft is None for *_, soft in found], dtype=bool)
     return Twists(network, twist, compliance, free, within, at - origin, length)
 
@@ -274,7 +281,7 @@ def _least_energy(statics: _Statics, loops: Floats, way: Floats, compliance: Flo
     return bears - loops.swapaxes(1, 2) @ more, stress + more
 
 
-def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> Held:
+def _held(compliance: Floats, statics: _Statics, length: Value, size: int) -> Held:
     """Compliance where the body is held, stiffness where it is not rigid, and what is free, unscaled."""
     n = len(compliance)
     lost = statics.lost if statics.lost is not None else np.zeros((n, size, size))
@@ -296,8 +303,8 @@ def _held(compliance: Floats, statics: _Statics, length: float, size: int) -> He
         if count:
             compliance[rows] = np.nan
             twist[rows] = axes[rows][:, :, -1]
-    scale = np.array([1.0, 1.0, 1.0 / length])[:size]
-    outer = np.outer(scale, scale)
+    scale = scales(length, n, size)
+    outer = scale[:, :, None] * scale[:, None]
     twist = np.where(np.abs(twist) > RANK, twist, 0.0 * twist) * scale
     if size == 3:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -340,14 +347,12 @@ def points_of(network: Network) -> list[tuple[str, str, str]]:
     return [(link, point, vertex) for link, points in network.points.items() for point, vertex in points]
 
 
-def effects_of(
-    network: Network, loaded: Loaded, at: str, configuration: Configuration, loads: tuple[tuple[float, ...], ...]
-) -> Effects:
-    """What each load (fx, fy, mz) does in a batch of poses."""
+def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configuration, loads: Floats) -> Effects:
+    """What each load (fx, fy, mz) does in a batch of poses; `loads` of shape (n, loads, 3)."""
     size = loaded.wrenches.shape[3]
-    applied = np.array(loads)[:, :size].T
+    applied = loads[:, :, :size].swapaxes(1, 2)
     origin = configuration.point(at)
-    effects = Effects.unknown(network, len(origin), len(loads))
+    effects = Effects.unknown(network, *loads.shape[:2])
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
         arm = (configuration.point(network.edges[k].point) - origin)[:, None]

@@ -105,12 +105,12 @@ def _elements(edges: Sequence[NetworkEdge], path: Sequence[str]) -> Iterator[Ele
 
 
 def hold_by_legs(
-    legs: Sequence[Leg], section: StiffnessSection, configuration: Configuration, length: float, size: int,
+    legs: Sequence[Leg], section: StiffnessSection, configuration: Configuration, length: Floats, size: int,
     condensed: bool,
 ) -> tuple[Held, Iterator[Springs]]:  # fmt: skip
     """Springs in a batch of assembled poses of shape (n,), and how they hold the body: rank 0 where not in closed form.
 
-    `length`, `size` and `condensed` are those of the `Body`.
+    `length` (n,), `size` and `condensed` are those of the `Body`.
     """
     n, body = configuration.shape[0], 3 if condensed else size
     at = configuration.point(section.at)
@@ -125,18 +125,18 @@ def hold_by_legs(
         signature = [int(rank[rows[0]]) for rank in ranks]
         here = chains if len(rows) == n else [chain.take(rows) for chain in chains]
         wrenches = [
-            reciprocal_wrenches(chain.passive, rank, length, len(rows))
+            reciprocal_wrenches(chain.passive, rank, length[rows], len(rows))
             for chain, rank in zip(here, signature, strict=True)
         ]
         if sum(w.shape[1] for w in wrenches) == body:
             blocks = [constraint_compliance(w, chain) for w, chain in zip(wrenches, here, strict=True)]
-            held.stiffness[rows], held.compliance[rows], regular = by_wrenches(wrenches, blocks, length, body)
+            held.stiffness[rows], held.compliance[rows], regular = by_wrenches(wrenches, blocks, length[rows], body)
             held.rank[rows] = body * regular
         found += [(rows, k, w, chain) for k, (w, chain) in enumerate(zip(wrenches, here, strict=True))]
     springs = (
         Springs(rows, np.full(len(rows), k), spring.stiffness, spring.place + origin[rows], spring.angle)
         for rows, k, w, chain in found
-        for spring in equivalent_springs(w, chain, length)
+        for spring in equivalent_springs(w, chain, length[rows])
     )
     held = held.seen_from(at - origin)
     if condensed:

@@ -64,8 +64,8 @@ class LegScrews:
         )
 
 
-def joint_rank(passive: Sequence[Floats], length: float) -> Ints | int:
-    """Rank of the free joints' twists in each pose, rotations scaled by a length."""
+def joint_rank(passive: Sequence[Floats], length: Value) -> Ints | int:
+    """Rank of the free joints' twists in each pose, rotations scaled by a length, or one of each pose."""
     count = len(passive)
     if count < 2:
         return count
@@ -77,7 +77,7 @@ def joint_rank(passive: Sequence[Floats], length: float) -> Ints | int:
     return np.asarray((values > RANK * values[:, :1]).sum(axis=1), dtype=np.intp)
 
 
-def reciprocal_wrenches(passive: Sequence[Floats], rank: int, length: float, count: int) -> Floats:
+def reciprocal_wrenches(passive: Sequence[Floats], rank: int, length: Value, count: int) -> Floats:
     """Wrenches on which free joints of a given rank do no work, a basis (3, 3 - rank, n)  [S4, eqs. 13-15].
 
     Closed form for up to two independent joints; the null space by singular values where joints depend on each other.
@@ -134,7 +134,7 @@ class Spring(NamedTuple):
     angle: Floats
 
 
-def equivalent_springs(wrenches: Floats, chain: LegScrews, length: float) -> list[Spring]:
+def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> list[Spring]:
     """Springs that hold the body as a leg does: one on the line of one wrench, two for two; none for three.
 
     Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
@@ -155,7 +155,7 @@ def equivalent_springs(wrenches: Floats, chain: LegScrews, length: float) -> lis
     ]
 
 
-def _single(wrench: Floats, chain: LegScrews, length: float) -> Spring:
+def _single(wrench: Floats, chain: LegScrews, length: Value) -> Spring:
     compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
     force = vector(wrench[0], wrench[1])
     size = np.abs(force)
@@ -220,7 +220,7 @@ def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
     return low, high, angle
 
 
-def _scaled(twist: Floats, length: float) -> Floats:
+def _scaled(twist: Floats, length: Value) -> Floats:
     unit = twist.copy()
     unit[2] *= length
     return np.asarray(unit / np.linalg.norm(unit, axis=0))

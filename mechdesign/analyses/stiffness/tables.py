@@ -9,10 +9,11 @@ import numpy as np
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
-from mechdesign.analyses.stiffness.compliance import Held, directional
+from mechdesign.analyses.stiffness.compliance import Held, directional, scales
 from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import principal
+from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
@@ -36,6 +37,10 @@ class Springs(Lanes):
         whole = Springs.joined([none, *parts])
         return whole.take(np.lexsort((whole.leg, whole.row)))
 
+    def counts(self, designs: int, poses: int) -> Ints:
+        """How many each of several designs has, which have as many poses."""
+        return np.bincount(self.row // poses, minlength=designs)
+
 
 def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str) -> list[Column]:
     """Columns of the upper triangle of stiffness or compliance matrices."""
@@ -50,9 +55,9 @@ def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str)
 
 
 def stiffness_table(
-    study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: float | None
+    study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: Value | None
 ) -> Table:
-    """``stiffness.csv``; `direction` in the study's units."""
+    """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
     units, soft = study.units, held.compliance
     size = soft.shape[1]
     low, high, angle = principal(soft)
@@ -81,15 +86,15 @@ def stiffness_table(
     return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
 
 
-def eigen_table(study: Study, poses: Poses, soft: Floats, length: float) -> Table:
+def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Table:
     """``eigen.csv``: eigen-stiffnesses of a body, softest first, and the twists along which they act.
 
     Of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size meets a wrench along itself.
     """
-    scale = np.array([1.0, 1.0, length])
+    scale = 1 / scales(length, len(soft))
     known = np.isfinite(soft).all(axis=(1, 2))
     values, vectors = np.full((len(soft), 3), np.nan), np.full((len(soft), 3, 3), np.nan)
-    values[known], vectors[known] = np.linalg.eigh(soft[known] * np.outer(scale, scale))
+    values[known], vectors[known] = np.linalg.eigh((soft * scale[:, :, None] * scale[:, None])[known])
     with np.errstate(divide="ignore"):
         stiffness = np.where(values > 1e-13 * values[:, -1:], 1 / values, np.where(np.isnan(values), np.nan, np.inf))
     # Softest first; a twist points up, or to the right.
@@ -135,11 +140,12 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Spri
 
 
 def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
+    """``deflections.csv``: a row a pose and load; `loads` of shape (poses, loads, 3)."""
     units = study.units
     size = soft.shape[1]
-    moved = np.einsum("nij,lj->nli", soft, loads[:, :size]).reshape(-1, size)
-    repeat = np.repeat(np.arange(poses.count), len(loads))
-    applied = np.tile(loads, (poses.count, 1))
+    moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
+    repeat = np.repeat(np.arange(poses.count), loads.shape[1])
+    applied = loads.reshape(-1, 3)
     columns = pose_columns(study, poses, repeat)
     force, moment, length = units.label("force"), units.label("moment"), units.label("length")
     for name, values, unit in zip(("fx", "fy", "mz")[:size], applied.T, (force, force, moment), strict=False):

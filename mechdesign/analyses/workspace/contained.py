@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from mechdesign.analyses.region.curves import whole
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import SAME_ROOT, Designs, is_turn, trace
 from mechdesign.analyses.region.rules import cubic, spread
+from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.numerics.roots import dips, lowest
 
@@ -63,39 +65,49 @@ LEAST_GAIN = 1e-7
 
 @dataclass(frozen=True)
 class Shape:
-    """A circle, or a rectangle with sides along x and y; `centre` is None where it may lie anywhere."""
+    """A circle, or a rectangle with sides along x and y; `centre` is None where it may lie anywhere.
 
-    width: float
-    height: float
+    Numbers are the same for all designs, or of shape (designs,).
+    """
+
+    width: Number
+    height: Number
     round: bool
-    centre: complex | None = None
+    centre: complex | Complexes | None = None
 
-    @property
-    def name(self) -> str:
-        """``rectangle 180 x 90 at (0, 250)``."""
-        size = f"circle {self.width / 2:g}" if self.round else f"rectangle {self.width:g} x {self.height:g}"
-        return size if self.centre is None else f"{size} at ({self.centre.real:g}, {self.centre.imag:g})"
+    def of(self, design: Ints | int) -> Shape:
+        """The shapes of some designs."""
+
+        def some(value: Any) -> Any:
+            return value[design] if isinstance(value, np.ndarray) and value.ndim else value
+
+        return Shape(some(self.width), some(self.height), self.round, some(self.centre))
 
     def directions(self, number: int = RAYS) -> Floats:
-        """Directions from the centre to places spread along the outline (radians in [0, 2 pi), ascending)."""
+        """Directions from the centre to places spread along the outline (radians in [0, 2 pi), ascending).
+
+        Of shape (places, designs), or (places, 1) where they are the same for all designs.
+        """
         if self.round:
-            return 2 * np.pi * np.arange(number) / number
-        sides, girth = np.array([self.width, self.height]), 2 * (self.width + self.height)
-        counts = np.maximum(SIDE_RAYS, np.round(number * sides / girth)).astype(int) + 1
-        x, y = (np.linspace(-side / 2, side / 2, count) for side, count in zip(sides, counts, strict=True))
-        around = np.concatenate([x + 1j * y[0], x + 1j * y[-1], x[0] + 1j * y, x[-1] + 1j * y])
-        return np.unique(np.angle(around) % (2 * np.pi))
+            return (2 * np.pi * np.arange(number) / number)[:, None]
+        width, height = np.broadcast_arrays(np.atleast_1d(self.width), np.atleast_1d(self.height))
+        long = float(np.median(width / (width + height)))
+        x, y = (np.linspace(-side / 2, side / 2, max(SIDE_RAYS, round(0.5 * number * share)) + 1)
+                for side, share in ((width, long), (height, 1 - long)))  # fmt: skip
+        around = np.concatenate([x[:-1] + 1j * y[0], x[1:] + 1j * y[-1], x[0] + 1j * y[1:], x[-1] + 1j * y[:-1]])
+        return np.sort(np.angle(around) % (2 * np.pi), axis=0)
 
     @property
     def corners(self) -> Floats:
-        """Directions of the corners from the centre (radians, in [0, 2 pi))."""
+        """Directions of the corners from the centre (radians, in [0, 2 pi)), shape (..., corners)."""
         corner = np.arctan2(self.height, self.width)
-        return np.array([] if self.round else [corner, np.pi - corner, np.pi + corner, 2 * np.pi - corner])
+        found = [] if self.round else [corner, np.pi - corner, np.pi + corner, 2 * np.pi - corner]
+        return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.array([])
 
     def radius(self, theta: Floats) -> Floats:
         """Distance of the outline from the centre."""
         if self.round:
-            return np.full(theta.shape, self.width / 2)
+            return np.broadcast_to(np.asarray(self.width) / 2, np.broadcast_shapes(theta.shape, np.shape(self.width)))
         with np.errstate(divide="ignore"):
             return 0.5 * np.minimum(self.width / np.abs(np.cos(theta)), self.height / np.abs(np.sin(theta)))
 
@@ -132,7 +144,7 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     if not some.size:
         return found, centres
     if shape.centre is not None:
-        found[some] = _View(shape, panels, some, centres[some]).checked()
+        found[some] = _View(shape.of(some), panels, some, centres[some]).checked()
         return found, centres
     lane, centre = _beginnings(shape, panels, some)
     centre, scale = _largest(shape, panels, lane, centre)
@@ -140,7 +152,7 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     order = np.argsort(scale, kind="stable")
     centres[lane[order]] = centre[order]
     some = np.unique(lane)
-    found[some] = _View(shape, panels, some, centres[some]).checked()
+    found[some] = _View(shape.of(some), panels, some, centres[some]).checked()
     return found, centres
 
 
@@ -158,10 +170,7 @@ class _View:
         self._reach = np.abs(centre - every.about) + panels.reach[design]
         _, found, inside = panels.through(design, centre)
         self._inside = np.bincount(found.ray[inside], minlength=len(design)) > 0
-        theta = shape.directions()
-        lanes, n = np.arange(len(design)), len(theta)
-        scales = self.at(np.tile(lanes, n), np.repeat(theta, len(lanes))).reshape(n, -1)
-        around, beside = _valleys(theta, scales)
+        around, beside = _valleys(*self._spread(RAYS))
         around, beside = self._with_overlooked(around, beside)
         contact, lane = np.nonzero(np.isfinite(beside[1]) & (beside[1] <= LOW * beside[1].min(axis=0)))
         self.theta, self.scales = around[1], beside[1]
@@ -172,8 +181,15 @@ class _View:
         self.theta[contact, lane], self.scales[contact, lane] = place, value
         least = self.scales.min(axis=0)
         # Where no ray meets the region it is farther than it is wide.
-        least = np.where(np.isfinite(least), least, 2 * self._reach / min(shape.width, shape.height))
+        least = np.where(np.isfinite(least), least, 2 * self._reach / np.minimum(shape.width, shape.height))
         self.scale = np.where(self._inside, least, -least)
+
+    def _spread(self, number: int) -> tuple[Floats, Floats]:
+        """Directions to places spread along the outline, and the scales that they allow, (places, lanes)."""
+        theta, lanes = self._shape.directions(number), len(self._centre)
+        theta = np.broadcast_to(theta, (len(theta), lanes))
+        lane = np.tile(np.arange(lanes), len(theta))
+        return theta, self.at(lane, theta.ravel()).reshape(theta.shape)
 
     def _with_overlooked(self, theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
         """Contacts with one more where the lowest place of a margin is a hole between the rays."""
@@ -213,19 +229,19 @@ class _View:
 
     def checked(self) -> Floats:
         """The scale, or less where the outline lies outside between the rays that were traced so far."""
-        theta, scale, lanes = self._shape.directions(CHECKED), self.scale.copy(), np.arange(len(self._centre))
-        scales = self.at(np.tile(lanes, len(theta)), np.repeat(theta, len(lanes))).reshape(len(theta), -1)
+        scale, lanes = self.scale.copy(), np.arange(len(self._centre))
+        theta, scales = self._spread(CHECKED)
         around, beside = _valleys(theta, scales)
         # Of a notch with a corner the lowest place is found by sections, not by parabolas.
         contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
         found = lowest(lambda x: self.at(lane, x), around[0, contact, lane], around[2, contact, lane])[1]
         np.minimum.at(scale, lane, np.minimum(found, beside[1, contact, lane]))
         for _ in range(LOOKS):
-            outline = (1 - TOUCHING) * scale * (self._shape.radius(theta) * np.exp(1j * theta))[:, None]
+            outline = (1 - TOUCHING) * scale * self._shape.radius(theta) * np.exp(1j * theta)
             place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
             if not lane.size:
                 break
-            found = self.at(lane, theta[place])
+            found = self.at(lane, theta[place, lane])
             # Where a ray leaves the region and comes back between two of its samples, places along it tell.
             passed = np.flatnonzero(found >= scale[lane])
             along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
@@ -237,7 +253,7 @@ class _View:
 
     def at(self, lane: Ints, theta: Floats) -> Floats:
         """Scales at which the outline passes through the ends of rays; from outside, where they enter the region."""
-        return self._radii(lane, theta) / self._shape.radius(theta)
+        return self._radii(lane, theta) / self._shape.of(lane).radius(theta)
 
     def _radii(self, lane: Ints, theta: Floats) -> Floats:
         if not lane.size:
@@ -266,22 +282,23 @@ class _View:
         normal = -1j * (high - low)
         size = np.abs(normal)
         known = np.isfinite(size) & (size > 0)
-        slope = -self._shape.slope_by(np.where(known, normal / np.where(known, size, 1.0), 1.0 + 0.0j))
+        slope = -self._shape.of(lane).slope_by(np.where(known, normal / np.where(known, size, 1.0), 1.0 + 0.0j))
         found[contact[known], lane[known]] = slope[known]
         return found
 
 
 def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:
-    """Where scales, shape (directions, lanes), are least around: directions with the two beside each, and the scales.
+    """Where scales are least around: directions with the two beside each, and the scales, given as (directions, lanes).
 
     Both are of shape (3, contacts, lanes); the scales are infinite where there are fewer.
     """
     low = (scales <= np.roll(scales, 1, axis=0)) & (scales <= np.roll(scales, -1, axis=0)) & np.isfinite(scales)
     row = np.argsort(np.where(low, scales, np.inf), axis=0, kind="stable")[:CONTACTS]
     turn = np.concatenate([theta[-1:] - 2 * np.pi, theta, theta[:1] + 2 * np.pi])
-    beside = scales[(row + np.array([[[-1]], [[0]], [[1]]])) % len(theta), np.arange(scales.shape[1])]
+    lanes = np.arange(scales.shape[1])
+    beside = scales[(row + np.array([[[-1]], [[0]], [[1]]])) % len(theta), lanes]
     missing = ~np.take_along_axis(low, row, axis=0)
-    return turn[row + np.arange(3)[:, None, None]], np.where(missing, np.inf, beside)
+    return turn[row + np.arange(3)[:, None, None], lanes], np.where(missing, np.inf, beside)
 
 
 def _within_scan(designs: Designs, z: Complexes, theta: Floats) -> tuple[Floats, Floats]:
@@ -317,17 +334,19 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
     within = about + (inner + FRACTIONS[:, None] * (outer - inner)) * way
     lanes, centres = [], []
     for k in some.tolist():
+        own = shape.of(k)
         mine = slice(*np.searchsorted(owner, [k, k + 1]))
         z = within[:, mine].ravel()
-        room = shape.scale_at(ends[:, mine].ravel() - z[:, None]).min(axis=1, initial=np.inf)
+        room = own.scale_at(ends[:, mine].ravel() - z[:, None]).min(axis=1, initial=np.inf)
         if not is_turn(designs.scan):
-            _, end = _within_scan(designs, z[:, None], shape.directions())
-            room = np.minimum(room, (end / shape.radius(shape.directions())).min(axis=1))
+            around = own.directions()[:, 0]
+            _, end = _within_scan(designs, z[:, None], around)
+            room = np.minimum(room, (end / own.radius(around)).min(axis=1))
         for _ in range(TRIALS if room.size else 0):
             best = int(room.argmax())
             lanes.append(k)
             centres.append(z[best])
-            room[shape.scale_at(z - z[best]) <= room[best]] = -1.0
+            room[own.scale_at(z - z[best]) <= room[best]] = -1.0
             if room.max() <= 0:
                 break
     return np.array(lanes, dtype=np.intp), np.array(centres)
@@ -335,20 +354,20 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
 
 def _largest(shape: Shape, panels: Panels, lane: Ints, centre: Complexes) -> tuple[Complexes, Floats]:
     """Centres moved to where the scale that fits is largest, and that scale."""
-    view = _View(shape, panels, lane, centre)
+    view = _View(shape.of(lane), panels, lane, centre)
     scale, centre = view.scale.copy(), centre.copy()
     slopes, contacts = view.slopes(), view.scales.copy()
-    move = FIRST_MOVE * np.maximum(scale, 0.1) * min(shape.width, shape.height)
-    size = np.hypot(shape.width, shape.height)
+    move = FIRST_MOVE * np.maximum(scale, 0.1) * np.minimum(shape.of(lane).width, shape.of(lane).height)
+    size = np.broadcast_to(np.hypot(shape.of(lane).width, shape.of(lane).height), lane.shape)
     left = np.arange(len(lane))
     for _ in range(MOVES):
         step, hoped = _step(contacts[:, left], slopes[:, left], move[left])
         hoped -= scale[left]
-        worth = (hoped > LEAST_GAIN * np.abs(scale[left])) & (move[left] > LAST_MOVE * size * np.abs(scale[left]))
+        worth = (hoped > LEAST_GAIN * np.abs(scale[left])) & (move[left] > LAST_MOVE * size[left] * np.abs(scale[left]))
         left, step, hoped = left[worth], step[worth], hoped[worth]
         if not left.size:
             break
-        view = _View(shape, panels, lane[left], centre[left] + step)
+        view = _View(shape.of(lane[left]), panels, lane[left], centre[left] + step)
         gain = view.scale - scale[left]
         better = gain > 0
         move[left] *= np.where(gain > 0.75 * hoped, 2.0, np.where(better, 1.0, 0.25))

@@ -11,7 +11,7 @@ import numpy as np
 
 from mechdesign import indices
 from mechdesign.analyses.columns import power_of_length
-from mechdesign.analyses.region.field import Field, Places
+from mechdesign.analyses.region.field import LENGTH, Field, Places
 from mechdesign.analyses.region.rays import Designs
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.algebra import Value, quiet
@@ -38,7 +38,9 @@ class Local(Jacobian):
         """What local indices at points `z` are computed from."""
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             configuration = field.configuration(z, places)
-            jacobian = Jacobian.of(field.mechanism.linearize(configuration), field.outputs, field.length)
+            jacobian = Jacobian.of(
+                field.mechanism.linearize(configuration), field.outputs, places.get(LENGTH, field.length)
+            )
             return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
 
     @staticmethod

@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units
+from mechdesign.curve.ends import Ends
 from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import AssemblyError, Problem, StudyError
@@ -94,14 +95,14 @@ def point_path(study: Study) -> Result:
         part = np.sin(t / 2) ** 2
         *places, ratio = functions.at(line, functions.curve.inside(line, part))
         for end, side, fold in ((0, -1, functions.curve.pieces.fold[0]), (-1, 1, functions.curve.pieces.fold[-1])):
-            for name, values in zip(outputs, places, strict=True):
-                values[end] = functions.at_end(name, 0, float(end == -1), side)
+            there = functions.at_ends(outputs, line[:1], np.array([float(end == -1)]), np.array([side]))
+            for (value,), values in zip(there, places, strict=True):
+                values[end] = value
             # At a dead centre the point moves and the drive does not.
             ratio[end] = np.inf if fold else ratio[end]
         (arc, error), travel = functions.integral(_SPEED, line, part), path.high - path.low
         arc, error = arc * travel, error * travel
-        still = np.zeros((2, 1))
-        box = [functions.extremes(outputs, sign, still).value[:, 0] * sign for sign in (-1, 1)]
+        box = functions.extremes(outputs, np.zeros((2, 1))).value[..., 0]
         with np.errstate(divide="ignore"):
             rows.append([np.full(ROWS, k), path.low + travel * part, *places, ratio, 1 / ratio, arc])
         totals.append([
@@ -154,11 +155,12 @@ def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
     pieces = curve.pieces
     if not len(pieces.line):
         raise AssemblyError(f"no position of drive {drive} can be assembled within the limits")
-    if not curve.ends and turning:
+    ends = Ends(curve).ends
+    if not ends and turning:
         return [_Path(study, drive, drawn - np.pi, drawn + np.pi, closed=True)]
     # Stretches of the motion between its ends.
     end = f"end of the range of {drive}"
-    causes = {mark.place: f"{mark.cause.kind}: {mark.cause.joint}" for mark in curve.ends}
+    causes = {mark.place: f"{mark.cause.kind}: {mark.cause.joint}" for mark in ends}
     breaks = np.flatnonzero(np.append(True, ~pieces.joined_to_next | np.isin(pieces.end[:-1], list(causes))))
     stretches = zip(pieces.begin[breaks], pieces.end[np.append(breaks[1:] - 1, -1)], strict=True)
     paths = [

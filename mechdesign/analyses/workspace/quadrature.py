@@ -6,34 +6,46 @@ In polar coordinates about the scan's centre, with each panel's angle and each i
 
 where q has threefold points at 0 and 1: inverse square roots at the boundary (resistivity where a leg is stretched or
 folded) become smooth in v, and cusps, tangent rays and the logarithms that two such boundaries leave in their corner
-nearly so in u. The rule is Gauss-Legendre in u and in v. Cells of panels and segments of rays are halved until their
-estimated errors are small; a segment that crosses a forward singularity is divided there.
+nearly so in u. The rule is Gauss-Legendre in u and in v: one pass over the panels is enough for most designs. Of the
+others panels end, and intervals are divided, where isotropic points are; then cells of panels and strips of rays are
+halved, the worst first, until the estimated errors are small.
 
-The error estimate adds the errors along each ray by absolute value to those in the angle.
+The error is that in the angle, of the integrals along rays, and that along the rays, of the sums of neighbouring rays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.rays import Designs
-from mechdesign.analyses.region.rules import Rule, cosine, cubic, spread
-from mechdesign.analyses.workspace.index import Local, Prepared
+from mechdesign.analyses.region.rays import Intervals
+from mechdesign.analyses.region.rules import Rule, cubic, spread
+from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.strips import (
+    BLOCK,
+    RADII,
+    SEGMENT,
+    Integrand,
+    Parts,
+    Strips,
+    along,
+    divided,
+    evaluate,
+)  # fmt: skip
+from mechdesign.analyses.workspace.tips import ended_at, isotropic_points, through_points
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 ANGLES = Rule.of(20, 4, 6.0)
-RADII = Rule.of(11, 2, 2.0)
 MOST_PASSES = 24
-# Cells and segments are not halved more often than this.
+# Cells are not halved more often than this.
 MOST_HALVINGS = 12
-# Share of the tolerance for the errors along all rays.
-ALONG = 0.6
+# Share of the tolerance for the errors along all rays, and by how much it shrinks from pass to pass.
+ALONG, LESS = 0.6, 0.85
+# Cells are halved that exceed so many times their equal share of the tolerance.
+FAR = 2.0
 # Share of the tolerance for the area, the divisor of every mean; and its relative tolerance at most.
 AREA = 0.1
 FINEST_AREA = 1e-6
@@ -41,39 +53,15 @@ FINEST_AREA = 1e-6
 SLIVER = 1e-3
 # Cells of one design at most; what is in doubt then stays so, and its error tells.
 MOST_CELLS = 256
-# Share of the errors along rays that any ray may have: those at the ends of panels weigh little.
-SINGLE_RAY = 0.01
 # Rays, and nodes of each, of the rules of comparison unless the study says how many.
 RAYS, RADIAL_NODES = {"sector_mean": 101, "midpoint": 300}, {"sector_mean": 49, "midpoint": 200}
-# Segments evaluated at once (11 nodes each).
-BLOCK = 4096
-# Nearer to the boundary than this fraction of the radius, rounding spoils an index that is infinite there.
-NEAREST = 3e-14
-# Step of the difference that finds a forward singularity, as a fraction of the segment.
-STEP = 0.01
 
-# Parts of panels: which of [low, high] for u in [start, stop], and whether the means count it.
-CELL = np.dtype([("design", np.intp), *((name, float) for name in ("low", "high", "start", "stop", "counted"))])
-# Parts of intervals of rays: those of [inner, outer] for v in [start, stop].
-SEGMENT = np.dtype([
-    ("ray", np.intp), ("design", np.intp), *((name, float) for name in ("theta", "inner", "outer", "start", "stop"))
+# Parts of panels: which of [low, high] for u in [start, stop], whether the means count it, and its share of the errors
+# allowed along rays; the isotropic points at either end, if any (`TIP`).
+CELL = np.dtype([
+    *((name, np.intp) for name in ("design", "low_slot", "high_slot")),
+    *((name, float) for name in ("low", "high", "low_part", "high_part", "start", "stop", "counted", "share")),
 ])  # fmt: skip
-Parts = NDArray[Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Integrand:
-    """An index, or its square (for the standard deviation)."""
-
-    index: Prepared
-    power: int = 1
-
-    def values(self, local: Local) -> Floats:
-        """Values at points; 0 where there is none: on the boundary itself rounding leaves an interval of no width."""
-        found = np.broadcast_to(np.asarray(self.index.values(local), dtype=float), local.configuration.shape)
-        with np.errstate(over="ignore", invalid="ignore"):
-            found = found**self.power
-        return np.where(np.isfinite(found), found, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +74,15 @@ class Integral:
         Area of the region.
     mean, mean_error : ndarray, shape (integrands, designs)
         Means over the region within the margins of the scan; nan where empty, infinite where the integral is.
-    boundary : (design, angle, radius)
-        Points of the boundary that were met.
+    boundary : (design, angle, intervals)
+        Rays on which it was met.
     """
 
     area: Floats
     area_error: Floats
     mean: Floats
     mean_error: Floats
-    boundary: tuple[Ints, Floats, Floats]
-
-
-def _divided(parts: Parts, at: Floats) -> Parts:
-    """Every part as two, divided at `at`; all first parts come first."""
-    lower, upper = parts.copy(), parts.copy()
-    lower["stop"] = upper["start"] = at
-    return np.concatenate([lower, upper])
+    boundary: tuple[Ints, Floats, Intervals]
 
 
 def integrate(
@@ -123,175 +104,153 @@ def integrate(
     """
     count = len(panels.closes)
     middle = 0.5 * (panels.low + panels.high)
-    fresh = np.zeros(len(middle), dtype=CELL)
-    fresh["design"], fresh["low"], fresh["high"], fresh["stop"] = panels.design, panels.low, panels.high, 1.0
-    fresh["counted"] = (middle > counted[0]) & (middle < counted[1])
-    span = np.bincount(panels.design, panels.high - panels.low, count).astype(float)
-    done = fresh[:0]
-    # Rows: area, area within the margins, and the integrands; of the values and of their errors.
-    values = errors = np.zeros((2 + len(integrands), 0))
+    cells = np.zeros(len(middle), dtype=CELL)
+    cells["design"], cells["low"], cells["high"], cells["stop"] = panels.design, panels.low, panels.high, 1.0
+    cells["low_slot"] = cells["high_slot"] = -1
+    cells["counted"] = (middle > counted[0]) & (middle < counted[1])
+    cells["share"] = (1 / np.maximum(np.bincount(panels.design, minlength=count), 1))[panels.design]
     each = np.where(endless, np.inf, tolerance)
     of_area = min(AREA * tolerance, FINEST_AREA)
-    allowed: Floats | None = None
-    boundary: tuple[Ints, Floats, Floats] | None = None
-    for _ in range(MOST_PASSES):
-        value, error, allowed, met = _evaluate(panels, integrands, fresh, each, allowed, span)
-        boundary = met if boundary is None else boundary
-        done = np.concatenate([done, fresh])
-        values, errors = np.concatenate([values, value], axis=1), np.concatenate([errors, error], axis=1)
-        owner = done["design"]
-        total, doubt = (np.stack([np.bincount(owner, row, count) for row in rows]) for rows in (values, errors))
+
+    def wanted(total: Floats) -> Floats:
         with np.errstate(invalid="ignore"):
-            area_wanted = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
-            wanted = np.concatenate([area_wanted, np.where(endless, np.inf, np.fmax(each * total[2:], 0.0))])
-        cells = np.bincount(owner, minlength=count)
-        late = (doubt > wanted).any(axis=0) & (cells < MOST_CELLS)
-        if not late.any():
-            break
+            area = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
+            return np.concatenate([area, np.where(endless, np.inf, np.fmax(each * total[2:], 0.0))])
+
+    first = Fan.of(panels, integrands, cells)
+    new = first.integrals(integrands, np.full_like(each, np.inf))
+    total, doubt = new.of_designs(count)
+    allowed = ALONG * np.maximum(wanted(total)[2:], np.finfo(float).tiny)
+    rough = np.asarray((doubt > wanted(total))[2:].any(axis=0))
+    tips = isotropic_points(panels, cells, first.strips, rough[cells["design"]])
+    plain = np.ones(len(cells), dtype=bool)
+    plain[tips["cell"]] = False
+    new = first.integrals(integrands, allowed, plain)
+    if len(tips):
+        new = new.joined(Fan.of(panels, integrands, ended_at(cells, tips)).integrals(integrands, allowed))
+    done = new
+    for _ in range(MOST_PASSES):
+        owner = done.cells["design"]
+        total, doubt = done.of_designs(count)
+        most, number = wanted(total), np.bincount(owner, minlength=count)
+        late = (doubt > most).any(axis=0) & (number < MOST_CELLS)
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
-        allowed = np.where(late, 0.5, 1.0) * allowed
-        share = errors / np.maximum(wanted, 1e-300)[:, owner]
-        worst = np.zeros((len(wanted), count))
-        for row in range(len(wanted)):
+        allowed = np.where(late, LESS, 1.0) * allowed
+        share = done.error / np.maximum(most, 1e-300)[:, owner]
+        worst = np.zeros((len(most), count))
+        for row in range(len(most)):
             np.maximum.at(worst[row], owner, share[row])
-        # The worst cell, and those that exceed their equal share of the tolerance.
-        equal = 1 / np.maximum(cells, 1)
-        over = (share >= np.minimum(worst, equal)[:, owner]) & (doubt > wanted)[:, owner]
-        split = over.any(axis=0) & (done["stop"] - done["start"] > 2.0**-MOST_HALVINGS) & late[owner]
+        # The worst cell, and those that exceed their equal share of the tolerance by far.
+        over = (share >= np.minimum(worst, FAR / np.maximum(number, 1))[:, owner]) & (doubt > most)[:, owner]
+        split = over.any(axis=0) & (done.cells["stop"] - done.cells["start"] > 2.0**-MOST_HALVINGS) & late[owner]
         if not split.any():
             break
-        fresh = _divided(done[split], 0.5 * (done["start"] + done["stop"])[split])
-        done, values, errors = done[~split], values[:, ~split], errors[:, ~split]
-    assert boundary is not None
+        rough_cells = done.cells[split]
+        fresh = divided(rough_cells, 0.5 * (rough_cells["start"] + rough_cells["stop"]))
+        done = done.kept(~split).joined(Fan.of(panels, integrands, fresh).integrals(integrands, allowed))
+    total, doubt = done.of_designs(count)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = total[2:] / total[1]
         mean_error = (doubt[2:] + np.abs(mean) * doubt[1]) / total[1]
     mean[endless & (total[1] > 0)], mean_error[endless] = np.inf, 0.0
-    return Integral(total[0], doubt[0], mean, mean_error, boundary)
+    return Integral(total[0], doubt[0], mean, mean_error, first.boundary)
 
 
-def _evaluate(
-    panels: Panels, integrands: Sequence[Integrand], cells: Parts, tolerance: Floats, allowed: Floats | None,
-    span: Floats,
-) -> tuple[Floats, Floats, Floats, tuple[Ints, Floats, Floats]]:  # fmt: skip
-    """Values and errors (rows, cells) of new cells, the error allowed along rays (integrands, designs), the boundary.
+@dataclass(frozen=True, eq=False)
+class Integrals:
+    """Integrals over cells: of 1, of 1 within the margins of the scan, of the integrands; (rows, cells), and errors."""
 
-    `tolerance` is of each integrand and design.
+    cells: Parts
+    value: Floats
+    error: Floats
+
+    def kept(self, keep: Flags) -> Integrals:
+        """Those of some cells."""
+        return Integrals(self.cells[keep], self.value[:, keep], self.error[:, keep])
+
+    def joined(self, other: Integrals) -> Integrals:
+        """Those of all cells of both."""
+        values = np.concatenate([self.value, other.value], axis=1)
+        errors = np.concatenate([self.error, other.error], axis=1)
+        return Integrals(np.concatenate([self.cells, other.cells]), values, errors)
+
+    def of_designs(self, count: int) -> tuple[Floats, Floats]:
+        """Sums over the cells of each design, and of their errors; (rows, designs)."""
+        owner = self.cells["design"]
+        value, error = (np.array([np.bincount(owner, row, count) for row in rows]) for rows in (self.value, self.error))
+        return value, error
+
+
+@dataclass(frozen=True, eq=False)
+class Fan:
+    """The rays of cells.
+
+    Parameters
+    ----------
+    weight : ndarray, shape (nodes, cells)
+        Slope of the angle, per unit of the rule's variable.
+    area : ndarray, shape (nodes, cells)
+        Integral of the radius along each ray.
+    strips : Strips
+        Of the whole intervals, but that those with an isotropic point are divided.
+    boundary : (design, angle, intervals)
+        All rays.
     """
-    nodes, count = len(ANGLES.nodes), len(cells)
-    middle, half = 0.5 * (cells["start"] + cells["stop"]), 0.5 * (cells["stop"] - cells["start"])
-    place, density = spread(cells["low"], cells["high"], middle + half * ANGLES.nodes[:, None], cubic)
-    theta, weight = place.ravel(), (half * density).ravel()
-    design, counted = np.tile(cells["design"], nodes), np.tile(cells["counted"], nodes)
-    intervals = panels.trace(design, theta)
-    ray, inner, outer = intervals.ray, intervals.inner, intervals.outer
-    area = np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta))
-    value = error = np.zeros((len(integrands), len(theta)))
-    if integrands:
-        segments = np.zeros(len(ray), dtype=SEGMENT)
-        for name, part in (("design", design[ray]), ("theta", theta[ray]), ("stop", 1.0)):
-            segments[name] = part
-        segments["ray"], segments["inner"], segments["outer"] = ray, inner, outer
-        first = _segments(panels.designs, integrands, segments)
-        if allowed is None:
-            share = weight * np.repeat(ANGLES.weights, count)
-            sums = [np.bincount(design[ray], row * share[ray], len(panels.closes)) for row in first[0]]
-            allowed = np.asarray(ALONG * tolerance * np.maximum(sums, np.finfo(float).tiny), dtype=float)
-        each = allowed[:, design] * np.maximum(1 / span[design], SINGLE_RAY / weight)
-        value, error = _along(panels.designs, integrands, segments, first, each)
-    rows = (area, area * counted, *(value * counted))
-    total, doubt = np.empty((2, len(rows), count))
-    for k, row in enumerate(rows):
-        total[k], doubt[k] = ANGLES.apply((row * weight).reshape(nodes, -1))
-    for k in range(len(integrands)):
-        doubt[2 + k] += ANGLES.weights @ (error[k] * weight * counted).reshape(nodes, -1)
-    met = (np.tile(design[ray], 2), np.tile(theta[ray], 2), np.concatenate([inner, outer]))
-    return total, doubt, np.zeros_like(tolerance) if allowed is None else allowed, met
 
+    panels: Panels
+    cells: Parts
+    weight: Floats
+    area: Floats
+    strips: Strips
+    boundary: tuple[Ints, Floats, Intervals]
 
-def _along(
-    designs: Designs, integrands: Sequence[Integrand], segments: Parts, evaluated: tuple[Floats, Floats, Floats],
-    allowed: Floats,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Integrals along rays and their estimated errors, both of shape (integrands, rays).
+    @staticmethod
+    def of(panels: Panels, integrands: Sequence[Integrand], cells: Parts) -> Fan:
+        """Trace the rays at the nodes of cells and evaluate the integrands along them."""
+        shape = nodes, count = len(ANGLES.nodes), len(cells)
+        middle, half = 0.5 * (cells["start"] + cells["stop"]), 0.5 * (cells["stop"] - cells["start"])
+        place, density = spread(cells["low"], cells["high"], middle + half * ANGLES.nodes[:, None], cubic)
+        theta, weight = place.ravel(), half * density
+        design = np.tile(cells["design"], nodes)
+        found = panels.trace(design, theta)
+        ray, inner, outer = found.ray, found.inner, found.outer
+        area = np.asarray(np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta)), dtype=float)
+        segments = np.zeros(len(ray) if integrands else 0, dtype=SEGMENT)
+        if integrands:
+            cell, slot = ray % count, found.slot
+            by = (weight * ANGLES.weights[:, None] * cells["counted"]).ravel()[ray]
+            for name, part in (("ray", ray), ("design", design[ray]), ("cell", cell), ("slot", slot),
+                               ("strip", 2 * (cell * (int(slot.max(initial=0)) + 1) + slot)), ("theta", theta[ray]),
+                               ("inner", inner), ("outer", outer), ("stop", 1.0), ("weight", by)):  # fmt: skip
+                segments[name] = part
+            segments = through_points(cells[cell], segments)
+        strips = evaluate(panels.designs, integrands, segments)
+        return Fan(panels, cells, weight, area.reshape(shape), strips, (design, theta, found))
 
-    `evaluated` is what `_segments` gives. A segment is divided if its error is larger than `allowed` on its ray.
-    """
-    value, error = np.zeros((2, *allowed.shape))
-    found, doubt, crossing = evaluated
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # What an inverse square root has within `NEAREST` of the boundary.
-        noise = np.sqrt(NEAREST * segments["outer"] / (segments["outer"] - segments["inner"])) * np.abs(found)
-    for halvings in range(MOST_HALVINGS + 1):
-        ray = segments["ray"]
-        split = (doubt > np.maximum(allowed[:, ray], noise)).any(axis=0) & (halvings < MOST_HALVINGS)
-        for k in range(len(integrands)):
-            value[k] += np.bincount(ray[~split], found[k, ~split], allowed.shape[1])
-            error[k] += np.bincount(ray[~split], doubt[k, ~split], allowed.shape[1])
-        if not split.any():
-            break
-        rough, at = segments[split], 0.5 * (segments["start"] + segments["stop"])[split]
-        crossed = np.flatnonzero(np.isfinite(crossing[split]))
-        if crossed.size:
-            at[crossed] = _crossing(designs, rough[crossed], crossing[split][crossed])
-        segments, noise = _divided(rough, at), np.tile(noise[:, split], 2)
-        found, doubt, crossing = _segments(designs, integrands, segments)
-    return value, error
+    def integrals(self, integrands: Sequence[Integrand], allowed: Floats, keep: Flags | None = None) -> Integrals:
+        """Integrals over the cells, or some; their errors along rays are no more than is allowed a whole design."""
+        cells, count = self.cells, len(self.cells)
+        keep = np.ones(count, dtype=bool) if keep is None else keep
+        width = cells["share"] * (cells["stop"] - cells["start"]) * keep
+        part = np.bincount(cells["design"], width, allowed.shape[1])
+        strips = self.strips.of_cells(keep)
+        # A design without cells may err as it likes.
+        share = np.where(part > 0, allowed * np.where(part > 0, part, 1.0), np.inf)
+        value, error = along(self.panels.designs, integrands, strips, share, self.area.size, count)
+        value = value.reshape(-1, *self.area.shape) * cells["counted"]
+        rows = self.area, self.area * cells["counted"], *value
+        values, errors = np.stack([ANGLES.apply(row * self.weight) for row in rows], axis=1)
+        errors[2:] += error + self._lost(value)
+        return Integrals(cells, values, errors).kept(keep)
 
-
-def _segments(designs: Designs, integrands: Sequence[Integrand], segments: Parts) -> tuple[Floats, Floats, Floats]:
-    """Integrals of indices times radius over segments, and their errors, both of shape (integrands, segments).
-
-    And v near which a forward singularity divides a segment; nan where none does.
-    """
-    found, doubt = np.empty((2, len(integrands), len(segments)))
-    crossing = np.full(len(segments), np.nan)
-    for k in range(0, len(segments), BLOCK):
-        at = slice(k, k + BLOCK)
-        part = segments[at]
-        inner, outer = part["inner"], part["outer"]
-        half = 0.5 * (part["stop"] - part["start"])
-        v = part["start"] + half * (1 + RADII.nodes[:, None])
-        r, slope = spread(inner, outer, v, cosine)
-        # In an interval so narrow, rounding leaves nothing of the closures: it only exists at a cusp.
-        measure = np.where(outer - inner > 100 * NEAREST * outer, r * slope * half, 0.0)
-        gap = np.minimum(NEAREST * outer, 0.5 * (outer - inner))
-        local = Local.on_rays(designs, part["design"], part["theta"], np.clip(r, inner + gap, outer - gap))
-        for j, integrand in enumerate(integrands):
-            found[j, at], doubt[j, at] = RADII.apply(integrand.values(local) * measure)
-        if not designs.field.same_assembly:
-            crossing[at] = _sign_change(v, _inverse_determinant(local, r.shape))
-    return found, doubt, crossing
-
-
-def _inverse_determinant(local: Local, shape: tuple[int, ...]) -> Floats:
-    """One by the determinant of the Jacobian, which changes its sign at a forward singularity."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.broadcast_to(1 / local.determinant, shape)
-
-
-def _sign_change(x: Floats, values: Floats) -> Floats:
-    """A root between two nodes (first axis), by a straight line; nan where there is none."""
-    # Where rounding leaves nothing of a determinant, at a cusp, its sign tells no place.
-    known = np.isfinite(values).all(axis=0)
-    change = (values[1:] > 0) != (values[:-1] > 0)
-    first, lane = change.argmax(axis=0), np.arange(values.shape[1])
-    a, b = values[first, lane], values[first + 1, lane]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = x[first, lane] + (x[first + 1, lane] - x[first, lane]) * a / (a - b)
-    return np.where(known & change.any(axis=0), root, np.nan)
-
-
-def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:
-    """Where a forward singularity divides segments, by a step of Newton's method from `v`."""
-    step = STEP * (segments["stop"] - segments["start"])
-    around = v + step * np.array([-1.0, 0.0, 1.0])[:, None]
-    r = spread(segments["inner"], segments["outer"], around, cosine)[0]
-    local = Local.on_rays(designs, segments["design"], segments["theta"], r)
-    low, middle, high = _inverse_determinant(local, r.shape)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shift = 2 * middle / (low - high)
-    return np.asarray(v + step * np.where(np.abs(shift) < 1, shift, 0.0))
+    def _lost(self, value: Floats) -> Floats:
+        """What integrands may have on rays whose interval rounding closes, at a cusp: as much as on the next ray."""
+        met, node = self.area > 0, np.arange(len(self.area))[:, None]
+        before = np.maximum.accumulate(np.where(met, node, -1))
+        after = np.minimum.accumulate(np.where(met, node, len(node))[::-1])[::-1]
+        nearest = np.where((before >= 0) & (node - before <= after - node), before, after) % len(node)
+        weight = ANGLES.weights[:, None] * self.weight * ~met
+        return np.asarray((np.abs(np.take_along_axis(value, nearest[None], axis=1)) * weight).sum(axis=1))
 
 
 def simple_means(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,8 +16,9 @@ from mechdesign.analyses.region.rays import SAME_ROOT, Designs, Effort, Interval
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
-from mechdesign.analyses.workspace.quadrature import Integrand, integrate, simple_means
-from mechdesign.analyses.workspace.ranged import Every, Some, SomeDesigns
+from mechdesign.analyses.workspace.quadrature import integrate, simple_means
+from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
+from mechdesign.analyses.workspace.strips import Integrand
 from mechdesign.errors import Problem, StudyError
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -25,6 +26,8 @@ from mechdesign.numerics.roots import dips
 from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
+from mechdesign.study.text.fields import parts_of
+from mechdesign.study.text.units import Amount
 
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
@@ -44,6 +47,7 @@ BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 # part of the way there from the last ray that meets it; beyond that ray the distance falls so much more than before it,
 # at so small a part of the angle that is left.
 RISE, TIP, SHARP, TOWARDS = 0.5, 2.0, 4.0, 0.5
+FLAT = 0.1 * SAME_ROOT
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
 EVERY: Any = slice(None)
@@ -99,6 +103,16 @@ def split(column: str) -> tuple[str, str]:
         return MEANS[column], "mean"
     name, _, kind = column.rpartition("_")
     return (name, kind) if kind in STATISTICS and name in INDEX_NAMES else ("", "")
+
+
+def shared(study: Study, asked: Sequence[Question], moved: Collection[str]) -> bool:
+    """Whether designs that differ in these parameters share the questions, but for what their fields take as arrays."""
+    field = asked[0].field
+    of_field = ("workspace.characteristic_length", *(() if field.plan.iterative else ("workspace.at.",)))
+    numbers = [part for key, part in parts_of(study.workspace, "workspace") if not key.startswith(of_field)]
+    followed = {name for part in numbers if isinstance(part, Amount) and part.expression
+                for name in part.expression.names}  # fmt: skip
+    return not isinstance(field, Ranged) and followed.union(study.fixed).isdisjoint(moved)
 
 
 def batched(column: str) -> bool:
@@ -293,26 +307,27 @@ def _statistic(
     return spread, error
 
 
-def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple[Floats, Floats]:
+def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Intervals]) -> tuple[Floats, Floats]:
     """Areas of the rectangles and their errors, shape (designs,) [S1, eq. 26]; 0 where the region is empty.
 
     The farthest place in a direction is a corner or cusp at the end of a panel, where rays are traced at several
     angles beside the end, or lies on a smooth curve, where parabolas through boundary points lead to it. A cusp may be
     too thin to be met at its tip, which is then at the end of the line through the places met beside it.
     """
-    count, about, (design, theta, radius) = len(panels.closes), panels.designs.about, boundary
+    count, (design, theta, met) = len(panels.closes), boundary
     width = 0.5 * (panels.high - panels.low)
     ends = np.stack([panels.low + width * BESIDE[:, None], panels.high - width * BESIDE[:, None]], axis=1)
     owner = np.broadcast_to(panels.design, ends.shape).ravel()
     traced = panels.trace(owner, ends.ravel(), SLACK)
     beside = _farthest(panels.designs, ends.ravel(), traced)
-    rays, ray = np.unique(design + 1j * theta, return_inverse=True)
-    within = np.full((len(SIDES), len(rays)), -np.inf)
-    np.maximum.at(within, (EVERY, ray), ((about + radius * np.exp(1j * theta)) * SIDES[:, None]).real)
-    rays, order = np.unique(np.concatenate([rays, owner + 1j * ends.ravel()]), return_index=True)
-    design, theta, away = rays.real.astype(np.intp), rays.imag, np.concatenate([within, beside], axis=1)[:, order]
-    at_end = np.zeros(len(rays), dtype=bool)
-    at_end[np.searchsorted(rays, owner + 1j * ends.ravel())[: 2 * len(width)]] = True
+    some = np.flatnonzero(met.counts)
+    within = _farthest(panels.designs, theta, met)[:, some]
+    design, theta = np.concatenate([owner, design[some]]), np.concatenate([ends.ravel(), theta[some]])
+    away, at_end = np.concatenate([beside, within], axis=1), np.arange(len(design)) < 2 * len(width)
+    order = np.lexsort((theta, design))
+    # Neighbouring panels end at one ray.
+    order = order[np.append(True, (np.diff(design[order]) > 0) | (np.diff(theta[order]) > 0))]
+    design, theta, away, at_end = design[order], theta[order], away[:, order], at_end[order]
     best = np.full((2, len(SIDES), count), -np.inf)
     np.maximum.at(best, (EVERY, EVERY, design), away)
     same = (design[2:] == design[:-2]) & ~at_end[1:-1]
@@ -320,6 +335,8 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
     with np.errstate(invalid="ignore"):
         fall = np.maximum(*(np.where(np.isfinite(other), here - other, 0.0) for other in (before, after)))
         top = same & (here >= before) & (here >= after) & (here + RISE * fall >= best[0][:, design[1:-1]])
+    # Where a curve cannot rise by more than two ends of an interval that are one, there is nothing to climb.
+    top &= RISE * fall > FLAT * panels.reach[design[1:-1]]
     side, middle = np.nonzero(top)
     if len(side):
         near = middle + np.arange(3)[:, None]
@@ -340,11 +357,9 @@ def bounding_box(panels: Panels, boundary: tuple[Ints, Floats, Floats]) -> tuple
 
 def _farthest(designs: Designs, theta: Floats, traced: Intervals) -> Floats:
     """How far rays reach in each direction of the rectangle, shape (directions, rays); -inf where they meet nothing."""
-    found = np.full((len(SIDES), len(theta)), -np.inf)
-    for radius in (traced.inner, traced.outer):
-        place = designs.about + radius * np.exp(1j * theta[traced.ray])
-        np.maximum.at(found, (EVERY, traced.ray), (place * SIDES[:, None]).real)
-    return found
+    places = designs.about + traced.by_ray(traced.inner, traced.outer) * np.exp(1j * theta)
+    away = (places * SIDES[:, None, None, None]).real
+    return np.asarray(np.fmax.reduce(away, axis=(1, 2), initial=-np.inf))
 
 
 def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats) -> Floats:

@@ -120,7 +120,7 @@ def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
 
 
 def _tolerance(name: str, raw: Any) -> float:
-    size = read_number(raw, Context(), "none" if name == "rtol" else None).nominal
+    size = read_number(raw, Context(), "none" if name == "rtol" else None)
     if size < 0:
         raise failure(f"{name} is a number from 0 on, not {shown(raw)}")
     return size

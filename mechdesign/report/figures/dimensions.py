@@ -208,12 +208,12 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
             rows.append((name, " to ".join(link.ends), "variable", "", _section(study, name)))
         for _, one, other, value, angle in own:
             place = f"{name}.length" if link.ends == (one, other) or link.ends == (other, one) else ""
-            text = _tolerance(tolerances.pop(place)) if place in tolerances else ""
+            text = _tolerance(tolerances.pop(place), study.sizes[place]) if place in tolerances else ""
             section = "" if name in described else _section(study, name)
             rows.append(("" if name in described else name, f"{one} to {other}", _number(value, angle), text, section))
             described.add(name)
     rows += _guides(scene)
-    rows += [(name, "", _nominal(study, name), _tolerance(given, _unit(study, name)), "")
+    rows += [(name, "", _nominal(study, name), _tolerance(given, study.sizes.get(name, 0.0), _unit(study, name)), "")
              for name, given in tolerances.items()]  # fmt: skip
     kept = [k for k in range(5) if any(row[k] for row in rows[1:])]
     return [tuple(row[k] for k in kept) for row in rows]
@@ -241,10 +241,10 @@ def _unit(study: Study, name: str) -> str:
     return "" if unit == study.units.label("length") else style.printed(unit)
 
 
-def _tolerance(given: Dimension, unit: str = "") -> str:
+def _tolerance(given: Dimension, nominal: float, unit: str = "") -> str:
     if given.measured is not None:
         return "measured"
-    low, high = given.ends
+    low, high = given.ends(nominal)
     if given.sigma is not None:
         words = f"\N{GREEK SMALL LETTER SIGMA} = {given.sigma:g}"
     else:

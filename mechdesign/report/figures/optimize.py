@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from itertools import combinations, cycle
-from string import ascii_uppercase
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,21 +14,23 @@ from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
 from mechdesign.analyses.optimize.judge import Designs
+from mechdesign.analyses.optimize.variables import variables_of
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
+from mechdesign.report.figures.designs import folded, head, label, listed, tick, value_text
+from mechdesign.report.figures.front import chosen, described, front_figure, marked
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.boundary import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
-from mechdesign.results import Result, Table
+from mechdesign.results import Result
 from mechdesign.study import Study
 
 MIN_MAP_DESIGNS = 9
 MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
-_FRONT_MARKS = "so^DvPX"
 # More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
 MAX_LINES = 300
 # Steps along a variable in which the best of scattered designs is found, and how many values no grid exceeds.
@@ -42,7 +41,6 @@ FEWEST_OF_FIELD = 1000
 # Directions from the centre of what the workspace contains to its outline.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _LETTER = 0.08  # inches
-_NAME_LETTERS = 14  # of a name in one line below an axis
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
 
@@ -68,17 +66,6 @@ def figures(study: Study, result: Result) -> Gallery:
     return found
 
 
-def _marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
-    """Designs of a front that are shown, and their rows: the best of each goal, and the knee between them."""
-    found: dict[int, str] = {}
-    for letter, goal in zip(ascii_uppercase, designs.goals, strict=False):
-        best = np.argmin if goal.smallest else np.argmax
-        found.setdefault(int(best(front[goal.name])), f"{letter}: best {goal.name}")
-    found.setdefault(int(np.argmax(front["knee"])), "knee")
-    # Along the first goal, as the front runs.
-    return [(found[row], row) for row in sorted(found)]
-
-
 def _optimum(result: Result, designs: Designs) -> Figure:
     """The best design itself: in its workspace where that was judged, in its motion where that was.
 
@@ -86,8 +73,8 @@ def _optimum(result: Result, designs: Designs) -> Figure:
     """
     if "pareto" in result.tables:
         front = result.tables["pareto"]
-        parts = [(_described(designs, front, name, row), *result.drawn["design"](_variables(designs, front, row)))
-                 for name, row in _marked(designs, front)]  # fmt: skip
+        parts = [(described(designs, front, name, row), *result.drawn["design"](chosen(designs, front, row)))
+                 for name, row in marked(designs, front)]  # fmt: skip
         moving = ("motion" in own.drawn and own.drawn["motion"].configuration.valid.any() for _, _, own in parts)
         if len(parts) > 1 and all(moving):
             return designs_figure(parts)
@@ -97,8 +84,8 @@ def _optimum(result: Result, designs: Designs) -> Figure:
             for axes, (_, _, own) in zip(figure.axes, parts, strict=True):
                 _draw_contained(axes, own)
             return figure
-    best, own = result.drawn["design"](designs.numbers(designs.best))
-    words = _listed(designs.numbers(designs.best))
+    best, own = result.drawn["design"](designs.design(designs.best))
+    words = listed(designs.design(designs.best))
     if own.command == "workspace":
         region = regions(best, own)[0]
         there = f", at {region.title}" if region.title else ""
@@ -118,27 +105,6 @@ def _draw_contained(axes: Axes, own: Result) -> None:
     for shape, centre in own.drawn["contained"]:
         z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
         axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
-
-
-def _variables(designs: Designs, front: Table, row: int) -> dict[str, float]:
-    return {name: float(front[name][row]) for name in designs.variables}
-
-
-def _described(designs: Designs, front: Table, name: str, row: int) -> str:
-    """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
-    lines = [f"{variable} = {value:.4g}" for variable, value in _variables(designs, front, row).items()]
-    lines += [f"{goal.column} = {front[goal.name][row]:.3g} {designs.unit_of(goal.name)}" for goal in designs.goals]
-    return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])
-
-
-def _listed(numbers: Mapping[str, float]) -> str:
-    """``l_a = 1, l_b = 2.15``."""
-    return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
-
-
-def label(designs: Designs, name: str) -> str:
-    """Name and unit of a variable or a goal, for an axis."""
-    return style.axis_label(name, designs.unit_of(name))
 
 
 def score_curves(designs: Designs) -> Figure:
@@ -161,24 +127,28 @@ def score_curves(designs: Designs) -> Figure:
         if count > 1:
             axes.plot(column[feasible], score[feasible], ".", color=style.FAINT, markersize=3, markeredgewidth=0,
                       label="designs")  # fmt: skip
-        axes.plot(column[best], score[best], color=style.INK, linewidth=1.6 if count > 1 else 2.0,
+        axes.locator_params(axis="x", nbins=6)
+        chosen_only = tick(axes.xaxis, designs, name)
+        # Nothing lies between choices.
+        axes.plot(column[best], score[best], "_" if chosen_only else "-", color=style.INK, markersize=18,
+                  markeredgewidth=2.0, linewidth=1.6 if count > 1 else 2.0,
                   label="best near each value" if count > 1 else told)  # fmt: skip
         for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
             dashes = style.DASHES[(k + 1) % len(style.DASHES)]
             axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
                       label=f"{designs.goals[k].name}, normalised")  # fmt: skip
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
-        axes.set_title(f"best: {name} = {column[winner]:.4g}", loc="right", fontsize=9, color=style.VERMILION)
+        words = f"best: {listed({name: designs.design(winner)[name]})}"
+        axes.set_title(words, loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
-        axes.set_ylabel("" if number % across else "index" if many and count == 1 else _folded(told))
-        axes.margins(x=0.02)
-        axes.locator_params(axis="x", nbins=6)
+        axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(told))
+        axes.margins(x=0.2 if chosen_only else 0.02)
         if steep:
             axes.set_yscale("log")
     among = "" if count == 1 else " over each variable"
     better = "" if many else f", {'less' if one.smallest else 'more'} is better"
     what = f"Composite performance index of ({', '.join(each.name for each in designs.goals)})" if many else one.name
-    _head(figure, f"{what}{among}{better}")
+    head(figure, f"{what}{among}{better}")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=fitting(labels) if style.narrow() else 5)
     return figure
@@ -205,7 +175,7 @@ def _steep(values: Floats) -> bool:
 
 def score_surface(designs: Designs) -> Figure:
     """The score over two variables as a map, with the best design for each row of weights [S1, Fig. 3(b)]."""
-    goals, (x, y) = [each.name for each in designs.goals], designs.variables.values()
+    goals = [each.name for each in designs.goals]
     many = len(goals) > 1
     figure = style.new_figure(5.2)
     axes = figure.add_subplot()
@@ -213,12 +183,13 @@ def score_surface(designs: Designs) -> Figure:
     what = "composite performance index CPI" if many else label(designs, goals[0])
     digits = FuncFormatter(lambda value, _: f"{value:.3g}")
     style.color_bar(figure, filled, what, ax=axes, pad=0.02, format=digits).minorticks_off()
-    shown: dict[tuple[float, float], list[str]] = {}
-    for row, weights in zip(designs.winners, designs.weights, strict=True):
-        shown.setdefault((x[row], y[row]), []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
-    for k, (place, rows) in enumerate(shown.items()):
-        words = f"{place[0]:.4g}, {place[1]:.4g}: " + (f"best for {' '.join(rows)}" if many else "best")
+    shown: dict[int, list[str]] = {}
+    for row, weights in zip(designs.winners.tolist(), designs.weights, strict=True):
+        shown.setdefault(row, []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
+    for k, (row, rows) in enumerate(shown.items()):
+        words = ", ".join(map(value_text, designs.design(row).values())) + ": best" + f" for {' '.join(rows)}" * many
         words = style.folded(words, 9.0, style.width() - 0.6)
+        place = [column[row] for column in designs.variables.values()]
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
                   linestyle="none", label=words, clip_on=False, zorder=5)  # fmt: skip
     title = f"CPI over the design variables, and the best designs for weights of ({', '.join(goals)})"
@@ -251,6 +222,8 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     across, up = designs.variables
     axes.set_xlabel(label(designs, across))
     axes.set_ylabel(label(designs, up))
+    tick(axes.xaxis, designs, across)
+    tick(axes.yaxis, designs, up)
     axes.grid(visible=False)
     inside = designs.feasible & np.isfinite(values)
     x, y, z = (column[inside] for column in (*designs.variables.values(), values))
@@ -290,8 +263,8 @@ def parallel_axes(designs: Designs) -> Figure:
     columns = np.column_stack([*designs.variables.values(), designs.values])
     low, high = columns[designs.feasible].min(axis=0), columns[designs.feasible].max(axis=0)
     heights = np.where(high > low, (columns - low) / np.where(high > low, high - low, 1.0), 0.5)
-    upright, words = style.narrow(), [label(designs, name) for name in names]
-    figure = style.new_figure(4.2 + upright * _LETTER * max(map(len, words)))
+    upright, titles = style.narrow(), [label(designs, name) for name in names]
+    figure = style.new_figure(4.2 + upright * _LETTER * max(map(len, titles)))
     axes = figure.add_subplot()
     places = np.arange(len(names))
     lines = [np.column_stack([places, heights[row]]) for row in rows]
@@ -300,13 +273,15 @@ def parallel_axes(designs: Designs) -> Figure:
     axes.plot(places, heights[designs.best], "o-", color=style.VERMILION, linewidth=2.2, label="best", clip_on=False,
               zorder=4)  # fmt: skip
     size = 7.0 if upright else 8.5
-    for place, ends in enumerate(zip(low, high, strict=True)):
+    for place, (name, *ends) in enumerate(zip(names, low, high, strict=True)):
+        words = variables_of(designs.study)[name].words if place < len(designs.variables) else ()
+        bottom, top = (words[int(end)] if words else f"{end:.4g}" for end in ends)
         axes.axvline(place, color=style.INK, linewidth=0.8, zorder=3)
-        axes.text(place, -0.03, f"{ends[0]:.4g}", ha="center", va="top", fontsize=size)
-        axes.text(place, 1.03, f"{ends[1]:.4g}", ha="center", va="bottom", fontsize=size)
+        axes.text(place, -0.03, bottom, ha="center", va="top", fontsize=size)
+        axes.text(place, 1.03, top, ha="center", va="bottom", fontsize=size)
     axes.set_xlim(-0.3, len(names) - 0.7)
     axes.set_ylim(-0.02, 1.02)
-    axes.set_xticks(places, words if upright else map(_folded, words), rotation=90 if upright else 0)
+    axes.set_xticks(places, titles if upright else map(folded, titles), rotation=90 if upright else 0)
     axes.tick_params(axis="x", length=0, pad=18)
     axes.set_yticks([])
     axes.spines[["left", "bottom"]].set_visible(False)
@@ -316,16 +291,6 @@ def parallel_axes(designs: Designs) -> Figure:
     what = "sum of the normalised goals" if len(designs.goals) > 1 else "normalised goal"
     style.color_bar(figure, drawn, what, ax=axes, pad=0.02)
     return figure
-
-
-def _folded(name: str) -> str:
-    """A long name on two or more lines, broken after its dots, underscores and spaces."""
-    lines = [""]
-    for part in re.findall(r"[^._ ]*[._ ]?", name):
-        if lines[-1] and len(lines[-1]) + len(part) > _NAME_LETTERS:
-            lines.append("")
-        lines[-1] += part
-    return "\n".join(lines)
 
 
 def convergence(designs: Designs) -> Figure:
@@ -355,57 +320,8 @@ def convergence(designs: Designs) -> Figure:
         found = so_far[known]
         if (found > 0).all() and found.max() > 20 * found.min():
             axes.set_yscale("log")
-        axes.set_ylabel(_folded(label(designs, goal.name)))
+        axes.set_ylabel(folded(label(designs, goal.name)))
     axes.set_xlabel("designs evaluated")
     axes.set_title("Convergence of the search", loc="left")
     axes.margins(x=0.01)
     return figure
-
-
-def front_figure(designs: Designs, front: Table) -> Figure:
-    """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
-    pairs = list(combinations(range(len(designs.goals)), 2))
-    columns = 1 if style.narrow() else min(len(pairs), 3)
-    rows = -(-len(pairs) // columns)
-    figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + 2.9 * rows)
-    for number, pair in enumerate(pairs):
-        _front(figure.add_subplot(rows, columns, number + 1), designs, front, pair)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    labels = [style.folded(words, 9.0, style.width() - 0.6) for words in labels]
-    figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else fitting(labels))
-    number = int(designs.feasible.sum())
-    _head(figure, f"Pareto front: {len(front)} of {number} feasible designs")
-    return figure
-
-
-def _head(figure: Figure, words: str) -> None:
-    """A title above all panels."""
-    figure.suptitle(style.folded(words, 11.0, style.width() - 0.2), x=0.01, ha="left", fontsize=11)
-
-
-def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:
-    goals = [designs.goals[k] for k in pair]
-    x, y = designs.values[designs.feasible][:, pair].T
-    axes.plot(x, y, ".", color=style.FAINT, markersize=3, alpha=0.5, markeredgewidth=0, label="feasible designs")
-    along, up = (np.asarray(front[goal.name], dtype=float) for goal in goals)
-    order = np.argsort(along, kind="stable")
-    axes.plot(along[order], up[order], "o-" if len(designs.goals) == 2 else "o", color=style.BLUE, linewidth=1.2,
-              markersize=4.0 if len(front) < 200 else 2.2,
-              label="front: no other is better in every goal")  # fmt: skip
-    for (name, row), marker in zip(_marked(designs, front), _FRONT_MARKS, strict=False):
-        knee = name == "knee"
-        words = _listed(_variables(designs, front, row))
-        axes.plot(along[row], up[row], "*" if knee else marker, color=style.VERMILION, markeredgecolor="white",
-                  markersize=15 if knee else 9, linestyle="none", label=f"{name}, {words}", zorder=5,
-                  clip_on=False)  # fmt: skip
-    across, upwards = (f"{label(designs, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
-    axes.set_xlabel(across)
-    axes.set_ylabel(style.folded(upwards, 10.0, 2.8) if style.narrow() else upwards)
-    if style.narrow():
-        axes.locator_params(axis="x", nbins=4)
-    # Designs far worse than the front would press it into a corner.
-    for values, every, limit in ((along, x, axes.set_xlim), (up, y, axes.set_ylim)):
-        low, high = float(values.min()), float(values.max())
-        span = (high - low) or abs(high) or 1.0
-        limit(max(float(every.min()), low - 0.6 * span) - 0.04 * span,
-              min(float(every.max()), high + 0.6 * span) + 0.04 * span)  # fmt: skip

@@ -10,12 +10,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.report.cases import best_of
 from mechdesign.report.figures.style import printed, raised
 from mechdesign.results import Column, Result, Table
 from mechdesign.rows import unit_of
+from mechdesign.statistics import Asked
 
 # Most numbers of a question.
 MOST = 8
+# Ends of names in the table of extremes of which the largest size is told instead, or nothing.
+_RATES_AND_FORCES = ("_effort", "_advantage", "_velocity", "_acceleration")
 # Meanings of the columns that make a pose.
 _POSE = ("drive", "given", "held coordinate")
 # Part of the numbers beside it below which one differs from zero by rounding alone.
@@ -101,7 +105,7 @@ def shown(value: float) -> str:
 
 def headlines(result: Result) -> list[Headline]:
     """The first numbers of a result, at most `MOST`, each of a name once."""
-    found: dict[str, Headline] = {}
+    found = {each.label: each for each in _best(result.main)}
     for rule in _RULES[result.command]:
         table = result.tables.get(rule.table)
         if table is None or not len(table):
@@ -113,6 +117,15 @@ def headlines(result: Result) -> list[Headline]:
                 for each in _of(rule, table, column):
                     found.setdefault(each.label, each)
     return list(found.values())[:MOST]
+
+
+def _best(table: Table) -> Iterator[Headline]:
+    """The best case of a sweep, and the front."""
+    if (best := best_of(table)) is not None:
+        more = [f"{best.equals - 1} more as good"] * (best.equals > 1)
+        yield Headline("best case", str(best.case), "", "; ".join([best.changes, *more]))
+        if best.front > best.equals:
+            yield Headline("cases on the Pareto front", shown(best.front), "", f"of {best.ranked} ranked cases")
 
 
 def _asked(result: Result, rule: _Rule, column: Column) -> bool:
@@ -144,7 +157,7 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     between = _between(rule, table, column)
     for row in rows[:1] if between else rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
-        if rule.table == "extremes" and words["output"].endswith(("_effort", "_advantage")):
+        if rule.table == "extremes" and words["output"].endswith(_RATES_AND_FORCES):
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
@@ -165,9 +178,13 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
 
 def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | None:
     """The number over the whole motion, and its place, where the table knows the motion between its rows."""
-    if table.scope is None or table.scope.worst is None or rule.row in ("first", "each"):
+    if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
         return None
-    return table.scope.worst(column.name, -1 if rule.row == "smallest" else 1, rule.row == "size")
+    course = table.scope.course(Asked(column.name))
+    if course is None:
+        return None
+    value, place = course.worst(-1 if rule.row == "smallest" else 1, absolute=rule.row == "size")
+    return float(value[0]), course.shown(float(place[0]))
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:

@@ -55,7 +55,7 @@ def moving(study: Study, result: Result) -> Moving | None:
     name = f"{result.command}-curves"
     if result.command == "optimize":
         designs = result.drawn["designs"]
-        study, result = result.drawn["design"](designs.numbers(designs.best))
+        study, result = result.drawn["design"](designs.design(designs.best))
     with style.context():
         if "motion" in result.drawn and result.drawn["poses"].motion:
             return _motion(study, result, name)

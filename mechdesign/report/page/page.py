@@ -34,6 +34,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.reliability import in_words
 from mechdesign.study.text.units import text_of
+from mechdesign.terms import path_of
 
 # Pixels of the drawings in an index, twice as many as they are wide on the page, and their colours.
 _THUMBNAIL = (240, 180)
@@ -183,7 +184,7 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:
-    path = requirement.result.partition(".")[2]
+    path = path_of(requirement.result)
     bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
         "what": f"|{path}|" if requirement.abs else path,
@@ -197,7 +198,7 @@ def _about(study: Study) -> dict[str, Any]:
     mechanism, units = study.mechanism, study.units
     description, graph = mechanism.description, mechanism.graph
     try:
-        lines = [*describe(mechanism).splitlines(), *in_words(study.reliability, graph)]
+        lines = [*describe(mechanism).splitlines(), *in_words(study.reliability, graph, study.sizes)]
     except Exception as error:
         lines = [explain(error)[1]]
     told: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}

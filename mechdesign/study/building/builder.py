@@ -13,9 +13,9 @@ from mechdesign.mechanism.model import Link, Place, Quantity, Term
 from mechdesign.study.building import section as models
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import Context, StudyNumber
+from mechdesign.study.text.fields import Context
 from mechdesign.study.text.reporter import Reporter
-from mechdesign.study.text.units import kind_of
+from mechdesign.study.text.units import Amount, kind_of
 
 ROOT: KeyPath = ("mechanism",)
 
@@ -35,7 +35,7 @@ class Builder:
         self.formulas: dict[str, Expression] = {}
         self.measured: set[str] = set()
         self.links: dict[str, Link] = {}
-        self.sketch = {name: complex(x.nominal, y.nominal) for name, (x, y) in section.sketch.items()}
+        self.sketch = {name: complex(x, y) for name, (x, y) in section.sketch.items()}
 
     def parameters(self, formulas: Mapping[str, Expression]) -> Parameters:
         """Parameters, of which some have formulas, with the places that depend on them."""
@@ -52,14 +52,11 @@ class Builder:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(
-        self, name: str, value: StudyNumber | float, quantity: Quantity = "length", *, measured: bool = False
-    ) -> Term:
+    def place(self, name: str, value: float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        nominal = value.nominal if isinstance(value, StudyNumber) else value
-        self.places[name] = Place(name, nominal * factor, quantity)
-        if isinstance(value, StudyNumber) and value.expression is not None:
+        self.places[name] = Place(name, value * factor, quantity)
+        if isinstance(value, Amount) and value.expression is not None:
             self.formulas[name] = value.expression
         if measured:
             self.measured.add(name)
@@ -169,7 +166,7 @@ class Builder:
             if name == GROUND:
                 self.report(("links", name), "the ground cannot be telescopic")
             return points
-        length: StudyNumber | float = section.length or 1.0
+        length: float = section.length or 1.0
         if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
             length = abs(drawn[1] - drawn[0])
             if length == 0.0:
@@ -203,7 +200,7 @@ class Builder:
         places = drawn[len(known) :]
         start, turn, centre = 0j, 1 + 0j, 0j
         if free and given:
-            local = [complex(x.nominal, y.nominal) for x, y in given.values()]
+            local = [complex(x, y) for x, y in given.values()]
             start, turn, centre = sum(drawn[: len(local)]) / len(local), rotation(local, drawn), sum(local) / len(local)
         elif free or ends:
             if drawn[0] == drawn[1]:

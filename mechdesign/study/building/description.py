@@ -29,7 +29,7 @@ from mechdesign.mechanism.model import (
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import StudyNumber
+from mechdesign.study.text.units import Amount
 
 
 def build(builder: Builder) -> Description:
@@ -96,7 +96,7 @@ def _line(builder: Builder, name: str, section: models.Joint, link: str) -> Line
         if first == second:
             _refuse(builder, path, f"{' and '.join(map(repr, through))} are one place: no direction")
         return Line(link, through[0], 0.0, through[1])
-    direction = builder.place(f"{name}.direction", section.direction or 0.0, "angle")
+    direction = builder.place(f"{name}.direction", 0.0 if section.direction is None else section.direction, "angle")
     return Line(link, through[0] if through else None, direction)
 
 
@@ -110,7 +110,7 @@ def _prismatic(builder: Builder, name: str, section: models.Joint, pair: tuple[s
     elif len(points) != 1:
         _refuse(builder, path, f"link {slider!r} has points {', '.join(points)}: say which one slides, as 'point'")
     line = _line(builder, name, section, guide)
-    angle = builder.place(f"{name}.angle", section.angle or 0.0, "angle")
+    angle = builder.place(f"{name}.angle", 0.0 if section.angle is None else section.angle, "angle")
     return Prismatic(name, line, slider, section.point or points[0], angle)
 
 
@@ -261,7 +261,7 @@ def _measures(builder: Builder) -> dict[str, Measure]:
             what, listed = "coordinate or parameter", [*known, *parameters]
             if all(builder.check_name(item, listed, what, path) for item in sorted(expression.names)):
                 for item in expression.names & parameters.keys():
-                    builder.place(MEASURED + item, StudyNumber(parameters[item], Expression.parse(item)), "none")
+                    builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
                 found[name] = Measure(name, "expression", None, expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
             found[name] = Measure(name, section.kind, pair)
@@ -302,12 +302,12 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
 
 def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: KeyPath) -> None:
     low, high = section.min, section.max
-    if low is not None and high is not None and high.nominal < low.nominal:
+    if low is not None and high is not None and high < low:
         also = "; add a full turn to it" if quantity == "angle" else ""
-        builder.report((*path, "max"), f"the maximum {high.nominal:g} is below the minimum {low.nominal:g}{also}")
+        builder.report((*path, "max"), f"the maximum {high:g} is below the minimum {low:g}{also}")
     if quantity == "angle" and (low is None or high is None):
         builder.report(path, "an angle needs both 'min' and 'max': angles are judged modulo a turn")
     if section.kind == "distance":
         for end, value in (("min", low), ("max", high)):
-            if value is not None and value.nominal < 0:
-                builder.report((*path, end), f"a distance is never negative, so not {value.nominal:g}")
+            if value is not None and value < 0:
+                builder.report((*path, end), f"a distance is never negative, so not {value:g}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,30 +76,23 @@ class Parameters:
             if place in moved
         }
 
-    def derivatives(self, name: str) -> dict[str, float]:
-        """Derivative of every place that depends on a parameter (or is the place `name`), at the nominal values.
+    def derivatives(
+        self, name: str, values: Mapping[str, Number] = MappingProxyType({}), changed: Collection[str] = ()
+    ) -> dict[str, Number]:
+        """Derivative of every place that depends on a parameter (or is the place `name`).
 
-        Lengths in the study's unit and angles in radians, per unit of the parameter as the study gives it.
+        Lengths in the study's unit and angles in radians, per unit of the parameter as the study gives it; at the
+        nominal values, or other `values` of parameters. What is `changed` itself follows nothing.
         """
         if name not in self.nominal:
             return {name: self.factors[name]}
-        slopes: dict[str, float] = {name: 1.0}
+        env: dict[str, Number] = {**self.nominal, **values}
+        slopes: dict[str, Number] = {name: 1.0}
         for other, formula in self.formulas.items():
-            slope = self._slope(formula, slopes)
-            if other != name and slope is not None:
-                slopes[other] = slope
-        found: dict[str, float] = {}
-        for place, formula in self.dependent.items():
-            slope = self._slope(formula, slopes)
-            if slope is not None:
-                found[place] = slope * self.factors[place]
-        return found
-
-    def _slope(self, formula: Expression, slopes: Mapping[str, float]) -> float | None:
-        if not formula.names & slopes.keys():
-            return None
-        partials = formula.derivatives(self.nominal)
-        return float(sum(float(partials[name]) * slopes[name] for name in partials if name in slopes))
+            if other != name and other not in changed and formula.names & slopes.keys():
+                slopes[other] = _slope(formula, env, slopes)
+        return {place: _slope(formula, env, slopes) * self.factors[place] for place, formula in self.dependent.items()
+                if place not in changed and formula.names & slopes.keys()}  # fmt: skip
 
     def kind(self, name: str, places: Mapping[str, Place]) -> str | None:
         """Kind of quantity of a parameter: the only one of `needed`, or else that of its unit; None where not known."""
@@ -121,6 +115,11 @@ class Parameters:
     def _dimensions(self) -> Iterator[str]:
         """Places of the geometry, without those of parameters in measures."""
         return (place for place in self.factors if not place.startswith(MEASURED))
+
+
+def _slope(formula: Expression, values: Mapping[str, Number], slopes: Mapping[str, Number]) -> Number:
+    partials = formula.derivatives(values)
+    return sum((partials[name] * slopes[name] for name in partials if name in slopes), start=0.0)
 
 
 def _number(value: ArrayLike) -> Number:

@@ -18,9 +18,9 @@ from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.graph import GROUND, OF_LINKS
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import Context, StudyNumber, failure, read_expression, read_rows, shown
+from mechdesign.study.text.fields import Context, failure, read_expression, read_rows, shown
 from mechdesign.study.text.inputs import file_of
-from mechdesign.study.text.units import QuantityError, check_unit
+from mechdesign.study.text.units import Amount, QuantityError, check_unit
 
 LINK_KEYS = ("from", "to", "length", "points", "telescopic")
 _BRANCHES = {
@@ -42,8 +42,8 @@ def names_to_mapping(raw: Any) -> Any:
     return dict.fromkeys(raw)
 
 
-Point = Annotated[tuple[fields.LengthValue, fields.LengthValue], fields.pair_of("[x, y]")]
-PointValues = tuple[StudyNumber, StudyNumber]
+Point = Annotated[tuple[fields.LengthPlace, fields.LengthPlace], fields.pair_of("[x, y]")]
+PointValues = tuple[Amount, Amount]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
 TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
 TwoEnds = Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two names")]
@@ -69,7 +69,7 @@ class Link(fields.Model):
     """First end of a binary link: origin of its frame, whose x axis leads to ``to``."""
     to: fields.PointName | None = None
     """Second end of a binary link."""
-    length: fields.PositiveLengthValue | None = None
+    length: fields.PositiveLengthPlace | None = None
     """Distance from ``from`` to ``to``. Left out: measured from the sketch. Example: 90 Example: 90 mm"""
     telescopic: bool = False
     """Whether the length is a coordinate, NAME.length: two bodies and a slide. Further points belong to the body at
@@ -151,7 +151,7 @@ class Joint(fields.Model):
     """Point of the first link that the line goes through, where the slide is 0; two points [P, R] give the direction as
     well. Left out: the origin of the link's frame. Example: G Example: [P, R]
     """
-    direction: fields.AngleValue | None = None
+    direction: fields.AnglePlace | None = None
     """Angle of the line from the first link's x axis, counter-clockwise: the way in which the slide counts. Left out:
     0, unless ``through`` has two points. Example: 90
     """
@@ -159,7 +159,7 @@ class Joint(fields.Model):
     """The point of the other link that moves along the line; of a clamp the shared point. Left out: the only one there
     is; a slot needs it. Example: B
     """
-    angle: fields.AngleValue | None = None
+    angle: fields.AnglePlace | None = None
     """Of a slide, angle from the line's direction to b's x axis, which stays (left out: 0). Of a clamp, from a's x axis
     to b's (left out: measured from the sketch). Example: 90
     """
@@ -236,9 +236,9 @@ class Limit(fields.Model):
     """
     measure: fields.MeasureName | None = None
     """Measure whose value is limited. Example: gap"""
-    min: fields.AnyValue | None = None
+    min: fields.AnyPlace | None = None
     """Lowest value. Left out: none. Example: 10"""
-    max: fields.AnyValue | None = None
+    max: fields.AnyPlace | None = None
     """Highest value. Left out: none. Example: 2*r + 10"""
 
     @model_validator(mode="after")
@@ -294,7 +294,7 @@ class MechanismSection(fields.Model):
     assembly.
     """
 
-    parameters: dict[str, fields.AnyValue] = Field(default_factory=dict)
+    parameters: dict[str, fields.AnyPlace] = Field(default_factory=dict)
     """Numbers with a name for expressions anywhere in the study; each may use those above it. Example: {r: 40, l: 3*r}
     """
     links: Annotated[dict[fields.LinkName, Link], BeforeValidator(_not_too_many)]

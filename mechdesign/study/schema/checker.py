@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from mechdesign.mechanism.model import Quantity
@@ -23,7 +23,7 @@ class Checker:
     """Looks names and units up, and notes what is wrong with them."""
 
     def __init__(
-        self, builder: Builder, parameters: Parameters, parts: Mapping[str, Any], folder: Folder
+        self, builder: Builder, parameters: Parameters, parts: dict[str, Any], folder: Folder
     ) -> None:  # fmt: skip
         self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters
@@ -60,6 +60,10 @@ class Checker:
             return self.parameters.kind(name, self.places)
         return self.places[name].quantity if name in self.places else self.mechanism.driven_kinds.get(name)
 
+    def size(self, name: str) -> float:
+        """Nominal value of a parameter or a place of the geometry; 0 of what deviates from nothing: drives, loads."""
+        return self.parameters.nominal.get(name, self.places[name].nominal if name in self.places else 0.0)
+
     def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
         """Check the coordinates that are keys of a mapping, and the units of their values, rates or accelerations."""
         for name in names:
@@ -91,6 +95,13 @@ class Checker:
         """Check that the end of a range is beyond its beginning."""
         if low is not None and high is not None and high <= low:
             self.report((*path, "to"), f"{high:g} is not beyond 'from', {low:g}")
+
+    def choices(self) -> list[Any]:
+        """Values that entries of the study have in cases of its matrix, or in designs."""
+        matrix, optimize = self.parts.get("matrix"), self.parts.get("optimize")
+        varied = [] if matrix is None else [each.values for each in (matrix.vary or {}).values()]
+        varied += [] if optimize is None else [each.choices for each in optimize.variables.values()]
+        return [value for values in varied for value in values or ()]
 
     def needs(self, section: str | None, what: str, path: KeyPath) -> None:
         """Check that the study has a section that something cannot do without."""

@@ -109,12 +109,12 @@ def _tolerances(checker: Checker, section: ReliabilitySection) -> None:
     parameters, links = checker.parameters, checker.mechanism.links
     lengths = {f"{name}.length" for name in links} & checker.places.keys()
     for name, dimension in section.dimensions.items():
-        low, high = dimension.ends
+        low, high = map(float, dimension.ends(checker.size(name)))
         width = max(-low, high, dimension.sigma or 0.0)
         slopes = parameters.derivatives(name) if name in parameters.known() else {}
         for place in lengths & slopes.keys():
             size = checker.places[place].nominal
-            if width * abs(slopes[place]) > size:
+            if width * abs(float(slopes[place])) > size:
                 told = f"a tolerance of {width:g} is larger than {place} itself, {size:g}"
                 checker.doubt(("reliability", "dimensions", name), f"{told}; is it in another unit?")
                 break

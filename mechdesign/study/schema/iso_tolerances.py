@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_left
 from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mechdesign.expressions import Number
+from mechdesign.numerics.arrays import Floats
 
 
 class ToleranceClassError(ValueError):
     """A tolerance class that is not given for a size, or none at all; the message says what there is."""
 
 
-def _numbers(text: str) -> tuple[float, ...]:
-    return tuple(math.nan if word == "-" else float(word) for word in text.split())
+def _numbers(text: str) -> Floats:
+    return np.array([math.nan if word == "-" else float(word) for word in text.split()])
 
 
 # Upper ends of the ranges of nominal sizes, mm: of the standard tolerances, and the finer ones of some deviations.
@@ -28,7 +33,7 @@ _FINE_ENDS = _numbers("3 6 10 14 18 24 30 40 50 65 80 100 120 140 160 180 200 22
 _LARGEST = 500.0
 
 # Standard tolerances IT1 to IT18 by range, micrometres [ISO 286-1:2010, table 1].
-_GRADES = [_numbers(line) for line in """
+_GRADES = np.array([_numbers(line) for line in """
     0.8 1 1 1.2 1.5 1.5 2 2.5 3.5 4.5 6 7 8 9 10 11 13 15 18 22 26
     1.2 1.5 1.5 2 2.5 2.5 3 4 5 7 8 9 10 11 13 15 18 21 25 30 36
     2 2.5 2.5 3 4 4 5 6 8 10 12 13 15 16 18 21 24 29 35 41 50
@@ -47,7 +52,7 @@ _GRADES = [_numbers(line) for line in """
     600 750 900 1100 1300 1600 1900 2200 2500 2900 3200 3600 4000 4400 5000 5600 6600 7800 9200 11000 13500
     1000 1200 1500 1800 2100 2500 3000 3500 4000 4600 5200 5700 6300 7000 8000 9000 10500 12500 15000 17500 21000
     1400 1800 2200 2700 3300 3900 4600 5400 6300 7200 8100 8900 9700 11000 12500 14000 16500 19500 23000 28000 33000
-""".strip().splitlines()]  # fmt: skip
+""".strip().splitlines()])  # fmt: skip
 
 # Size of the fundamental deviations of shafts by range, micrometres [ISO 286-1:2010, tables 4 and 5]: es is minus that
 # of a to h, ei that of k to zc. A letter has one number a range, or one a finer range.
@@ -93,6 +98,8 @@ _J = {
 }
 LETTERS = (*(letter for letter in _DEVIATIONS if letter < "h"), "h", "js", "j", *(k for k in _DEVIATIONS if k > "j"))
 """Letters of shafts; those of holes are their capitals."""
+# Coarsest grades, of sizes above 1 mm alone.
+_COARSE = 14
 _CLEARANCE = LETTERS[: LETTERS.index("h") + 1]
 
 # Upper ends of the ranges of ISO 2768-1, mm, and half the tolerances of each class there: lengths, mm (table 1), and
@@ -107,10 +114,10 @@ _LENGTHS = {
 }
 _LEG_ENDS = _numbers("10 50 120 400 inf")
 _ANGLES = {
-    "f": (1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12),
-    "m": (1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12),
-    "c": (1.5, 1.0, 1 / 2, 1 / 4, 1 / 6),
-    "v": (3.0, 2.0, 1.0, 1 / 2, 1 / 3),
+    "f": np.array([1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12]),
+    "m": np.array([1.0, 1 / 2, 1 / 3, 1 / 6, 1 / 12]),
+    "c": np.array([1.5, 1.0, 1 / 2, 1 / 4, 1 / 6]),
+    "v": np.array([3.0, 2.0, 1.0, 1 / 2, 1 / 3]),
 }
 
 _CLASS = re.compile(r"([A-Za-z]{1,2})([1-9]\d?)")
@@ -125,48 +132,74 @@ def is_class(text: str) -> bool:
     return named or text.strip().upper().startswith("ISO")
 
 
-def deviations(text: str, size: float) -> tuple[float, float]:
-    """Lower and upper limit deviation of a length by its class, mm.
+def deviations(text: str, size: ArrayLike) -> tuple[Number, Number]:
+    """Lower and upper limit deviation of lengths by their class, mm.
 
     Parameters
     ----------
     text : str
         ``h7``, ``JS9`` or ``ISO 2768-m``.
-    size : float
-        Nominal size, mm.
+    size : array_like
+        Nominal sizes, mm.
 
     Raises
     ------
     ToleranceClassError
-        Where the text is no class, or the standard does not give it for this size.
+        Where the text is no class, or the standard does not give it for a size.
     """
-    general = _GENERAL.fullmatch(text.strip())
+    general, size = _GENERAL.fullmatch(text.strip()), np.asarray(size, dtype=float)
     if general is None:
         return _by_class(text.strip(), size)
-    half = _of_general(general[1], _LENGTHS)[min(bisect_left(_LENGTH_ENDS, size), len(_LENGTH_ENDS) - 1)]
-    if not _SMALLEST_LENGTH <= size <= _LENGTH_ENDS[-1] or math.isnan(half):
-        least = 3.0 if general[1] == "v" else _SMALLEST_LENGTH
-        most = _LENGTH_ENDS[-2] if general[1] == "f" else _LENGTH_ENDS[-1]
-        raise ToleranceClassError(f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {size:g} mm")
+    table = _of_general(general[1], _LENGTHS)
+    half = table[np.minimum(np.searchsorted(_LENGTH_ENDS, size), len(table) - 1)]
+    least = 3.0 if general[1] == "v" else _SMALLEST_LENGTH
+    most = _LENGTH_ENDS[-2] if general[1] == "f" else _LENGTH_ENDS[-1]
+    wrong = (size < _SMALLEST_LENGTH) | (size > _LENGTH_ENDS[-1]) | np.isnan(half)
+    if wrong.any():
+        given = size[wrong][0]
+        raise ToleranceClassError(f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {given:g} mm")
     return -half, half
 
 
-def angle_deviations(text: str, leg: float) -> tuple[float, float]:
-    """Lower and upper limit deviation, degrees, of an angle whose shorter leg is so long (mm); see `deviations`."""
+def angle_deviations(text: str, leg: ArrayLike) -> tuple[Number, Number]:
+    """Lower and upper limit deviation, degrees, of angles whose shorter legs are so long (mm); see `deviations`."""
     general = _GENERAL.fullmatch(text.strip())
     if general is None:
         raise ToleranceClassError(f"{text!r} is of lengths; of angles give a number, or ISO 2768-m with the 'leg'")
-    half = _of_general(general[1], _ANGLES)[bisect_left(_LEG_ENDS, leg)]
+    half = _of_general(general[1], _ANGLES)[np.searchsorted(_LEG_ENDS, leg)]
     return -half, half
 
 
-def _of_general(letter: str, table: Mapping[str, tuple[float, ...]]) -> tuple[float, ...]:
+def standard_tolerance(grade: int, size: ArrayLike) -> Number:
+    """Standard tolerance of a grade (7 of IT7) for nominal sizes, both in mm.
+
+    Raises
+    ------
+    ToleranceClassError
+        Where the standard gives none for a size.
+    """
+    return _width(grade, np.asarray(size, dtype=float)) * 1e-3
+
+
+def _width(grade: int, size: Floats) -> Floats:
+    """Standard tolerances, micrometres."""
+    wrong = ~((size > 0) & (size <= _ENDS[-1]))
+    if wrong.any():
+        given, most = size[wrong][0], _ENDS[-1]
+        raise ToleranceClassError(f"ISO 286 gives classes of sizes above 0 up to {most:g} mm, not of {given:g} mm")
+    if grade >= _COARSE and (size <= 1).any():
+        given = size[size <= 1][0]
+        raise ToleranceClassError(f"ISO 286 gives grades from {_COARSE} on of sizes above 1 mm, not of {given:g} mm")
+    return np.asarray(_GRADES[grade - 1][np.searchsorted(_ENDS, size)])
+
+
+def _of_general(letter: str, table: Mapping[str, Floats]) -> Floats:
     if letter not in table:
         raise ToleranceClassError(f"ISO 2768-1 has the classes ISO 2768-f, -m, -c and -v, not {letter!r}")
     return table[letter]
 
 
-def _by_class(text: str, size: float) -> tuple[float, float]:
+def _by_class(text: str, size: Floats) -> tuple[Number, Number]:
     found = _CLASS.fullmatch(text)
     letter, grade = (found[1].lower(), int(found[2])) if found else ("", 0)
     if found is None or found[1] not in (letter, letter.upper()) or letter not in LETTERS or grade > len(_GRADES):
@@ -174,53 +207,54 @@ def _by_class(text: str, size: float) -> tuple[float, float]:
             f"{text!r} is no tolerance class: those are a letter ({', '.join(LETTERS)}; of holes capitals) and a grade "
             f"from 1 to {len(_GRADES)}, such as h7, js9 or H7; or ISO 2768-m"
         )
-    if not 0 < size <= _ENDS[-1]:
-        raise ToleranceClassError(f"ISO 286 gives classes of sizes above 0 up to {_ENDS[-1]:g} mm, not of {size:g} mm")
-    if size <= 1 and grade >= 14:
-        raise ToleranceClassError(f"ISO 286 gives grades from 14 on of sizes above 1 mm, not of {size:g} mm")
-    width, hole = _GRADES[grade - 1][bisect_left(_ENDS, size)], found[1].isupper()
-    nearest = -0.5 * width if letter == "js" else 0.0 if letter == "h" else _nearest(letter, grade, hole, size)
-    if math.isnan(nearest):
-        raise ToleranceClassError(f"ISO 286 gives no {text} of {size:g} mm here; {_given(letter, grade, hole)}")
+    width, hole = _width(grade, size), found[1].isupper()
+    nearest = -0.5 * width if letter == "js" else 0.0 * width if letter == "h" else _nearest(letter, grade, hole, size)
+    none = np.isnan(nearest)
+    if none.any():
+        given, known = size[none][0], _given(letter, grade, hole)
+        raise ToleranceClassError(f"ISO 286 gives no {text} of {given:g} mm here; {known}")
     above = letter == "js" or (letter in _CLEARANCE) == hole
     low, high = (nearest, nearest + width) if above else (nearest - width, nearest)
     return low * 1e-3, high * 1e-3
 
 
-def _nearest(letter: str, grade: int, hole: bool, size: float) -> float:
-    """The limit next to the nominal size, micrometres; nan where the standard gives none."""
-    part = bisect_left(_ENDS, size)
-    numbers = _J.get(("J" if hole else "j") + str(grade), ()) if letter == "j" else _DEVIATIONS[letter]
-    if size > _LARGEST or not numbers or (size <= 1 and letter in ("a", "b")):
-        return math.nan
-    number = numbers[bisect_left(_FINE_ENDS, size) if len(numbers) == len(_FINE_ENDS) else part]
+def _nearest(letter: str, grade: int, hole: bool, size: Floats) -> Floats:
+    """The limits next to the nominal sizes, micrometres; nan where the standard gives none."""
+    part = np.searchsorted(_ENDS, size)
+    numbers = (
+        _J.get(("J" if hole else "j") + str(grade), np.array([math.nan])) if letter == "j" else _DEVIATIONS[letter]
+    )
+    ranges = np.searchsorted(_FINE_ENDS, size) if len(numbers) == len(_FINE_ENDS) else part
+    number = numbers[np.minimum(ranges, len(numbers) - 1)]
+    number = np.where((size > _LARGEST) | ((size <= 1) & (letter in ("a", "b"))), math.nan, number)
     if letter == "j" or (not hole and letter not in _CLEARANCE):
-        return 0.0 if letter == "k" and not 4 <= grade <= 7 else number
+        return 0.0 * number if letter == "k" and not 4 <= grade <= 7 else number
     if letter in _CLEARANCE:
         return number if hole else -number
     # Of holes ES = -ei + Delta; no Delta is given up to 3 mm.
     coarse = grade > (8 if letter in ("k", "m", "n") else 7)
-    if grade < 3 or (coarse and ((letter == "k" and part) or (letter == "n" and size <= 1))):
-        return math.nan
-    if letter == "n" and coarse and part:
-        return 0.0
-    if letter == "m" and grade == 6 and 250 < size <= 315:
-        return -9.0
-    return -number + (0.0 if coarse or not part else _GRADES[grade - 1][part] - _GRADES[grade - 2][part])
+    if grade < 3:
+        return np.full_like(number, math.nan)
+    if coarse:
+        none = ((letter == "k") & (part > 0)) | ((letter == "n") & (size <= 1))
+        return np.where(none, math.nan, np.where((letter == "n") & (part > 0), 0.0 * number, -number))
+    found = -number + np.where(part > 0, _GRADES[grade - 1][part] - _GRADES[grade - 2][part], 0.0)
+    special = (letter == "m") & (grade == 6) & (size > 250) & (size <= 315)
+    return np.where(special, -9.0, found)
 
 
 def _given(letter: str, grade: int, hole: bool) -> str:
     """The sizes for which a class is given."""
-    known = [end for end in _FINE_ENDS if not math.isnan(_nearest(letter, grade, hole, end))]
-    if known:
-        low = max([0.0, *(end for end in _FINE_ENDS if end < known[0])]) or (1.0 if letter in ("a", "b", "n") else 0.0)
+    known = _FINE_ENDS[~np.isnan(_nearest(letter, grade, hole, _FINE_ENDS))]
+    if len(known):
+        low = max([0.0, *_FINE_ENDS[known[0] > _FINE_ENDS]]) or (1.0 if letter in ("a", "b", "n") else 0.0)
         return f"it is given of sizes above {low:g} up to {known[-1]:g} mm"
     if letter == "j":
         return f"{'J6, J7 and J8' if hole else 'j5, j6, j7 and (up to 3 mm) j8'} are given"
     return "holes from K on are given from grade 3 on"
 
 
-def fit_deviations(text: str) -> tuple[float, tuple[float, float], tuple[float, float]]:
+def fit_deviations(text: str) -> tuple[float, tuple[Number, Number], tuple[Number, Number]]:
     """Nominal size of a fit such as ``20 H7/g6``, and the limit deviations of its hole and of its shaft, mm.
 
     Raises
@@ -233,5 +267,5 @@ def fit_deviations(text: str) -> tuple[float, tuple[float, float], tuple[float, 
         raise ToleranceClassError(
             f"{text!r} is no fit: those are a size in mm, the hole's class and the shaft's, such as 20 H7/g6"
         )
-    size = float(found[1])
-    return size, _by_class(found[2], size), _by_class(found[3], size)
+    size = np.asarray(found[1], dtype=float)
+    return float(size), _by_class(found[2], size), _by_class(found[3], size)

@@ -13,16 +13,17 @@ from pydantic_core import PydanticCustomError
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Expression
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.optimize import WORDS as WORDS
 from mechdesign.study.schema.optimize import Chosen, check_result, read_result
 from mechdesign.study.schema.paths import read_cells
+from mechdesign.study.schema.variable import LIST_FORM, plainly, read_values
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import read
+from mechdesign.study.text.document import KeyPath, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
-from mechdesign.study.text.units import QUANTITY
 
 # Cases of one study.
-MAX_CASES = 10_000
+MAX_CASES = 10_000_000
 GRID = "grid"
 METHODS = {
     GRID: "every combination of the values",
@@ -32,28 +33,21 @@ METHODS = {
 # A range as the command line has it, and the keys of its parts.
 RANGE = re.compile(r"[^:,\[\]{}]+(?::[^:,\[\]{}]+){1,2}")
 _PARTS = ("from", "to", "step")
-_LIST: fields.Form = {"type": "array", "items": {"title": "value"}}
+# A plain number, which most cells of a file of cases are: a million of them are not read as YAML one by one.
+_DECIMAL = re.compile(r"-?(?:0|[1-9][0-9]{0,14})(\.[0-9]+)?")
 
 
 def _listed(raw: Any, context: Context) -> tuple[Any, ...]:
-    """A list of values; quantities become numbers in the study's units, and no value stands there twice."""
     if not isinstance(raw, list) or not raw:
         raise failure(f"expected START:STOP:STEP, LOW:HIGH or a list of values, not {shown(raw)}")
-    values: list[Any] = []
-    for item in raw:
-        quantity = isinstance(item, str) and QUANTITY.fullmatch(item)
-        value = plainly(read_number(item, context).nominal) if quantity or isinstance(item, float) else item
-        if value in values:
-            raise failure(f"{shown(item)} is listed twice")
-        values.append(value)
-    return tuple(values)
+    return read_values(raw, context)
 
 
 class Values(fields.Model):
     """Values of an entry: a range, also written ``30:50:5`` (from, to, step) or ``30:50``, or a list."""
 
     bare = "values"
-    short = ({"type": "string", "title": "START:STOP:STEP or LOW:HIGH"}, _LIST)
+    short = ({"type": "string", "title": "START:STOP:STEP or LOW:HIGH"}, LIST_FORM)
     one_of = ("say the values as START:STOP:STEP, LOW:HIGH or a list", "from_", "values")
     from_: fields.Number | None = Field(None, alias="from")
     """Lowest value, in the study's units. Example: 30"""
@@ -63,7 +57,7 @@ class Values(fields.Model):
     """Step of a grid, which needs this or ``number``. Example: 5"""
     number: Annotated[int, fields.whole(1, MAX_CASES)] | None = None
     """How many values of a grid, both ends included. Example: 11"""
-    values: Annotated[tuple[Any, ...], fields.Read(_listed, _LIST)] | None = None
+    values: Annotated[tuple[Any, ...], fields.Read(_listed, LIST_FORM)] | None = None
     """Values one by one, also words: the list alone says the same. Example: [analytic, monte_carlo]"""
 
     @model_validator(mode="before")
@@ -121,12 +115,6 @@ class Values(fields.Model):
         return plainly(self.from_ + share * (self.to - self.from_))
 
 
-def plainly(value: float) -> float | int:
-    """A number of 12 digits, as it is written: whole ones without a point."""
-    value = float(f"{value:.12g}")
-    return int(value) if value.is_integer() and abs(value) < 1e15 else value
-
-
 def _named(raw: Any, context: Context) -> str:
     found = read_result(raw, context)
     if isinstance(found, Expression):
@@ -138,8 +126,9 @@ class Named(Chosen):
     """A result of every case, and the rows of it that count."""
 
     result: Annotated[str, fields.Read(_named, {**fields.NAME_FORM, "title": "result"})]
-    """COMMAND.COLUMN, COMMAND.TABLE.COLUMN or a number of the workspace (GII); of several rows their ``min``, ``max``,
-    ``mean`` or ``range``. Example: kinematics.mu.min Example: kinematics.extremes.C.x.range
+    """COMMAND.COLUMN, COMMAND.TABLE.COLUMN or a number of the workspace (GII); of several rows one of |WORDS|, along a
+    motion also between the rows; or a sum of such numbers of one unit. Example: kinematics.mu.min Example:
+    kinematics.extremes.C.x.range
     """
 
 
@@ -153,6 +142,28 @@ def _each_once(results: tuple[Named, ...]) -> tuple[Named, ...]:
 Results = Annotated[
     tuple[Named, ...], fields.BeforeValidator(fields.as_list), AfterValidator(_each_once), fields.OrShort()
 ]
+
+
+class Best(fields.Model):
+    """What is best of the cases: the table has each case's rank, and marks the Pareto front of these results."""
+
+    maximize: Results = ()
+    """Results that are to be large, listed for every case as those of ``results`` are; one alone needs no list.
+    Example: kinematics.mu.min
+    """
+    minimize: Results = ()
+    """Results that are to be small, likewise. Example: [kinematics.rod.angle.peak, kinematics.C.x_velocity.peak]"""
+    sort: bool = False
+    """Whether the best case is the first row of the table; those without a rank come last, in their order."""
+
+    @model_validator(mode="after")
+    def _goals(self) -> Self:
+        if not self.maximize and not self.minimize:
+            raise failure("say what to 'maximize' or 'minimize'")
+        for named in self.minimize:
+            if named in self.maximize:
+                raise failure(f"{shown(named.name)} cannot be both large and small")
+        return self
 
 
 class MatrixSection(fields.Model):
@@ -171,6 +182,10 @@ class MatrixSection(fields.Model):
     """CSV file, beside the study, whose first line names entries; each line below is a case. Example: cases.csv"""
     results: Results = ()
     """Results of every case that are listed besides the requirements. Example: [kinematics.mu.min, GII]"""
+    best: Best | None = None
+    """Rank the cases that meet every requirement by one of their results, or by the equally weighted sum of several,
+    each normalised by its range over these cases. Example: {maximize: kinematics.mu.min, minimize: GII}
+    """
 
     @model_validator(mode="after")
     def _design(self) -> Self:
@@ -195,8 +210,12 @@ class MatrixSection(fields.Model):
 
     def checked(self, checker: Checker) -> Self:
         """Check the commands that results name; whether they have such a result is found at a look."""
-        for k, named in enumerate(self.results):
-            check_result(checker, named.result, ("matrix", "results", k))
+        named: dict[KeyPath, Results] = {("matrix", "results"): self.results}
+        if self.best is not None:
+            named |= {("matrix", "best", key): getattr(self.best, key) for key in ("maximize", "minimize")}
+        for place, results in named.items():
+            for k, each in enumerate(results):
+                check_result(checker, each.result, (*place, k))
         return self
 
     def table(self, folder: Folder) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]]:
@@ -220,11 +239,14 @@ class MatrixSection(fields.Model):
     def _row(self, number: int, names: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:
         if len(row) != len(names):
             raise StudyError(f"{self.cases}:{number}: {len(row)} values for {len(names)} names")
-        found = []
+        found: list[Any] = []
         for name, cell in zip(names, row, strict=True):
+            if decimal := _DECIMAL.fullmatch(cell):
+                found.append(plainly(float(cell)) if decimal[1] else int(cell))
+                continue
             try:
                 value = read(cell.encode(), "").data
-                found.append(plainly(read_number(value, Context()).nominal) if isinstance(value, float) else value)
+                found.append(plainly(read_number(value, Context())) if isinstance(value, float) else value)
             except (StudyError, PydanticCustomError):
                 raise StudyError(f"{self.cases}:{number}: {name}: expected a value, not {shown(cell)}") from None
         return tuple(found)

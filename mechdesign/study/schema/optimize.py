@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -13,45 +14,28 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, needed_section
+from mechdesign.statistics import STATISTICS as STATISTICS_OF_ROWS
+from mechdesign.statistics import Interval
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
-from mechdesign.study.text.units import QUANTITY, text_of, written
+from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
+from mechdesign.terms import command_of, sum_of
 
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
 
 _METHODS = {
-    "grid": "every design of the steps of the variables",
-    "search": "global search over continuous variables, for each row of weights",
+    "grid": "every design of the steps and choices of the variables",
+    "search": "global search over ranges and choices, for each row of weights",
     "pareto": "the front between two goals or more, spread evenly",
 }
-
-
+# Words behind the name of a column.
+WORDS = ", ".join(f"``{word}``" for word in STATISTICS_OF_ROWS)
 _UNASSEMBLED = {"allowed": "only the part of the motion that is valid counts; how much is missing is said"}
-
-
-class Variable(fields.Model):
-    """Range of a design variable; bounds may be expressions over parameters and the variables above it."""
-
-    from_: fields.Bound = Field(alias="from")
-    """Lowest value. Example: l_min + 5"""
-    to: fields.Bound
-    """Highest value; on a grid it is taken where a step leads to it. Example: (l_min + R)/2"""
-    step: fields.PositiveNumber | None = None
-    """Step of a grid, and of the sensitivities reported with the optimum. Left out: ``number``; a grid needs one of
-    them. Example: 0.03
-    """
-    number: Annotated[int, fields.whole(1, 10_000_000)] | None = None
-    """How many values, both ends included, instead of ``step``. Example: 21"""
-
-    @model_validator(mode="after")
-    def _spacing(self) -> Variable:
-        if self.step is not None and self.number is not None:
-            raise failure("either 'step' or 'number', not both")
-        return self
 
 
 def _known() -> tuple[str, ...]:
@@ -60,12 +44,14 @@ def _known() -> tuple[str, ...]:
 
 
 def read_result(raw: Any, context: Context) -> str | Expression:
-    """The name of a result, or an expression over parameters; a name that is both is the result's."""
+    """The name of a result, a sum of results, or an expression over parameters; what is both is the result's."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         raise failure(f"expected a result, such as GII or kinematics.mu, or an expression, not {shown(raw)}")
     if fields.COORDINATE.fullmatch(raw) and (raw not in context.parameters or raw in _known()):
         return raw
     try:
+        if command_of(raw) and _is_sum(raw):
+            return raw
         expression = context.expression(raw)
     except ExpressionError as error:
         raise failure(str(error)) from None
@@ -75,6 +61,17 @@ def read_result(raw: Any, context: Context) -> str | Expression:
             cure = "; a measure takes coordinates and parameters: mechanism.measures: {NAME: ...}, then kinematics.NAME"
         raise failure(f"{name!r} in {shown(raw)} is not a parameter, and an expression here is over parameters{cure}")
     return expression
+
+
+def _is_sum(raw: str) -> bool:
+    """Whether a text is a sum of results of one command; raises ExpressionError where they are of several."""
+    expression = sum_of(raw)
+    commands = {command_of(name) for name in expression.names} if expression else {""}
+    if "" not in commands and len(commands) > 1:
+        raise ExpressionError(
+            f"a sum is of results of one command, and {shown(raw)} has {' and '.join(sorted(commands))}"
+        )
+    return "" not in commands
 
 
 def _required(raw: Any, context: Context) -> str:
@@ -91,8 +88,66 @@ def _amount(value: str | float, info: ValidationInfo) -> str | float:
     """A quantity as an `Amount`; what only looks like one is a word."""
     with suppress(PydanticCustomError):
         if text_of(value):
-            return read_number(value, info.context or Context()).nominal
+            return read_number(value, info.context or Context())
     return value
+
+
+class Span(fields.Model):
+    """A part of a motion, or rows: where a column lies between two values, above one or below one."""
+
+    from_: fields.Number | None = Field(None, alias="from")
+    """One end, in the column's unit or with one of its kind; of an angle whole turns aside. Example: 180"""
+    to: fields.Number | None = None
+    """The other end; of an angle it may be smaller, past a whole turn. Example: 300"""
+    at_least: fields.Number | None = None
+    """Lowest value, of an angle as it is counted along the motion. Example: 0"""
+    at_most: fields.Number | None = None
+    """Highest value, likewise. Example: 2 mm"""
+
+    @model_validator(mode="after")
+    def _ends(self) -> Self:
+        given = self.given("from_", "to", "at_least", "at_most")
+        if not given or (given != ["from_", "to"] and {"from_", "to"} & {*given}):
+            raise failure("a part of a motion has 'from' and 'to', or 'at_least', 'at_most' or both")
+        if self.from_ is not None and self.from_ == self.to:
+            raise failure(f"nothing lies between {written(self.from_)} and {written(self.to)}")
+        if self.at_least is not None and self.at_most is not None and not self.at_least < self.at_most:
+            raise failure(f"nothing is at least {written(self.at_least)} and at most {written(self.at_most)}")
+        return self
+
+    def interval(self, unit: str) -> Interval:
+        """The values in a unit; see `mechdesign.rows.Span`.
+
+        Raises
+        ------
+        QuantityError
+            Where they are of another kind, or none lies between two that are no angles.
+        """
+        low, high = (
+            None if end is None else Amount.of(end).within(unit)
+            for end in ((self.at_least, self.at_most) if self.from_ is None else (self.from_, self.to))
+        )
+        turn = turn_in(unit) if self.from_ is not None else 0.0
+        found = Interval(-np.inf if low is None else low, np.inf if high is None else high, turn)
+        if turn and found.high - found.low >= turn:
+            return Interval()
+        if not turn and not found.low < found.high:
+            raise QuantityError(f"nothing lies {self}; the smaller one comes first")
+        return found
+
+    def __str__(self) -> str:
+        words = (("from", self.from_), ("to", self.to), ("at least", self.at_least), ("at most", self.at_most))
+        return " ".join(f"{word} {written(end)}" for word, end in words if end is not None)
+
+
+def _where_form(raw: Any) -> str:
+    return "span" if isinstance(raw, Span | dict) else "value"
+
+
+Rows = Annotated[
+    Annotated[Span, Tag("span")] | Annotated[str | float | int, AfterValidator(_amount), Tag("value")],
+    Discriminator(_where_form),
+]
 
 
 class Chosen(fields.Model):
@@ -105,11 +160,14 @@ class Chosen(fields.Model):
         fields.Read(read_result, {**fields.NAME_FORM, "title": "result, or expression over parameters"}),
     ]
     """A number of the workspace (GII, area, sigma_min_mean), COMMAND.COLUMN or COMMAND.TABLE.COLUMN, whose worst row
-    counts, or an expression over parameters. Example: kinematics.extremes.C.x.range
+    counts, or which a word behind it makes one number (|WORDS|), along a motion also between the rows; a sum of
+    such numbers of one unit; or an expression over parameters. Example: kinematics.extremes.C.x.range Example:
+    kinematics.C.x_velocity.peak Example: kinematics.C.y.range + 2*kinematics.D.y.range
     """
-    where: dict[str, Annotated[str | float | int, AfterValidator(_amount)]] = Field(default_factory=dict)
-    """Rows that count: those whose columns have these values, in the column's unit or with one of its kind. Left out:
-    all rows. Example: {method: monte_carlo}
+    where: dict[str, Rows] = Field(default_factory=dict)
+    """Rows that count: those whose columns have these values, in the column's unit or with one of its kind, or lie in
+    these ranges, which along a motion are a part of it. Left out: all rows. Example: {method: monte_carlo} Example:
+    {theta: {from: 180, to: 300}} Example: {P.y: {at_most: 2 mm}}
     """
 
     @property
@@ -168,8 +226,9 @@ class Requirement(Condition):
 
     result: Annotated[str, fields.Read(_required, {**fields.NAME_FORM, "title": "result"})]
     """COMMAND.COLUMN or COMMAND.TABLE.COLUMN, with a row's word between where it needs one; the worst row counts, along
-    a motion the worst place between the rows, too, and nan is not met. Example: kinematics.mu Example:
-    kinematics.extremes.C.x.range
+    a motion the worst place between the rows, too, and nan is not met. A word behind it makes it one number
+    (|WORDS|), and such numbers of one unit may be added. Example: kinematics.mu Example:
+    kinematics.extremes.C.x.range Example: kinematics.C.x_velocity.rms
     """
 
 
@@ -186,22 +245,28 @@ class Outline(fields.Model):
     """A circle, or a rectangle with sides along x and y."""
 
     one_of = ("a shape is one of rectangle: [width, height], circle: radius", "rectangle", "circle")
-    rectangle: Annotated[tuple[fields.PositiveLengthValue, fields.PositiveLengthValue], _PAIR] | None = None
+    rectangle: Annotated[tuple[fields.PositiveLengthPlace, fields.PositiveLengthPlace], _PAIR] | None = None
     """Sides [width, height], along x and y. Example: [200, 100]"""
-    circle: fields.PositiveLengthValue | None = None
+    circle: fields.PositiveLengthPlace | None = None
     """Radius of a circle. Example: 80"""
     center: Annotated[
-        tuple[fields.LengthValue, fields.LengthValue] | None,
+        tuple[fields.LengthPlace, fields.LengthPlace] | None,
         BeforeValidator(_centre),
         fields.OrShort({"const": "free"}),
     ] = None
-    """Centre [x, y], the same for all designs. ``free``, or left out: anywhere in the region. Example: [0, 300]"""
+    """Centre [x, y]. ``free``, or left out: anywhere in the region. Example: [0, 300]"""
 
-    @property
-    def numbers(self) -> Mapping[str, tuple[fields.StudyNumber, ...]]:
-        """Every number that is given, by its key."""
-        given = {"rectangle": self.rectangle, "circle": self.circle and (self.circle,), "center": self.center}
-        return {key: numbers for key, numbers in given.items() if numbers}
+    def named(self, moved: Collection[str] = ()) -> str:
+        """``rectangle 180 x 90 at (0, 250)``; numbers that the parameters in `moved` change are named by their text."""
+
+        def told(number: float) -> str:
+            expression = Amount.of(number).expression
+            return f"{number:g}" if expression is None or expression.names.isdisjoint(moved) else expression.text
+
+        size = f"circle {told(self.circle)}" if self.circle is not None else ""
+        if self.rectangle is not None:
+            size = f"rectangle {' x '.join(map(told, self.rectangle))}"
+        return size if self.center is None else f"{size} at ({', '.join(map(told, self.center))})"
 
 
 class Containment(fields.Model):
@@ -259,9 +324,11 @@ class OptimizeSection(fields.Model):
 
     method: Annotated[str, fields.choice(_METHODS, "method of optimization")] = "grid"
     """How the best designs are looked for."""
-    variables: dict[fields.PlaceName, Variable]
-    """Ranges of parameters or of single dimensions (rod.length). Example: {l_min: {from: 1, to: 5, step: 0.5}, l_a:
-    {from: l_min, to: 2*l_min, number: 9}}
+    variables: dict[str, Variable]
+    """Ranges or choices of parameters, of single dimensions (rod.length), or of any entry of the mechanism and of the
+    questions by the name that ``--set`` takes. Example: {l_min: {from: 1, to: 5, step: 0.5}, l_a: {from: l_min, to:
+    2*l_min, number: 9}} Example: {teeth: {from: 10, to: 30, integer: true}, d: {choices: [8, 10, 12]}} Example:
+    {stiffness.elastic.rod: {choices: [bar, tube]}}
     """
     maximize: Goals = ()
     """Results that are to be large; one alone needs no list. Their worst row counts, the smallest. Example: [GII, SUI,
@@ -293,30 +360,13 @@ class OptimizeSection(fields.Model):
         return self
 
     def checked(self, checker: Checker) -> Self:
-        """Check the variables, the method, and the results that goals name, against the mechanism."""
+        """Check the method, and the results that goals name, against the mechanism."""
         root: KeyPath = ("optimize",)
         report = checker.report
         if not self.variables:
             report((*root, "variables"), "an optimisation needs at least one variable")
         if not self.maximize and not self.minimize:
             report(root, "say what to 'maximize' or 'minimize'", at_key=True)
-        above = [name for name in checker.parameters.nominal if name not in self.variables]
-        for name, variable in self.variables.items():
-            path: KeyPath = (*root, "variables", name)
-            checker.known(name, checker.parameters.known(), "parameter or dimension", path, at_key=True)
-            if name in checker.parameters.formulas:
-                message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
-                report(path, message, at_key=True)
-            for key, bound in (("from", variable.from_), ("to", variable.to)):
-                for unknown in sorted(bound.names - set(above)):
-                    below = " above it" if unknown in self.variables else ""
-                    message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
-                    report((*path, key), message)
-            if (quantity := checker.quantity(name)) is not None:
-                checker.kind(path, quantity)
-            above.append(name)
-            if self.method == "grid" and variable.step is None and variable.number is None:
-                report(path, "a variable of a grid needs either 'step' or 'number'")
         if self.method == "pareto" and len(self.maximize + self.minimize) == 1:
             report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
         if self.method == "grid" and self.evaluations is not None:
@@ -330,7 +380,7 @@ class OptimizeSection(fields.Model):
         for k, condition in enumerate(self.subject_to):
             at = (*root, "subject_to", k)
             if isinstance(condition, Containment):
-                _check_fixed(checker, condition.contains, (*at, "contains"), moved)
+                checker.needs("workspace", "'contains'", (*at, "contains"))
                 continue
             _check_judged(checker, condition, (*at, "result"), moved)
             for key in condition.given("at_least", "at_most"):
@@ -344,17 +394,6 @@ def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collec
         check_result(checker, judged.result, path)
     elif judged.result.names.isdisjoint(moved):
         checker.report(path, f"{judged.name!r} is the same for every design: no variable changes it")
-
-
-def _check_fixed(checker: Checker, shape: Outline, path: KeyPath, moved: Collection[str]) -> None:
-    """Note a shape without a workspace to hold it, and numbers of it that the parameters in `moved` change."""
-    checker.needs("workspace", "'contains'", path)
-    for key, numbers in shape.numbers.items():
-        names = {name for number in numbers if number.expression for name in number.expression.names}
-        for name in sorted(names.intersection(moved)):
-            told = f"{name!r} changes with the variables, and what is to be contained is the same for every design"
-            free = "; with 'center: free' the shape may lie anywhere in the region" * (key == "center")
-            checker.report((*path, key), told + free)
 
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
@@ -372,7 +411,15 @@ def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: C
 
 
 def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool = False) -> None:
-    """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`."""
+    """Check the name of a result: a statistic of the workspace, or ``command.column``, as it must be if `required`.
+
+    Of a sum each term is checked.
+    """
+    with suppress(ExpressionError):
+        if command_of(name) and (total := sum_of(name)):
+            for term in sorted(total.names):
+                check_result(checker, term, path, required=required)
+            return
     command, _, rest = name.partition(".")
     known = _known()
     if rest:

@@ -1,36 +1,27 @@
-"""Paths of a coordinate or a point: as the study file gives them, and as arrays.
+"""Paths of a coordinate or a point as the study file gives them, and files of numbers.
 
-A path is points or numbers one after another, a circle, an arc, or a line. That of a point has, at every place, the
-length of the way to it and the direction and bend of the path there.
+A path is points or numbers one after another, a circle, an arc, or a line.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Floats
 from mechdesign.study.text import fields
-from mechdesign.study.text.fields import MIN_NUMBER, Context, failure, read_number, read_rows
+from mechdesign.study.text.fields import Context, failure, read_number, read_rows
 from mechdesign.study.text.inputs import Folder, file_of
+from mechdesign.study.text.units import Amount
 
 # Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
 CIRCLE_POSES = 72
 LINE_POSES = 51
-# Pieces of a spline between two of its points whose lengths are added up.
-SPLINE_PIECES = 64
-# Steps of a path that differ by less than this part of them go on evenly.
-EVEN = 1e-9
 _ROWS = {"type": ["array", "string", "number"], "title": "[[x, y], ...] or [number, ...] or file or number"}
 
 Speed = Annotated[float, fields.number("velocity", 0.0, exclusive=True)]
@@ -38,7 +29,7 @@ Point = Annotated[tuple[fields.Length, fields.Length], fields.pair_of("[x, y]")]
 
 
 def _radians(raw: Any, context: Context) -> float:
-    return read_number(raw, context, "angle").nominal * context.units.angle_factor
+    return Amount.by("angle*unit", angle=read_number(raw, context, "angle"), unit=context.units.angle_factor)
 
 
 Radians = Annotated[float, fields.Read(_radians, fields.NUMBER_FORM, "angle")]
@@ -59,7 +50,7 @@ class Circle(fields.Model):
     @property
     def to(self) -> float:
         """Angle at which it closes."""
-        return self.from_ + (-2.0 if self.clockwise else 2.0) * math.pi
+        return Amount.by("begin + turn", begin=self.from_, turn=(-2.0 if self.clockwise else 2.0) * math.pi)
 
 
 class Arc(fields.Model):
@@ -136,209 +127,6 @@ class PathSection(fields.Model):
                 "a list of points has its own number; 'points' goes with a spline, a circle, an arc or a line"
             )
         return self
-
-
-@dataclass(frozen=True, eq=False)
-class PointPath(ABC):
-    """The path of a point: functions of the place along it, in rows from 0; `count` poses stand at its first rows."""
-
-    count: int
-
-    @property
-    def closed(self) -> bool:
-        """Whether the path goes on from its last pose to its first."""
-        return False
-
-    @property
-    def corners(self) -> Floats:
-        """Places between the ends at which the path is not smooth."""
-        return np.empty(0)
-
-    @abstractmethod
-    def at(self, s: Floats) -> Complexes:
-        """Point of the plane (x + i y) at places of shape (n,)."""
-
-    @abstractmethod
-    def course(self, s: Floats) -> tuple[Complexes, Complexes, Floats]:
-        """Direction of the path (a unit vector), and its bend: the derivatives of the point by the path's length.
-
-        The bend leads to the centre of curvature and is 1 / radius long. Then the length of the path, a row.
-        """
-
-    @abstractmethod
-    def way(self, s: Floats) -> Floats:
-        """Length of the path from its first pose."""
-
-
-@dataclass(frozen=True, eq=False)
-class Polyline(PointPath):
-    """Straight segments; a corner has the direction of the segment that begins there, nan where none has a length."""
-
-    places: Complexes  # of the poses, shape (count,)
-
-    @staticmethod
-    def through(places: Complexes) -> Polyline:
-        """The segments through some places."""
-        return Polyline(len(places), places)
-
-    @cached_property
-    def _lengths(self) -> Floats:
-        lengths = np.abs(np.diff(self.places))
-        # What is shorter than any number of a study is no step: its reciprocal would overflow.
-        lengths[lengths < MIN_NUMBER] = 0.0
-        return lengths
-
-    @property
-    def corners(self) -> Floats:
-        return bends(self.places[None])
-
-    def at(self, s: Floats) -> Complexes:
-        return between(self.places[None], np.zeros(len(s), dtype=np.intp), s)
-
-    def course(self, s: Floats) -> tuple[Complexes, Complexes, Floats]:
-        moving: Ints = np.flatnonzero(self._lengths > 0)
-        none = np.zeros(len(s))
-        if not len(moving):
-            return np.full(len(s), complex(np.nan, np.nan)), np.zeros(len(s), dtype=complex), none
-        units: Complexes = np.diff(self.places)[moving] / self._lengths[moving]
-        # The segment that begins at each place, or the next one with a length.
-        after = np.searchsorted(moving, np.floor(s))
-        last = 0 if self.places[0] == self.places[-1] else len(moving) - 1
-        pace = self._lengths[np.clip(np.floor(s), 0, self.count - 2).astype(np.intp)]
-        return units[np.where(after < len(moving), after, last)], np.zeros(len(s), dtype=complex), pace
-
-    def way(self, s: Floats) -> Floats:
-        return np.asarray(np.interp(s, np.arange(self.count), np.concatenate([[0.0], np.cumsum(self._lengths)])))
-
-
-@dataclass(frozen=True, eq=False)
-class Round(PointPath):
-    """A circle, or a part of it between two angles (radians)."""
-
-    center: complex
-    radius: float
-    begin: float
-    end: float
-    whole: bool  # whether the last pose is one step before the end
-
-    @property
-    def closed(self) -> bool:
-        return self.whole
-
-    def _turned(self, s: Floats) -> Floats:
-        last = self.count - 1 + self.whole
-        return np.where(s == last, self.end, self.begin + s * ((self.end - self.begin) / last))
-
-    def at(self, s: Floats) -> Complexes:
-        return np.asarray(self.center + self.radius * np.exp(1j * self._turned(s)))
-
-    def course(self, s: Floats) -> tuple[Complexes, Complexes, Floats]:
-        outward, turn = np.exp(1j * self._turned(s)), self.end - self.begin
-        pace = self.radius * abs(turn) / (self.count - 1 + self.whole)
-        return complex(0.0, math.copysign(1.0, turn)) * outward, outward / -self.radius, np.full(len(s), pace)
-
-    def way(self, s: Floats) -> Floats:
-        return self.radius * np.abs(self._turned(s) - self.begin)
-
-
-@dataclass(frozen=True, eq=False)
-class Spline(PointPath):
-    """A cubic spline by the length of the chords through three places or more, periodic where the first is the last."""
-
-    curve: Any  # SciPy's CubicSpline of complex numbers, for a spline is linear in its values
-    rows: Floats  # its parameter at the poses
-    fine: Floats  # its parameter at ends of pieces of it,
-    length: Floats  # and the length up to there
-
-    @staticmethod
-    def through(places: Complexes, points: int | None) -> Spline:
-        """The spline through some places, with so many poses evenly spaced, or those that are given."""
-        from scipy.interpolate import CubicSpline
-
-        knots = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(places)))])
-        curve: Any = CubicSpline(knots, places, bc_type="periodic" if places[0] == places[-1] else "not-a-knot")
-        fine = np.unique(np.concatenate([np.linspace(a, b, SPLINE_PIECES + 1) for a, b in pairwise(knots)]))
-        lengths = _spline_lengths(curve, fine[:-1], fine[1:])
-        length = np.concatenate([[0.0], np.cumsum(lengths)])
-        rows = knots if points is None else np.interp(np.linspace(0.0, length[-1], points), length, fine)
-        return Spline(len(rows), curve, rows, fine, length)
-
-    @property
-    def corners(self) -> Floats:
-        # Beyond its second derivative the curve is not smooth at its knots, nor is the pace at which poses pass it.
-        knots = np.interp(self.curve.x, self.rows, np.arange(self.count))
-        return np.unique(np.concatenate([knots, np.arange(self.count)]))[1:-1]
-
-    def _parameter(self, s: Floats) -> Floats:
-        return between(self.rows[None], np.zeros(len(s), dtype=np.intp), s)
-
-    def at(self, s: Floats) -> Complexes:
-        return np.asarray(self.curve(self._parameter(s)))
-
-    def course(self, s: Floats) -> tuple[Complexes, Complexes, Floats]:
-        x = self._parameter(s)
-        first, second = self.curve(x, 1), self.curve(x, 2)
-        speed = np.abs(first)
-        unit = first / speed
-        across = second - (second * np.conj(unit)).real * unit
-        pace = np.diff(self.rows)[np.clip(np.floor(s), 0, self.count - 2).astype(np.intp)]
-        return unit, across / speed**2, speed * pace
-
-    def way(self, s: Floats) -> Floats:
-        x = self._parameter(s)
-        piece = np.clip(np.searchsorted(self.fine, x, side="right") - 1, 0, len(self.fine) - 2)
-        return self.length[piece] + _spline_lengths(self.curve, self.fine[piece], x)
-
-
-def _spline_lengths(curve: Any, begin: Floats, end: Floats) -> Floats:
-    """Lengths of short pieces of a spline."""
-    nodes, weights = np.polynomial.legendre.leggauss(4)
-    middle, half = (begin + end) / 2, (end - begin) / 2
-    return np.asarray(half * (np.abs(curve(middle[:, None] + half[:, None] * nodes, 1)) @ weights))
-
-
-def between(rows: NDArray[Any], line: Ints, s: Floats) -> NDArray[Any]:
-    """Values at places of some lines of rows, shape (lines, rows), that change evenly from row to row."""
-    k = np.clip(np.floor(s), 0, max(rows.shape[1] - 2, 0)).astype(np.intp)
-    begin = rows[line, k]
-    return np.asarray(begin + (s - k) * (rows[line, np.minimum(k + 1, rows.shape[1] - 1)] - begin))
-
-
-def bends(rows: NDArray[Any]) -> Floats:
-    """Places between the ends at which some of the lines of rows, shape (lines, rows), do not go on evenly."""
-    steps = np.abs(np.diff(rows, axis=1))
-    rounding = EVEN * np.maximum(steps[:, 1:], steps[:, :-1]) + 4 * np.finfo(float).eps * np.abs(rows[:, 1:-1])
-    return np.asarray(np.flatnonzero((np.abs(np.diff(rows, 2, axis=1)) > rounding).any(axis=0)) + 1.0)
-
-
-def course(name: str, given: PathSection, folder: Folder) -> PointPath | Floats:
-    """The path of a point, or the values of a coordinate.
-
-    Raises
-    ------
-    StudyError
-        Where a file cannot be read, or what is listed is no such path.
-    """
-    for form, count, whole in ((given.circle, CIRCLE_POSES, True), (given.arc, LINE_POSES, False)):
-        if form is not None:
-            return Round(given.points or count, complex(*form.center), form.radius, form.from_, form.to, whole)
-    if given.line is not None:
-        start, stop = (complex(*place) for place in given.line)
-        if start == stop:
-            raise StudyError(f"path: the line of {name!r} needs two different places")
-        return Polyline.through(np.linspace(start, stop, given.points or LINE_POSES, dtype=np.complex128))
-    point = "." not in name
-    table = read_table(folder, given.file) if given.file is not None else np.array(given.through, dtype=float)
-    if point and table.shape[1] == 2:
-        places = table[:, 0] + 1j * table[:, 1]
-        if not given.spline:
-            return Polyline.through(places)
-        if len(places) < 3 or not np.diff(places).all():
-            raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
-        return Spline.through(places, given.points)
-    if table.shape[1] == 1:
-        return np.asarray(table[:, 0])
-    raise StudyError(f"path: {name!r} needs a list of " + ("[x, y]" if point else "numbers"))
 
 
 def read_table(folder: Folder, file: str, most: int = 2) -> Floats:

@@ -8,100 +8,28 @@ the pin moves in another one. Where the pin gives, by a bearing of the stiffness
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field
 
 from mechdesign.commands import COMMANDS
+from mechdesign.expressions import Number
 from mechdesign.mechanism.graph import GROUND, OF_LINKS, Graph
 from mechdesign.study.building.section import MechanismSection
+from mechdesign.study.schema.allocation import Allocate, check_allocation
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
+from mechdesign.study.schema.clearances import Clearance, check_clearance
+from mechdesign.study.schema.limits import ErrorLimit, split_order
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.variation import (
-    LOADS,
-    Clearance,
-    Dimension,
-    ToleranceClass,
-    check_clearance,
-    check_dimensions,
-)
+from mechdesign.study.schema.variation import LOADS, Dimension, ToleranceClass, check_dimensions
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 DEFAULT_METHODS = ("analytic", "monte_carlo")
-# What the names of errors of positions, velocities and accelerations end in.
-SUFFIXES = ("", "_velocity", "_acceleration")
-
-
-def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
-    """The coordinate (or point) that a name is about, and whether it means the position, velocity or acceleration."""
-    for order, suffix in enumerate(SUFFIXES):
-        if not known(name) and name.endswith(suffix) and known(name.removesuffix(suffix)):
-            return name.removesuffix(suffix), order
-    return name, 0
-
-
-class ErrorLimit(fields.Model):
-    """Bounds of an error (``min``, ``max``), of the value itself (``lsl``, ``usl``), or of a point's distance from its
-    place (``radius``). A number alone is +- about 0, two are lowest and highest error.
-    """
-
-    short = (fields.NUMBER_FORM, fields.PAIR_FORM)
-    min: fields.Number | None = None
-    """Lowest error. Left out: none. Example: -0.05"""
-    max: fields.Number | None = None
-    """Highest error. Left out: none. Example: 0.05"""
-    lsl: fields.Number | None = None
-    """Lower specification limit: lowest value of the output itself, at every pose. Example: 99.9"""
-    usl: fields.Number | None = None
-    """Upper specification limit: highest value of the output itself. An angle between both is counted at the turn
-    nearest to them. Example: 100.1
-    """
-    radius: fields.NonNegative | None = None
-    """Of a point: distance from its nominal place that is allowed. Example: 0.05"""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _long_form(cls, raw: Any, info: ValidationInfo) -> Any:
-        if isinstance(raw, list):
-            if len(raw) != 2:
-                raise failure(f"expected a number, or the lowest and highest error such as [-1, 0.8], not {shown(raw)}")
-            return {"min": raw[0], "max": raw[1]}
-        if not isinstance(raw, int | float | str) or isinstance(raw, bool):
-            return raw
-        size = read_number(raw, info.context or Context()).nominal
-        if size < 0:
-            raise failure(f"must be at least 0, not {size:g}")
-        return {"min": -size, "max": size}
-
-    @model_validator(mode="after")
-    def _some(self) -> ErrorLimit:
-        kinds = [given for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (given := self.given(*keys))]
-        if not kinds:
-            raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
-        if len(kinds) > 1:
-            raise failure(
-                f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
-                "'usl' the value itself, 'radius' the place of a point"
-            )
-        low, high = self.ends
-        if low is not None and high is not None and high < low:
-            raise failure(f"the maximum {high:g} is below the minimum {low:g}")
-        return self
-
-    @property
-    def absolute(self) -> bool:
-        """Whether it is a limit of the value itself."""
-        return self.lsl is not None or self.usl is not None
-
-    @property
-    def ends(self) -> tuple[float | None, float | None]:
-        """Lowest and highest error, or value where it is absolute."""
-        return (self.lsl, self.usl) if self.absolute else (self.min, self.max)
 
 
 class Precision(fields.Model):
@@ -121,34 +49,6 @@ class Precision(fields.Model):
     """Half the width of the 99.7 % interval of the probability of failure. Example: 1e-4"""
 
 
-class Cost(fields.Model):
-    """What a tolerance T costs: a/T^exponent, T in the study's units; a number alone is ``a``."""
-
-    bare, short = "a", (fields.NUMBER_FORM,)
-    a: fields.Positive = 1.0
-    """Cost of a tolerance of 1. Example: 2"""
-    exponent: fields.Positive = 1.0
-    """How steeply the cost rises as the tolerance falls. Example: 1.5"""
-
-
-class Allocate(fields.Model):
-    """The cheapest tolerances that reach a reliability at every pose, each by itself (not over a cycle)."""
-
-    reliability: fields.Positive
-    """Reliability that every pose must reach, between 0 and 1. Example: 0.999"""
-    cost: dict[str, Cost] = Field(default_factory=dict)
-    """Cost of each tolerance, a/T^exponent, T half its width, sigma or the mean radial clearance. Dimensions that are
-    not named cost 1/T; clearances and loads that are not named are held. Example: {r1: 2, rod.length: {a: 1, exponent:
-    2}}
-    """
-
-    @model_validator(mode="after")
-    def _possible(self) -> Allocate:
-        if not 0.0 < self.reliability < 1.0:
-            raise failure(f"a reliability lies between 0 and 1, not {self.reliability:g}")
-        return self
-
-
 class Correlated(NamedTuple):
     """Two dimensions and the correlation coefficient of their deviations."""
 
@@ -160,7 +60,7 @@ class Correlated(NamedTuple):
 def _correlation(raw: Any, context: Context) -> Correlated:
     if not isinstance(raw, list) or len(raw) != 3 or not all(isinstance(name, str) for name in raw[:2]):
         raise failure(f"a correlation is [name, name, coefficient], for example [r1, r2, 0.5], not {shown(raw)}")
-    coefficient = read_number(raw[2], context, "none").nominal
+    coefficient = read_number(raw[2], context, "none")
     if abs(coefficient) >= 1.0:
         raise failure(f"a correlation lies between -1 and 1, not {coefficient:g}; what is the same is one parameter")
     if raw[0] == raw[1]:
@@ -219,8 +119,8 @@ class ReliabilitySection(MotionSection):
     where a method samples. Example: 4096
     """
     allocate: Allocate | None = None
-    """Asks for the cheapest tolerances that reach a reliability at every pose. Example: {reliability: 0.999, cost: {r1:
-    2}}
+    """Asks for the cheapest tolerances that reach a reliability or a Cpk at every pose. Example: {reliability: 0.999,
+    cost: {r1: 2}} Example: {cpk: 1.33, grades: true}
     """
     shown: Annotated[int, fields.whole(1, 10**9)] | None = None
     """The pose, by its number from 1, at which samples are shown; left out, the one that fails most. Example: 1"""
@@ -260,7 +160,7 @@ class ReliabilitySection(MotionSection):
             message = "no method draws samples that could be shown; ask for monte_carlo, say, or leave it out"
             checker.report(("reliability", "shown"), message, at_key=True)
         if self.allocate is not None:
-            _allocate(checker, self, dimensions, clearances)
+            check_allocation(checker, self.allocate, dimensions, clearances, self.limits)
         load = _load(checker, self, dimensions)
         parts = {name: split_link(checker.mechanism, name) for name in (*(self.outputs or ()), *self.limits)}
         stiffness = checker.parts.get("stiffness")
@@ -343,27 +243,6 @@ def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, D
     return None if section.load is None else checker.load(section.load, path, on_pin=on_pin)
 
 
-def _allocate(
-    checker: Checker, section: ReliabilitySection, dimensions: dict[str, Dimension], clearances: dict[str, Clearance]
-) -> None:
-    assert section.allocate is not None
-    for name in section.allocate.cost:
-        path: KeyPath = ("reliability", "allocate", "cost", name)
-        if name in dimensions and dimensions[name].measured is not None:
-            checker.report(path, "what is measured is held as it is: its tolerance is not allocated", at_key=True)
-        checker.known(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
-        if name in clearances and clearances[name].fit is not None:
-            message = "a fit is not allocated: its classes come in steps; give 'radial' or 'diametral', or no cost"
-            checker.report(path, message, at_key=True)
-    if not section.limits:
-        checker.report(("reliability", "allocate"), "tolerances are allocated to keep 'limits'; give some")
-    wide = any(d.sigma if d.tolerance is None else d.ends[0] < d.ends[1]
-               for name, d in dimensions.items() if name not in LOADS)  # fmt: skip
-    if not wide and not section.allocate.cost:
-        message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
-        checker.report(("reliability", "allocate"), message)
-
-
 def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
     path: KeyPath = ("reliability", "limits", name)
     mechanism, report = checker.mechanism, checker.report
@@ -414,8 +293,11 @@ def links_meant(
     return meant | {point: rest for point, (_, rest) in others(section, graph).items()}
 
 
-def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
-    """A line for each clearance, and for each fit and tolerance class with its size in the study's units."""
+def in_words(section: ReliabilitySection | None, graph: Graph, sizes: Mapping[str, float]) -> list[str]:
+    """A line for each clearance, and for each fit and tolerance class with its size in the study's units.
+
+    `sizes` are the nominal values of parameters and places.
+    """
     if section is None:
         return []
     lines = [
@@ -433,10 +315,10 @@ def in_words(section: ReliabilitySection | None, graph: Graph) -> list[str]:
                 f"fit: {name}, {clearance.fit.text}: radial clearance {clearance.radius - half:.6g} to "
                 f"{clearance.radius + half:.6g}"
             )
-    classes: dict[tuple[str, tuple[float, float]], list[str]] = {}
+    classes: dict[tuple[str, tuple[Number, Number]], list[str]] = {}
     for name, dimension in section.dimensions.items():
         if isinstance(given := dimension.tolerance, ToleranceClass):
-            classes.setdefault((given.text, given.ends), []).append(name)
+            classes.setdefault((given.text, dimension.ends(sizes[name])), []).append(name)
     lines += [
         f"tolerance: {text} of {', '.join(names)}: {low:+.6g} to {high:+.6g}"
         for (text, (low, high)), names in classes.items()

@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
+from mechdesign.expressions import Number
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.schema.checker import Checker
@@ -14,6 +15,7 @@ from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number
+from mechdesign.study.text.units import Amount
 
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
@@ -61,18 +63,23 @@ class Profile(fields.Model):
         return self
 
     @property
-    def extent(self) -> tuple[float, float, float]:
-        """Area, second moment of area for bending in the plane, and shear factor."""
+    def extent(self) -> tuple[Number, Number, Number]:
+        """Area, second moment of area for bending in the plane, and shear factor; arrays where numbers are."""
+        area: Number
+        inertia: Number
+        factor: Number
         if self.width is not None and self.height is not None:
             area, inertia, factor = self.width * self.height, self.width * self.height**3 / 12, 5 / 6
         elif self.diameter is not None:
-            m = (self.inner_diameter or 0.0) / self.diameter
+            m = 0.0 if self.inner_diameter is None else self.inner_diameter / self.diameter
             area = math.pi / 4 * self.diameter**2 * (1 - m * m)
             inertia = math.pi / 64 * self.diameter**4 * (1 - m**4)
             factor = 6 * (1 + m * m) ** 2 / (7 * (1 + m * m) ** 2 + 20 * m * m)
         else:
-            area, inertia, factor = self.area or 0.0, self.inertia or 0.0, 5 / 6
-        return area, inertia, self.shear_factor or factor
+            assert self.area is not None
+            assert self.inertia is not None
+            area, inertia, factor = self.area, self.inertia, 5 / 6
+        return area, inertia, factor if self.shear_factor is None else self.shear_factor
 
 
 class Bearing(fields.Model):
@@ -93,13 +100,13 @@ class Bearing(fields.Model):
 
 def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
-    parts = [read_number(each, context).nominal for each in fields.as_list(raw)]
+    parts = {f"k{number}": read_number(each, context) for number, each in enumerate(fields.as_list(raw))}
     if not parts:
         raise failure("expected a stiffness, or a list of those in series")
-    for part in parts:
+    for part in parts.values():
         if part <= 0:
             raise failure(f"must be positive, not {part:g}")
-    return 1.0 / sum(1.0 / part for part in parts)
+    return Amount.by(f"1/({' + '.join(f'1/{name}' for name in parts)})", **parts)
 
 
 _SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
@@ -169,8 +176,9 @@ class StiffnessSection(PoseSection):
             path: KeyPath = (*root, "elastic", link)
             checker.known(link, checker.mechanism.moving, "moving link", path, at_key=True)
             checker.known(profile, self.sections, "section", path)
+        named = [*self.elastic.values(), *checker.choices()]
         for profile in self.sections:
-            if profile not in self.elastic.values():
+            if profile not in named:
                 others = [other for other in self.sections if other != profile]
                 checker.reporter.unused((*root, "sections", profile), "section", others)
         for drive in self.actuators:

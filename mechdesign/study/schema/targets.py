@@ -17,6 +17,7 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.paths import read_table
 from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.reporter import Reporter
 
 ROOT: KeyPath = ("mechanism", "targets")
@@ -33,7 +34,8 @@ class Target:
     owner: str  # a coordinate or a measure, or a point whose path it is
     coordinates: tuple[str, ...]  # what has an error: the owner, or the point's x and y
     expression: Expression | None = None  # over coordinates and parameters, in the study's units
-    table: Floats | None = None  # in the study's units, shape (rows, columns)
+    table: Floats | None = None  # in the study's units, shape (rows, columns),
+    rows: Sequence[Sequence[float]] = ()  # and its numbers where some follow parameters
 
     @property
     def timed(self) -> bool:
@@ -63,7 +65,8 @@ def check(checker: Checker, wanted: Mapping[str, Wanted]) -> dict[str, Target]:
         if not isinstance(value, Expression):
             table = _table(checker, owner, value, path, len(coordinates), quantity)
             if table is not None:
-                found[owner] = Target(owner, coordinates, table=table)
+                moved = () if isinstance(value, str) or not any(own_numbers(value)) else value
+                found[owner] = Target(owner, coordinates, table=table, rows=moved)
         elif _right(checker, owner, value, path, point):
             if quantity != "none":
                 checker.kind(path, quantity)

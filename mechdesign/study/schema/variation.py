@@ -1,24 +1,25 @@
-"""How parts vary, as the study file gives it: dimensions by tolerances, classes or measured values; clearances."""
+"""How dimensions vary, as the study file gives it: by tolerances, classes or measured values."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, NamedTuple, Self
+from dataclasses import dataclass
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import model_validator
 
 from mechdesign.errors import StudyError
-from mechdesign.mechanism.model import MEASURED
+from mechdesign.expressions import Number
+from mechdesign.mechanism.model import MEASURED, Place
 from mechdesign.numerics.arrays import Floats
+from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.iso_tolerances import (
     ToleranceClassError,
     angle_deviations,
     deviations,
-    fit_deviations,
     is_class,
 )
 from mechdesign.study.schema.paths import read_column
@@ -26,7 +27,7 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
-from mechdesign.study.text.units import QuantityError
+from mechdesign.study.text.units import Amount, QuantityError
 
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
@@ -41,21 +42,9 @@ BETA = "beta"
 _OF_DIMENSIONS = {**DISTRIBUTIONS, BETA: "beta over the tolerance, with two shape parameters, 'shape'"}
 # Least number of measured values.
 MIN_MEASURED = 10
-PIN_MODELS = {
-    "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
-    "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",
-    "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
-    "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
-}
-_EFFECTS = {
-    "offset": "moves the joint's point in the link's frame, by x and y",
-    "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
-}
-# A lowest clearance so little below zero counts as zero.
-CLEARANCE_ROUNDING = 1e-9
 
 
-def _millimetre(context: Context, text: str) -> float:
+def millimetre(context: Context, text: str) -> float:
     """A millimetre in the study's unit of length, for a class of an ISO standard."""
     try:
         return context.units.convert("1 mm")
@@ -65,22 +54,18 @@ def _millimetre(context: Context, text: str) -> float:
 
 @dataclass(frozen=True)
 class ToleranceClass:
-    """A tolerance class as it is written, a millimetre and a degree as the study counts them.
-
-    `ends`, its lowest and highest deviation, follow from the size of what it is of.
-    """
+    """A tolerance class as it is written, a millimetre and a degree as the study counts them."""
 
     text: str
     millimetre: float
     degree: float
-    ends: tuple[float, float] = (0.0, 0.0)
 
-    def of_length(self, size: float) -> tuple[float, float]:
+    def of_length(self, size: Number) -> tuple[Number, Number]:
         """Lowest and highest deviation of a length; raises as `deviations`."""
-        low, high = deviations(self.text, abs(size) / self.millimetre)
+        low, high = deviations(self.text, np.abs(size) / self.millimetre)
         return low * self.millimetre, high * self.millimetre
 
-    def of_angle(self, leg: float) -> tuple[float, float]:
+    def of_angle(self, leg: Number) -> tuple[Number, Number]:
         """Lowest and highest deviation of an angle whose shorter leg is so long; raises as `angle_deviations`."""
         low, high = angle_deviations(self.text, leg / self.millimetre)
         return low * self.degree, high * self.degree
@@ -90,20 +75,20 @@ def _tolerance_or_class(raw: Any, context: Context) -> tuple[float, float] | Tol
     """As `_tolerance`, or a tolerance class; a parameter of its name counts first."""
     if isinstance(raw, str) and is_class(raw) and raw not in context.parameters:
         degree = math.pi / 180.0 / context.units.angle_factor
-        return ToleranceClass(raw, _millimetre(context, raw), degree)
+        return ToleranceClass(raw, millimetre(context, raw), degree)
     return _tolerance(raw, context)
 
 
 def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
     """A half-width, or the lowest and the highest deviation."""
     if not isinstance(raw, list):
-        half = read_number(raw, context).nominal
+        half = read_number(raw, context)
         if half < 0:
             raise failure(f"must be at least 0, not {half:g}; two bounds are written [-0.1, 0.3]")
-        return -half, half
+        return Amount.by("-half", half=half), half
     if len(raw) != 2:
         raise failure(f"expected a half-width or two bounds such as [-0.1, 0.3], not {shown(raw)}")
-    low, high = (read_number(each, context).nominal for each in raw)
+    low, high = (read_number(each, context) for each in raw)
     if low > high:
         raise failure(f"the lowest deviation {low:g} is above the highest {high:g}")
     return low, high
@@ -112,37 +97,6 @@ def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
 _TOLERANCE = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM]}
 Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 _CLASSED = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM, {**fields.NAME_FORM, "title": "tolerance class"}]}
-
-
-class Fit(NamedTuple):
-    """A fit as it is written, its mean diametral clearance, and half the tolerances of its hole and of its shaft."""
-
-    text: str
-    diametral: float
-    hole: float
-    shaft: float
-
-
-def _fit(raw: Any, context: Context) -> Fit:
-    if not isinstance(raw, str):
-        raise failure(f"expected a fit such as 20 H7/g6, not {shown(raw)}")
-    millimetre = _millimetre(context, raw)
-    try:
-        _, hole, shaft = fit_deviations(raw)
-    except ToleranceClassError as error:
-        raise failure(str(error)) from None
-    least, most = hole[0] - shaft[1], hole[1] - shaft[0]
-    if least < -CLEARANCE_ROUNDING:
-        kind = "an interference" if most <= CLEARANCE_ROUNDING else "a transition"
-        raise failure(
-            f"{raw} is {kind} fit, from {least:+.4g} to {most:+.4g} mm, and no clearance is negative; a pin that is "
-            "pressed in has none: leave it out, or take a clearance fit such as H7/g6 or H7/h6"
-        )
-    halves = [0.5 * (high - low) * millimetre for low, high in (hole, shaft)]
-    return Fit(raw, 0.5 * (least + most) * millimetre, *halves)
-
-
-_FIT = {**fields.NAME_FORM, "title": "fit"}
 
 
 class Dimension(fields.Model):
@@ -191,13 +145,32 @@ class Dimension(fields.Model):
             raise failure(f"{spare[0]!r} goes with 'measured', the name of a file")
         return self
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Lowest and highest deviation of the tolerance; none where sigma is given."""
-        return self.tolerance.ends if isinstance(self.tolerance, ToleranceClass) else self.tolerance or (0.0, 0.0)
+    def ends(self, nominal: Number) -> tuple[Number, Number]:
+        """Lowest and highest deviation of the tolerance, none where sigma is given; a class goes by the nominal value.
 
-    def deviations(self, nominal: float, folder: Folder) -> Floats:
-        """Measured values less what they deviate from, in the study's units, by default `nominal`.
+        Raises
+        ------
+        ToleranceClassError
+            Where the class is not given for the size.
+        """
+        if not isinstance(self.tolerance, ToleranceClass):
+            return self.tolerance or (0.0, 0.0)
+        return self.tolerance.of_length(nominal) if self.leg is None else self.tolerance.of_angle(self.leg)
+
+    def varies(self, nominal: Number) -> bool:
+        """Whether it has a tolerance that is wider than nothing; see `ends`."""
+        low, high = self.ends(nominal)
+        return bool(np.any(low < high))
+
+    def flaw(self, nominal: Number) -> str:
+        """What is wrong with its numbers at a nominal value, or at any of several; empty where nothing is."""
+        if self.distribution == "lognormal" and np.any(nominal <= 0):
+            return "what is lognormal is positive, and so is its nominal value"
+        low, high = self.ends(nominal)
+        return "the lowest deviation is above the highest" if np.any(low > high) else ""
+
+    def deviations(self, nominal: Number, folder: Folder) -> tuple[Floats, Number]:
+        """Measured values, and what they deviate from, in the study's units, by default `nominal`.
 
         Raises
         ------
@@ -211,73 +184,15 @@ class Dimension(fields.Model):
             raise StudyError(f"{file}: {len(values)} measured values are too few: give {MIN_MEASURED} or more")
         if np.ptp(values) == 0:
             raise StudyError(f"{file}: all {len(values)} measured values are {values[0]:g}: nothing varies")
-        if self.nominal is None and np.abs(values).max() < 0.5 * abs(nominal):
+        if self.nominal is not None:
+            return values, self.nominal
+        far = np.max(np.abs(nominal))
+        if np.abs(values).max() < 0.5 * far:
             raise StudyError(
                 f"{file}: the measured values lie between {values.min():g} and {values.max():g}, and the nominal value "
-                f"is {nominal:g}; where they are deviations, say 'nominal: 0'"
+                f"is {far:g}; where they are deviations, say 'nominal: 0'"
             )
-        return np.asarray(values - (nominal if self.nominal is None else self.nominal))
-
-
-class PinModel(fields.Model):
-    """How a pin lies in its hole, for each kind of method; a word alone is for both."""
-
-    short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
-    analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that compute: analytic, second_order."""
-    monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that sample, and of form."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _long_form(cls, raw: Any) -> Any:
-        return {"analytic": raw, "monte_carlo": raw} if isinstance(raw, str) else raw
-
-
-class Clearance(fields.Model):
-    """Clearance of a pin or slide: one of ``radial``, ``diametral`` and ``fit``. Coordinates of a pin's point are those
-    of the links in which it does not move; an output may name its link, coupler.P.x.
-    """
-
-    one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
-    radial: fields.NonNegativeLength | None = None
-    """Mean radial clearance: half the difference of the diameters; of a slide its play on either side. Example: 0.03"""
-    diametral: fields.NonNegativeLength | None = None
-    """Mean difference of the diameters of hole and pin. Example: 0.06"""
-    fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
-    """Fit of ISO 286-1 with its size in mm; tolerances of hole and shaft follow. Example: 20 H7/g6"""
-    tolerance: Tolerance = (0.0, 0.0)
-    """How far the clearance given (radial or diametral) deviates: a half-width, or the lowest and highest. A fit has
-    its own. Example: 0.01
-    """
-    distribution: Annotated[str, fields.choice(DISTRIBUTIONS, "distribution")] = "normal"
-    """Distribution of the clearance over its tolerance; of a fit normal or uniform."""
-    pin: PinModel = PinModel()
-    link: fields.LinkName | None = None
-    """Link in which the pin moves. Left out: the last link at the joint that no output is said to be of. Example:
-    forearm
-    """
-    effect: Annotated[str, fields.choice(_EFFECTS, "effect of a clearance")] = "offset"
-    """What the pin's place changes."""
-    length: fields.PositiveLength | None = None
-    """Length of a slider in its guide, centred on the joint's point: it shifts and tilts. Prismatic joints need it; no
-    others have it. Example: 40
-    """
-
-    @property
-    def radius(self) -> float:
-        """Mean radial clearance, half the difference of the diameters."""
-        diametral = self.fit.diametral if self.fit is not None else self.diametral
-        return self.radial if self.radial is not None else 0.5 * (diametral or 0.0)
-
-    @property
-    def radius_spread(self) -> Dimension | None:
-        """Variation of the radial clearance; None where it has none, and of a fit."""
-        if self.tolerance == (0.0, 0.0):
-            return None
-        factor = 1.0 if self.radial is not None else 0.5
-        low, high = (factor * end for end in self.tolerance)
-        return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
+        return values, nominal
 
 
 def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> dict[str, Dimension]:
@@ -304,49 +219,47 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
 
 
 def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
-    """Check a dimension and give it the deviations of its class."""
-    if dimension.distribution == "lognormal":
-        nominal = checker.parameters.nominal.get(name)
-        if name in checker.mechanism.driven_kinds or name in LOADS or (nominal is not None and nominal <= 0):
-            checker.report(path, "what is lognormal is positive, and so is its nominal value", at_key=True)
+    """Check a dimension, as the section gives it or a wildcard in it."""
     if (quantity := LOADS.get(name) or checker.quantity(name)) is not None:
         for key in (dimension.kind, "nominal"):
             checker.kind((*path, key), quantity)
     if dimension.measured is not None:
         _check_measured(checker, name, dimension, path)
-    if not isinstance(dimension.tolerance, ToleranceClass):
-        if dimension.leg is not None:
-            checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
-        return dimension
-    given = dimension.tolerance
+    if dimension.leg is not None and not isinstance(dimension.tolerance, ToleranceClass):
+        checker.report((*path, "leg"), "the leg is that of an angle with the tolerance ISO 2768-m (or -f, -c, -v)")
     try:
-        given = replace(given, ends=_of_class(checker, name, given, dimension.leg))
+        _check_class(checker, name, dimension.tolerance, dimension.leg)
+        flaw = dimension.flaw(checker.size(name))
     except ToleranceClassError as error:
-        alone = "" if name == path[-1] else f"{name} has no such tolerance and needs one of its own: "
-        checker.report(path, f"{alone}{error}", at_key=True)
-    return dimension.model_copy(update={"tolerance": given})
+        flaw = str(error) if name == path[-1] else f"{name} has no such tolerance and needs one of its own: {error}"
+    if flaw:
+        checker.report(path, flaw, at_key=True)
+    return dimension
 
 
-def _of_class(checker: Checker, name: str, given: ToleranceClass, leg: float | None) -> tuple[float, float]:
-    """Deviations of a parameter or place by its class."""
-    parameters, places = checker.parameters, checker.places
-    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
-    # Bounds of the motion and numbers in measures are no dimensions of a part.
-    kinds = {places[place].quantity for place, slope in slopes.items()
-             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
+def _check_class(checker: Checker, name: str, given: object, leg: float | None) -> None:
+    """Check that a tolerance is no class, or that of a parameter or place that has one."""
+    if not isinstance(given, ToleranceClass):
+        return
+    kinds = quantities(name, checker.parameters, checker.places)
     if len(kinds) != 1 or "none" in kinds:
         raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
-    if kinds == {"length"}:
-        if leg is not None:
-            raise ToleranceClassError("the leg is that of an angle; a length has its own size")
-        return given.of_length(parameters.nominal[name] if name in parameters.nominal else places[name].nominal)
-    found = given.of_angle(leg or given.millimetre)
-    if leg is None:
+    if kinds == {"length"} and leg is not None:
+        raise ToleranceClassError("the leg is that of an angle; a length has its own size")
+    if kinds == {"angle"} and leg is None:
+        given.of_angle(given.millimetre)
         raise ToleranceClassError(
             f"{given.text} of an angle goes by the length of its shorter leg; say which: "
             f"{{tolerance: {given.text}, leg: 50}}"
         )
-    return found
+
+
+def quantities(name: str, parameters: Parameters, places: Mapping[str, Place]) -> set[str]:
+    """Quantities of the dimensions of parts that a parameter moves, or of the place of this name."""
+    slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
+    # Bounds of the motion and numbers in measures are no dimensions of a part.
+    return {places[place].quantity for place, slope in slopes.items()
+            if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
 
 
 def _check_measured(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> None:
@@ -365,60 +278,3 @@ def _check_measured(checker: Checker, name: str, dimension: Dimension, path: Key
             "deviations are those of every design"
         )
         checker.report(path, message, at_key=True)
-
-
-def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
-    """A clearance with the link that its pin moves in, which is not that `meant` by outputs; None without its joint."""
-    path: KeyPath = ("reliability", "clearances", point)
-    mechanism, report = checker.mechanism, checker.report
-    _check_radius(checker, clearance, path)
-    if point in mechanism.slides:
-        return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
-    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
-        return None
-    if clearance.length is not None:
-        report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
-    links = mechanism.owners[point]
-    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
-    if len(held) < 2:
-        report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
-    # Where the study does not say, the pin moves in the last link that no output or limit means.
-    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
-    if link not in links:
-        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
-    elif clearance.effect == "length":
-        binary = mechanism.links[link]
-        if point not in (binary.from_, binary.to) or binary.telescopic:
-            message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
-            report((*path, "effect"), message)
-    return clearance.model_copy(update={"link": link})
-
-
-def _check_slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath, *, tilts: bool) -> Clearance:
-    for key in {"link", "effect"} & clearance.model_fields_set:
-        checker.report((*path, key), f"a slide's clearance has no {key!r}: its slider shifts across the line")
-    if tilts and clearance.length is None:
-        message = "the slider tilts in its guide as far as its 'length' along the line lets it; give that too"
-        checker.report(path, message, at_key=True)
-    elif not tilts and clearance.length is not None:
-        checker.report((*path, "length"), "a pin in a slot does not tilt; leave it out")
-    return clearance
-
-
-def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
-    """Check how the clearance's size varies."""
-    report = checker.report
-    checker.kind((*path, "tolerance"), "length")
-    if clearance.fit is not None:
-        if "tolerance" in clearance.model_fields_set:
-            report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
-        if clearance.distribution not in ("normal", "uniform"):
-            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
-    spread = clearance.radius_spread
-    if spread is not None and clearance.radius + spread.ends[0] < -CLEARANCE_ROUNDING:
-        factor = 1.0 if clearance.radial is not None else 2.0
-        size, lowest = factor * clearance.radius, clearance.tolerance[0]
-        message = f"a clearance of {size:g} that is {-lowest:g} smaller is negative: such a pin does not go in its hole"
-        report((*path, "tolerance"), message)
-    if spread is not None and spread.distribution == "lognormal" and clearance.radius <= 0:
-        report((*path, "distribution"), "what is lognormal is positive, and so is its nominal value")

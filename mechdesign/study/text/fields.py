@@ -25,7 +25,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.study.text.document import read
-from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure, text_of
+from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure
 
 Form = dict[str, Any]
 """JSON Schema of a part of the study; a title says in words what is accepted."""
@@ -52,7 +52,8 @@ MAX_NAMED = 12
 class Context:
     """What numbers are read with: units, values of the parameters (nan where one is wrong) and those not known yet.
 
-    `quantities` are the texts of parameters that have a unit; `used` gathers the names in expressions that were read.
+    `quantities` are the texts of parameters that have a unit; `used` gathers the names in expressions that were read,
+    `fixed` those in whole numbers, which are the same for every design.
     """
 
     units: Units = field(default_factory=Units)
@@ -60,6 +61,7 @@ class Context:
     below: Collection[str] = ()
     quantities: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
+    fixed: set[str] = field(default_factory=set)
 
     def expression(self, text: str) -> Expression:
         """Parse an expression in the study's units and note the names in it."""
@@ -68,15 +70,7 @@ class Context:
         return found
 
 
-@dataclass(frozen=True)
-class StudyNumber:
-    """A number in the study's units (an `Amount` where it has a unit), with its expression over parameters."""
-
-    nominal: float
-    expression: Expression | None = None
-
-
-LOST = StudyNumber(math.nan)
+LOST = Amount(math.nan)
 """Stands for a number whose own mistake has been reported, so that the rest can be checked."""
 
 
@@ -98,7 +92,7 @@ def shown(value: object) -> str:
     return repr(cut(value)) if isinstance(value, str) else cut(f"the number {value}")
 
 
-def read_number(raw: object, context: Context, kind: str | None = None) -> StudyNumber:
+def read_number(raw: object, context: Context, kind: str | None = None) -> Amount:
     """Read a number, a quantity or an expression over parameters.
 
     Raises
@@ -106,30 +100,30 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Study
     PydanticCustomError
         Where it is none of them, not finite, too large, or a quantity of another kind than `kind`.
     """
-    if isinstance(raw, StudyNumber):
+    if isinstance(raw, Amount):
         return raw
     if isinstance(raw, bool) or not isinstance(raw, int | float | str):
         raise failure(f"expected a number, not {shown(raw)}")
     try:
-        value = _read_text(raw, context, kind) if isinstance(raw, str) else StudyNumber(float(raw))
+        value = _read_text(raw, context, kind) if isinstance(raw, str) else Amount(float(raw))
     except (QuantityError, ExpressionError) as error:
         raise failure(str(error)) from None
     except OverflowError:
         raise failure("too large a number") from None
-    if not isinstance(raw, str) and not math.isfinite(value.nominal):
-        raise failure(f"expected a finite number, not {value.nominal:g}")
+    if not isinstance(raw, str) and not math.isfinite(value):
+        raise failure(f"expected a finite number, not {value:g}")
     largest, what = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")
-    if abs(value.nominal) > largest:
+    if abs(value) > largest:
         raise failure(f"{shown(raw)} is too large a {what}: none is beyond {largest:g}; choose a larger unit")
     return value
 
 
-def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
+def _read_text(text: str, context: Context, kind: str | None) -> Amount:
     if QUANTITY.fullmatch(text):
         number = context.units.convert(text, kind)
         if not math.isfinite(number):
             raise failure(f"{text!r} is too large a number")
-        return StudyNumber(Amount(number, text.strip()))
+        return Amount(number, text.strip())
     if text.rstrip().endswith("%"):
         raise failure(f"{text!r} is in per cent, which is no unit here: write the fraction, or what it is of, 0.01*r")
     if _DECIMAL_COMMA.fullmatch(text):
@@ -139,15 +133,13 @@ def _read_text(text: str, context: Context, kind: str | None) -> StudyNumber:
         hint = _known_names(name, context)
         raise failure(f"unknown name {name!r} in {shown(text)}{hint}")
     value = float(expression.evaluate(context.parameters))
-    return StudyNumber(
-        Amount(value, context.quantities.get(text.strip(), "")), expression if expression.names else None
-    )
+    return Amount(value, context.quantities.get(text.strip(), ""), expression if expression.names else None)
 
 
 def read_expression(raw: object, context: Context) -> Expression:
     """Read an expression whose names are looked up later; a number is one without names."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
-        number = read_number(raw, context).nominal
+        number = float(read_number(raw, context))
         # A number that is lost has been reported already.
         return Expression.parse(repr(0.0 if math.isnan(number) else number))
     try:
@@ -164,7 +156,7 @@ def read_rows(raw: list[Any], context: Context, most: int, rule: str, empty: str
     rows: list[tuple[float, ...]] = []
     for index, item in enumerate(raw):
         try:
-            row = tuple(read_number(part, context).nominal for part in (item if isinstance(item, list) else [item]))
+            row = tuple(read_number(part, context) for part in (item if isinstance(item, list) else [item]))
         except PydanticCustomError as error:
             raise failure(f"entry {index}: {error.message()}") from None
         if not 1 <= len(row) <= most or (rows and len(row) != len(rows[0])):
@@ -231,28 +223,33 @@ def reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
 
 
 def number(
-    kind: str | None = None, minimum: float | None = None, *, exclusive: bool = False, value: bool = False
+    kind: str | None = None, minimum: float | None = None, *, exclusive: bool = False, place: bool = False
 ) -> Read:
     """Annotation of a number: its kind in `units.KINDS`, if that is the same everywhere, and its least value.
 
-    It becomes a float, or with `value` a `StudyNumber`.
+    It becomes an `Amount`. What is a `place` of the geometry judges the parameters in it by itself.
     """
     smallest = MIN_LENGTH if kind == "length" else MIN_NUMBER
 
-    def read(raw: Any, context: Context) -> float | StudyNumber:
-        found = read_number(raw, context, kind)
-        size = found.nominal
-        if kind and not value and found.expression and text_of(size):
+    def read(raw: Any, context: Context) -> Amount:
+        size = read_number(raw, context, kind)
+        if kind and not place and size.expression and size.text:
             # Parameters are judged by the geometry that they change.
-            _check_kind(text_of(size), kind)
+            _check_kind(size.text, kind)
         if minimum is not None and 0 < size < smallest:
             raise failure(f"{size:g} is too small a number: none but 0 is below {smallest:g}; choose a smaller unit")
         if minimum is not None and (size < minimum or (exclusive and size == minimum)):
-            what = "positive" if minimum == 0 and exclusive else f"at least {minimum:g}"
+            what = positive(minimum, exclusive=exclusive)
             raise failure(f"must be {what}, not {size:g}")
-        return found if value else size
+        size.least, size.exclusive = minimum, exclusive
+        return size
 
     return Read(read, NUMBER_FORM, kind or "")
+
+
+def positive(minimum: float, *, exclusive: bool) -> str:
+    """What a number must be that is not below a minimum, or above it."""
+    return "positive" if minimum == 0 and exclusive else f"at least {minimum:g}"
 
 
 def _check_kind(text: str, kind: str) -> None:
@@ -269,10 +266,11 @@ def whole(minimum: int = 0, maximum: int | None = None) -> Read:
         if isinstance(raw, int) and not isinstance(raw, bool):
             found = raw
         else:
-            size = read_number(raw, context, "none").nominal
+            size = read_number(raw, context, "none")
+            context.fixed.update(size.expression.names if size.expression else ())
             if math.isnan(size):
                 return minimum
-            if size != int(size):
+            if not size.is_integer():
                 raise failure(f"expected a whole number, not {size:g}")
             found = int(size)
         if found < minimum:
@@ -338,6 +336,51 @@ class KeyText(NamedTuple):
     examples: tuple[str, ...] = ()
 
 
+def parts_of(part: Any, key: str) -> Iterator[tuple[str, Any]]:
+    """The sections and numbers in a part of a study, itself among them, with their keys."""
+    if isinstance(part, Model | Amount):
+        yield key, part
+    for name, each in _inside(part):
+        yield from parts_of(each, f"{key}.{name}")
+
+
+def own_numbers(part: Any) -> Iterator[Amount]:
+    """The numbers of a part of a study that follow parameters, without those of sections inside it."""
+    if isinstance(part, Amount) and part.expression is not None:
+        yield part
+    for _, each in _inside(part):
+        if not isinstance(each, Model):
+            yield from own_numbers(each)
+
+
+def _inside(part: Any) -> Iterator[tuple[Any, Any]]:
+    """What a part of a study holds, by keys."""
+    if isinstance(part, Model):
+        for name, field in type(part).model_fields.items():
+            yield field.alias or name, getattr(part, name)
+    elif isinstance(part, Mapping):
+        yield from part.items()
+    elif isinstance(part, tuple):
+        yield from enumerate(part)
+
+
+def _with_numbers(part: Any, value: Callable[[Amount], Any]) -> Any:
+    """A part of a study with other numbers where they follow parameters; the part itself where none does."""
+    if isinstance(part, Amount):
+        return part if part.expression is None else value(part)
+    if isinstance(part, Model):
+        return part.with_numbers(value)
+    if isinstance(part, dict):
+        changed = {name: new for name, old in part.items() if (new := _with_numbers(old, value)) is not old}
+        return {**part, **changed} if changed else part
+    if isinstance(part, tuple):
+        new = [_with_numbers(old, value) for old in part]
+        if all(one is other for one, other in zip(new, part, strict=True)):
+            return part
+        return type(part)(*new) if hasattr(part, "_fields") else tuple(new)
+    return part
+
+
 _CONSTANT = re.compile(r"\|([A-Z_]+)\|")
 _EXAMPLE = " Example: "
 
@@ -400,6 +443,29 @@ class Model(BaseModel):
         return self.given(*self.one_of[1:])[0]
 
     @classmethod
+    def rules(cls) -> list[Callable[[Any], Any]]:
+        """What the section checks of its numbers together: functions of it that raise PydanticCustomError."""
+        validators = cls.__pydantic_decorators__.model_validators
+        return [each.func for name, each in validators.items() if each.info.mode == "after" and name != "_exactly_one"]
+
+    def judge(self) -> None:
+        """Check the numbers together once more.
+
+        Raises
+        ------
+        PydanticCustomError
+            Where the section does not allow them.
+        """
+        for rule in self.rules():
+            rule(self)
+
+    def with_numbers(self, value: Callable[[Amount], Any]) -> Self:
+        """The section where the numbers that follow parameters are what `value` makes of them, perhaps arrays."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        changed = {name: new for name, old in given.items() if (new := _with_numbers(old, value)) is not old}
+        return self.model_copy(update=changed) if changed else self
+
+    @classmethod
     def said_of_all(cls) -> str:
         """What the section is, in one line."""
         return quoted(" ".join((cls.__doc__ or "").split()))
@@ -444,10 +510,11 @@ PositiveStress = Annotated[float, number("stress", 0.0, exclusive=True)]
 PositiveArea = Annotated[float, number("area", 0.0, exclusive=True)]
 PositiveInertia = Annotated[float, number("inertia", 0.0, exclusive=True)]
 
-LengthValue = Annotated[StudyNumber, number("length", value=True)]
-PositiveLengthValue = Annotated[StudyNumber, number("length", 0.0, exclusive=True, value=True)]
-AngleValue = Annotated[StudyNumber, number("angle", value=True)]
-AnyValue = Annotated[StudyNumber, number(value=True)]
+# Numbers of the geometry.
+LengthPlace = Annotated[Amount, number("length", place=True)]
+PositiveLengthPlace = Annotated[Amount, number("length", 0.0, exclusive=True, place=True)]
+AnglePlace = Annotated[Amount, number("angle", place=True)]
+AnyPlace = Annotated[Amount, number(place=True)]
 Bound = Annotated[Expression, Read(read_expression, NUMBER_FORM)]
 
 LinkName = Annotated[str, name_of("a link")]
@@ -458,6 +525,5 @@ DriveName = Annotated[str, name_of("a drive")]
 MeasureName = Annotated[str, name_of("a measure")]
 BearingName = Annotated[str, name_of("a point, joint or leg")]
 CoordinateName = Annotated[str, name_of("a coordinate (such as C.x or rod.angle)", COORDINATE)]
-PlaceName = Annotated[str, name_of("a parameter or dimension", COORDINATE)]
 CoordinateNames = Annotated[tuple[CoordinateName, ...], BeforeValidator(as_list), OrShort()]
 Numbers = Annotated[tuple[Number, ...], BeforeValidator(as_list), OrShort()]

@@ -10,11 +10,15 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, Self
 
+from numpy.typing import ArrayLike
+
 from mechdesign.errors import nearest
+from mechdesign.expressions import Expression, Number
 
 Powers = tuple[int, ...]
 """Exponents of length, angle, time and force."""
@@ -111,20 +115,36 @@ class QuantityError(ValueError):
 
 
 class Amount(float):
-    """A number in the study's units, with the quantity that it was written as; without text, a bare number."""
+    """A number in the study's units, with the quantity that it was written as, and the expression that gives it.
+
+    Without text it is a bare number; without an expression it is the same for every design.
+    """
 
     text: str
+    expression: Expression | None  # over parameters, in the study's units
+    least: float | None = None  # which it may not fall below, or with `exclusive` not reach
+    exclusive: bool = False
 
-    def __new__(cls, value: float, text: str = "") -> Self:
-        """Make it of a number and the quantity's text."""
+    def __new__(cls, value: float, text: str = "", expression: Expression | None = None) -> Self:
+        """Make it of a number, the quantity's text, and the expression."""
         amount = super().__new__(cls, value)
-        amount.text = text
+        amount.text, amount.expression = text, expression
         return amount
 
     @classmethod
     def of(cls, value: float) -> Self:
         """The number itself if it is one, else a bare one."""
         return value if isinstance(value, cls) else cls(value)
+
+    @classmethod
+    def by(cls, formula: str, **given: float) -> Self:
+        """What a formula makes of numbers, which are its variables; it follows the parameters that they follow."""
+        amounts = {name: cls.of(value) for name, value in given.items()}
+        rule = Expression.parse(formula)
+        value = float(rule.evaluate({name: float(amount) for name, amount in amounts.items()}))
+        followed = {name: amount.expression or float(amount) for name, amount in amounts.items()}
+        whole = rule.substituted(followed)
+        return cls(value, "", whole if whole.names else None)
 
     def __str__(self) -> str:
         return self.text or repr(self)
@@ -146,6 +166,14 @@ class Amount(float):
             raise QuantityError(f"{self.text!r} has a unit, and {unit} is none: give a bare number") from None
         _check_kind(self.text, powers, expected)
         return number * factor / divisor
+
+
+def turn_in(unit: str) -> float:
+    """A whole turn in a unit of angle; 0 in another."""
+    with contextlib.suppress(QuantityError):
+        _, powers, factor = measure(f"1 {unit}")
+        return 2 * math.pi / factor if powers == KINDS["angle"] else 0.0
+    return 0.0
 
 
 @dataclass(frozen=True)
@@ -206,6 +234,12 @@ def text_of(value: object) -> str:
     if isinstance(value, Amount):
         return value.text
     return value if isinstance(value, str) and QUANTITY.fullmatch(value) else ""
+
+
+def at(value: float, parameters: Mapping[str, ArrayLike]) -> Number:
+    """A number of the study where parameters have these values; it is its own where it follows none of them."""
+    expression = value.expression if isinstance(value, Amount) else None
+    return float(value) if expression is None else expression.evaluate(parameters)
 
 
 def written(value: float) -> str:

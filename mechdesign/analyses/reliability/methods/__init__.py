@@ -46,9 +46,9 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
     from mechdesign.analyses.reliability.probability import made_failure
 
     rows = np.flatnonzero(task.assembled)
-    bands = question.at(task.nominal[:, rows]).bands
+    question = question.take(rows).at(task.nominal[:, rows])
     linear, closing = task.linear.take(rows), task.closing.take(rows)
-    values = made_failure(linear, closing, bands, question.discs, mean.T[rows], covariance[rows])
+    values = made_failure(linear, closing, question.bands, question.discs, mean.T[rows], covariance[rows])
     return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
 
 

@@ -115,13 +115,13 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
     length = sources.study.mechanism.size or 1.0
     scale = np.full(len(sigma), length)
     for k, scalar in enumerate(sources.scalars):
-        reach = [(1.0 if quantity == "angle" else length) / abs(slope)
+        reach = [(1.0 if quantity == "angle" else length) / abs(float(slope))
                  for slope, quantity in scalar.moves.values() if slope]  # fmt: skip
         scale[k] = min(reach, default=1.0)
     for k, pin in enumerate(sources.pins):
         first = len(sources.scalars) + 2 * k
         # A slider's end moves its offset, and its angle (the last of its places) by the inverse of its length.
-        turn = abs([*pin.directions[0].values()][-1]) if len(pin.directions[0]) > 1 else 0.0
+        turn = abs(float([*pin.directions[0].values()][-1])) if len(pin.directions[0]) > 1 else 0.0
         scale[first : first + 2] = min(length, 1.0 / turn) if turn else length
     steps = np.clip(_PART * sigma, _SHORTEST * scale, _LONGEST * scale)
     # Deflections are linear in the loads, and the longest step leaves the least rounding.
@@ -137,7 +137,7 @@ def cumulants(sources: Sources) -> Cumulants:
     E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^2 y^2], and all odd moments are zero. Of
     correlated dimensions that are not normal the cumulants of two are counted, those of three and more together not.
     """
-    laws = [scalar.law.moments for scalar in sources.scalars]
+    laws = [[float(moment) for moment in scalar.law.moments] for scalar in sources.scalars]
     count = len(laws)
     size = count + 2 * len(sources.pins)
     mean, covariance = np.zeros(size), np.zeros((size, size))
@@ -153,7 +153,7 @@ def cumulants(sources: Sources) -> Cumulants:
         for places, value in _of_pairs(sources, covariance):
             (third if len(places) == 3 else fourth)[places] = value
     for k, pin in enumerate(sources.pins):
-        law, (radius, second, skew, flat) = pin.laws[pin.analytic], pin.moments
+        law, (radius, second, skew, flat) = pin.laws[pin.analytic], map(float, pin.moments)
         squared = law.variance * (radius**2 + second)
         power = radius**4 + 6.0 * radius**2 * second + 4.0 * radius * skew + flat
         x, y = count + 2 * k, count + 2 * k + 1

@@ -75,7 +75,7 @@ _KINDS = (
 
 def poses_figure(study: Study, result: Result) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
-    found: SpecialPoses = result.drawn["special"]
+    found: SpecialPoses = result.drawn["special"]()
     centres = list(found.shown[0].centres) if found.shown else []
     if not found.shown or not (found.special or found.rates or centres or result.drawn["poses"].listed):
         return None

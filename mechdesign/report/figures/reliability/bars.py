@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -166,8 +166,14 @@ def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
     below = figure.add_axes(
         (margin / style.width(), 1.0 / height, 1 - (margin + 0.2) / style.width(), _FAILURE_HEIGHT / height)
     )
-    _failures(below, tables, 1.0 - section.allocate.reliability)
-    title(figure, f"Cheapest tolerances for a reliability of {section.allocate.reliability:.10g}", note, left=margin)
+    capable = section.allocate.cpk is not None
+    asked = (section.allocate.cpk if capable else section.allocate.reliability) or 0.0
+    if capable:
+        _capabilities(below, tables, asked)
+    else:
+        _failures(below, tables, 1.0 - asked)
+    noun = "Cpk" if capable else "reliability"
+    title(figure, f"Cheapest tolerances for a {noun} of {asked:.10g}", note, left=margin)
     handles, labels = (
         [*first, *second] for first, second in zip(
             one.get_legend_handles_labels(), below.get_legend_handles_labels(), strict=True)
@@ -184,20 +190,32 @@ def _failures(axis: Axes, tables: Mapping[str, Table], allowed: float) -> None:
         [before[name] for name in ("failure", "failure_low", "failure_high")],
         [1.0 - after[name] for name in ("simulated", "high", "low")],
     ]
-    for place, (side, color) in enumerate(zip(sides, (style.FAINT, style.BLUE), strict=True)):
-        worst = int(np.argmax(np.nan_to_num(side[0])))
-        value, low, high = (float(part[worst]) for part in side)
+    worst = [[float(part[int(np.argmax(np.nan_to_num(side[0])))]) for part in side] for side in sides]
+    axis.axvline(allowed, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"allowed: {number(allowed)}")
+    axis.set_xscale("log")
+    _sides(axis, worst, "probability that an error leaves its limits, at the pose that fails most")
+
+
+def _capabilities(axis: Axes, tables: Mapping[str, Table], asked: float) -> None:
+    """The least Cpk of any limit at any pose with the tolerances given and allocated, and what is asked."""
+    before, after = tables["capability"], tables["confirmation"]
+    given, worst = float(np.nanmin(before["cpk"])), int(np.argmin(after["simulated"]))
+    axis.axvline(asked, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"asked: {number(asked)}")
+    sides = [[given] * 3, [float(after[name][worst]) for name in ("simulated", "low", "high")]]
+    _sides(axis, sides, "least Cpk of any limit at any pose")
+
+
+def _sides(axis: Axes, sides: Sequence[Sequence[float]], what: str) -> None:
+    """Value, lowest and highest, of the tolerances given and of those allocated."""
+    for place, ((value, low, high), color) in enumerate(zip(sides, (style.FAINT, style.BLUE), strict=True)):
         axis.errorbar(value, place, xerr=[[value - low], [high - value]], fmt="o", color=color, capsize=3)
         axis.annotate(f"{number(value)}", (value, place), xytext=(0, 7), textcoords="offset points", ha="center",
                       fontsize=8)  # fmt: skip
-    axis.axvline(allowed, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"allowed: {number(allowed)}")
-    axis.set_xscale("log")
     axis.margins(x=0.1)
     axis.set_ylim(1.6, -0.9)
     axis.set_yticks([0, 1], ["as given", "allocated"])
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
-    what = "probability that an error leaves its limits, at the pose that fails most"
     axis.set_xlabel(style.folded(what, 10.0, axis.get_position().width * style.width()))
 
 

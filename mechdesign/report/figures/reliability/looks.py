@@ -16,8 +16,8 @@ from mechdesign.report.figures import style
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.limits import SUFFIXES as ORDER_SUFFIXES
 from mechdesign.study.schema.methods import METHODS, Method
-from mechdesign.study.schema.reliability import SUFFIXES as ORDER_SUFFIXES
 
 SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
 

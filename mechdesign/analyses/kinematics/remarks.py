@@ -1,0 +1,186 @@
+"""What is to be known of a motion as its poses show it: poses that stall, miss a target, or lie on a corner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.instant_centres import REST, TRANSLATION
+from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
+from mechdesign.analyses.kinematics.passage import Mark
+from mechdesign.analyses.poses import POSES_AT_ONCE, pose_in_words
+from mechdesign.errors import counted
+from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.numerics.arrays import Flags
+from mechdesign.study.poses import Poses
+
+# Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
+SINGULAR = 1e-8
+# Poses that warnings are about.
+_STALLED = "stalled"
+_LOST = "without drive rates"
+_REGULAR = "regular"
+_NEAR = "nearly singular"
+_WITHOUT_TARGET = " without target"
+# How two links without an instant centre within reach move against each other.
+_CENTRELESS = {
+    TRANSLATION: "one translates against the other: their instant centre is at infinity",
+    REST: "neither moves against the other: they have no instant centre",
+}
+# How far a step of a motion may deviate from the direction of its rates, as a part of it.
+ASTRAY = 1e-3
+# A path has a corner where its direction (of length one) differs by more from that so many rows before.
+TURNED, BEFORE_CORNER = 1e-6, 1e-9
+
+
+def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    """Warnings about the poses of one design, and about its rates."""
+    found = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
+    return found + _untargeted(question, marks)
+
+
+def unfollowed(poses: Poses) -> list[str]:
+    """A warning of a motion that cannot be followed between its poses."""
+    if not poses.followed:
+        return []
+    what = f"the steps of {poses.swept} are" if poses.swept is not None else "the steps of the path are"
+    return [
+        f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
+        "poses only, and limits of motion, singularities and links in line are not looked for; sweep fewer turns"
+    ]
+
+
+def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    """What is to be known of poses in which two links have no instant centre within reach."""
+    study, poses, warnings = question.study, question.poses, []
+    for centre in question.centres:
+        for kind, text in _CENTRELESS.items():
+            rows, row = marks[f"{centre.name} {kind}"]
+            if rows:
+                where = f"in {rows} of {poses.count} poses"
+                first = pose_in_words(study, poses, row)
+                warnings.append(f"{centre.one} and {centre.other}: {where} {text}; the first: {first}")
+    return warnings
+
+
+def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    """A warning where a valid pose has no target."""
+    study, poses, warnings = question.study, question.poses, []
+    for mark, (count, row) in marks.items():
+        output = mark.removesuffix(_WITHOUT_TARGET)
+        if output != mark and count:
+            name = f"{output}_error"
+            warnings.append(
+                f"{count} of {poses.count} poses lie where the target of {output} has no value: their "
+                f"{name} is nan; the first: {pose_in_words(study, poses, row)}"
+            )
+    return warnings
+
+
+def marks_of(motion: Motion) -> dict[str, Flags]:
+    """Poses that warnings are about."""
+    question, valid, arrays = motion.question, motion.valid, motion.arrays
+    steady = arrays["conditioning"] >= STALLED
+    stalled = valid & ~motion.smooth & ~steady
+    found = {_STALLED: stalled}
+    if question.of_given:
+        found[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
+    if "inverse_condition" in arrays:
+        found[_REGULAR] = valid & steady
+        found[_NEAR] = valid & steady & _near(motion)
+    for output, where in targets.untargeted(question.study, motion.errors, valid).items():
+        found[f"{output}{_WITHOUT_TARGET}"] = where
+    for centre in question.centres:
+        for kind in _CENTRELESS:
+            found[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)
+    return found
+
+
+def _near(motion: Motion) -> Flags:
+    """Poses at or near a singularity of the Jacobian."""
+    question, arrays = motion.question, motion.arrays
+    if len(question.drives) > 1:
+        return ~(arrays["inverse_condition"] >= SINGULAR)
+    # A Jacobian of one entry has no condition: it is compared with a whole size of the mechanism a radian.
+    (output,), (drive,) = question.listed, question.drives
+    size = {"length": question.study.mechanism.size}
+    still = np.abs(arrays["det_J"]) * size.get(drive.quantity, 1.0) / size.get(output.quantity, 1.0)
+    return np.asarray(still < SINGULAR)
+
+
+def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    if _REGULAR not in marks:
+        return []
+    if marks[_REGULAR].number and question.mixed:
+        return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
+    count = marks[_NEAR].number
+    poses = "1 pose is" if count == 1 else f"{count} poses are"
+    if len(question.drives) == 1:
+        (output,) = question.listed
+        return [f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"] if count else []
+    return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"] if count else []
+
+
+def _astray(question: MotionQuestion) -> list[str]:
+    """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
+    study, section, poses = question.study, question.section, question.poses
+    if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
+        return []
+    sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
+    unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
+    given = poses.section(section, slice(1)).rates
+    rates = np.array([np.sum(given.get(name, 0.0)) * u for name, u in zip(poses.names, unit, strict=True)])
+    if not rates.any():
+        return []
+    ahead, values, off = rates / np.linalg.norm(rates), poses.values, 0
+    for begin in range(0, poses.count - 1, POSES_AT_ONCE):
+        some = slice(begin, begin + POSES_AT_ONCE + 1)
+        way = np.array([np.diff(values[name][some]) * u for name, u in zip(poses.names, unit, strict=True)])
+        aside = np.linalg.norm(way - ahead[:, None] * (ahead @ way), axis=0)
+        off += int(np.count_nonzero(aside > ASTRAY * np.linalg.norm(way, axis=0)))
+    if not off:
+        return []
+    return [
+        f"{off} of {poses.count - 1} steps of the motion do not go where the rates of "
+        f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
+        "drawn; 'speed' gives those of a point along its path"
+    ]
+
+
+def _corners(question: MotionQuestion) -> list[str]:
+    """A warning where a path that is passed with a speed has corners: its rates there are those behind them."""
+    poses = question.poses
+    if question.section.speed is None or not poses.motion:
+        return []
+    rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
+    turned = np.zeros(len(rows), dtype=bool)
+    for path in poses.paths.values():
+        behind, before = (path.course(np.zeros(len(at), dtype=np.intp), at)[0] for at in (rows, rows - BEFORE_CORNER))
+        turned |= np.abs(behind - before) > TURNED
+    rows = rows[turned]
+    if not len(rows):
+        return []
+    return [
+        f"the path has corners at {counted(len(rows), 'pose')}, the first: "
+        f"{pose_in_words(question.study, poses, int(rows[0]))}; velocities there are those of the segment that begins, "
+        "and the acceleration that a corner takes is in no row; a spline has no corners"
+    ]
+
+
+def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+    texts = {
+        _STALLED: "at a dead centre or change point, where the drives do not move the mechanism in one way "
+        f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
+        "nothing there",
+        _LOST: "where no drive rates give what is asked: the drives cannot move it in every direction; rates are nan "
+        "there",
+    }
+    warnings = []
+    for name, text in texts.items():
+        count, row = marks.get(name, Mark(0, 0))
+        if count:
+            lie = f"{count} poses lie" if count > 1 else "1 pose lies"
+            warnings.append(f"{lie} {text}; the first: {pose_in_words(question.study, question.poses, row)}")
+    return warnings

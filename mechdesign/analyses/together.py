@@ -1,0 +1,119 @@
+"""Answers of a command for many designs: tables that hold the rows of all of them, and those of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import overload
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Ints
+from mechdesign.results import Column, Result, Scope, Table
+from mechdesign.statistics import Asked, Course
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """How a design was answered: `missing` says which poses or parts of its motion are not valid."""
+
+    warnings: Sequence[str] = ()
+    failed: str = ""
+    missing: str = ""
+    counts: Mapping[str, int] = field(default_factory=dict)
+    error: Exception | None = None  #: why it has no answer
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Answers of some designs of one kind.
+
+    Parameters
+    ----------
+    rows : ndarray of int
+        Which of all designs they are.
+    result : Result
+        Its tables have the rows of one design after those of another.
+    ends : sequence of End
+        Of each design.
+    uneven : mapping of str to ndarray of int
+        Numbers of rows of each design in tables of which one may have more than another.
+    """
+
+    rows: Ints
+    result: Result
+    ends: Sequence[End]
+    uneven: Mapping[str, Sequence[int] | Ints] = field(default_factory=dict)
+
+    @classmethod
+    def alone(cls, result: Result) -> Group:
+        """The answer of a single design."""
+        scopes = (table.scope for table in result.tables.values())
+        missing = next((scope.missing for scope in scopes if scope is not None and scope.missing), "")
+        return cls(np.zeros(1, dtype=np.intp), result, [End(result.warnings, result.failed, missing, result.counts)])
+
+    @classmethod
+    def failed(cls, command: str, error: Exception) -> Group:
+        """A single design that has no answer."""
+        return cls(np.zeros(1, dtype=np.intp), Result(command, {}), [End(error=error)])
+
+    @property
+    def missing(self) -> Flags:
+        """Designs of which poses or a part of the motion is not valid."""
+        return np.array([bool(end.missing) for end in self.ends])
+
+    def of(self, k: int) -> Result | Exception:
+        """The answer of one design as if it were asked alone, or why it has none."""
+        end = self.ends[k]
+        if end.error is not None:
+            return end.error
+        if len(self.ends) == 1:
+            return self.result
+        tables = {name: self._of(table, k, end) for name, table in self.result.tables.items()}
+        return replace(
+            self.result, tables=tables, warnings=list(end.warnings), counts=end.counts, failed=end.failed
+        )  # fmt: skip
+
+    def _of(self, table: Table, k: int, end: End) -> Table:
+        counts = self.uneven.get(table.name)
+        each = len(table) // len(self.ends)
+        begin, number = (k * each, each) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
+        columns = tuple(Column(c.name, c.values[begin : begin + number], c.unit, c.meaning) for c in table.columns)
+        scope = table.scope and replace(table.scope, missing=end.missing, course=_course_of(table.scope, k))
+        return Table(table.name, columns, table.meaning, scope)
+
+
+def _course_of(scope: Scope, design: int) -> Callable[[Asked], Course | None] | None:
+    """A column along the motion of one design of several."""
+    together = scope.course
+    if together is None:
+        return None
+
+    def own(asked: Asked) -> Course | None:
+        course = together(asked)
+        return None if course is None else course.of(design)
+
+    return own
+
+
+class Answers(Sequence[Result | Exception]):
+    """The answer of each design, or why it has none, in groups of those that are of one kind."""
+
+    def __init__(self, groups: Sequence[Group]) -> None:
+        self.groups = groups
+        self._places = {row: (group, k) for group in groups for k, row in enumerate(group.rows.tolist())}
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, k: int) -> Result | Exception: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[Result | Exception]: ...
+    def __getitem__(self, k: int | slice) -> Result | Exception | list[Result | Exception]:
+        if isinstance(k, slice):
+            return [self[each] for each in range(*k.indices(len(self)))]
+        if k not in self._places:
+            raise IndexError(k)
+        group, own = self._places[k]
+        return group.of(own)

@@ -1,0 +1,166 @@
+"""Where motions end, go to infinity, or two assemblies meet: the ends of a curve's pieces, and what causes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from mechdesign.curve.motion import BEYOND, Curve
+from mechdesign.mechanism import Reason
+from mechdesign.mechanism.change_points import TOUCHING
+from mechdesign.mechanism.margins import ZERO_LENGTH, Cause
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+
+# Margins are looked at so far beside the end of a piece, as a part of it.
+BESIDE = 1e-6
+# Slides that become parallel are so within this part of their sine's size, and a leg has no length within this part of
+# the mechanism's.
+PARALLEL, ZERO_LEG = 1e-9, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class End:
+    """Where a motion ends, `before` or behind a piece of it; both where it goes to infinity between two pieces.
+
+    Parameters
+    ----------
+    line : int
+    place : float
+        Along the line, in rows.
+    cause : Cause
+    piece : int
+        The piece at whose end (`x` 1) or begin (-1) it lies.
+    endless : bool
+        Whether the motion goes on behind it, through infinity.
+    """
+
+    line: int
+    place: float
+    cause: Cause
+    piece: int
+    x: int
+    endless: bool = False
+
+
+class Change(NamedTuple):
+    """Where two assemblies meet and a motion goes on; `place` is along the line, in rows."""
+
+    line: int
+    place: float
+    cause: Cause
+
+
+class Ends:
+    """What lies at the ends of the pieces of a curve."""
+
+    def __init__(self, curve: Curve) -> None:
+        self._curve = curve
+
+    @cached_property
+    def _sizes(self) -> Floats:
+        """Size of every margin along each line, shape (causes, lines)."""
+        s, line = self._curve.pieces.nodes, self._curve.pieces.line
+        table = np.abs(self._curve.margins_at(np.repeat(line, s.shape[1]), s.ravel()))
+        table = table.reshape(len(table), *s.shape)
+        sizes = np.zeros((len(table), self._curve.lines))
+        for row, size in zip(np.where(np.isfinite(table), table, 0.0), sizes, strict=True):
+            np.maximum.at(size, line, row.max(axis=1, initial=0.0))
+        return np.where(sizes > 0, sizes, 1.0)
+
+    @cached_property
+    def ends(self) -> tuple[End, ...]:
+        """Where the motions end and where they go to infinity, in order along the lines."""
+        pieces, found = self._curve.pieces, list[End]()
+        joined = pieces.joined_to_next
+        if not len(pieces.line):
+            return ()
+        for x, open_ in ((-1, np.append(True, ~joined)), (1, np.append(~joined, True))):
+            place, beyond = (pieces.end, BEYOND) if x > 0 else (pieces.begin, -BEYOND)
+            piece = np.flatnonzero(open_)
+            outer = place[piece] == (self._curve.poses.end if x > 0 else 0.0)
+            outside = place[piece] + beyond * self._curve.poses.end
+            held = np.zeros(len(piece), dtype=bool)
+            if outer.any() and not self._curve.poses.closed:
+                # The motion ends with its poses only where it cannot go on.
+                held[outer] = self._curve.solve(pieces.line[piece[outer]], outside[outer])[1].valid
+            held |= outer & self._curve.poses.closed
+            piece, outside = piece[~held], outside[~held]
+            causes = self._causes(pieces.line[piece], outside)
+            found += [
+                End(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
+                for k, cause in zip(piece.tolist(), causes, strict=True)
+            ]
+        found += [
+            End(int(pieces.line[k]), float(pieces.end[k]), self._curve.margins.causes[number], k, 1, endless=True)
+            for k, number in self._at_joints("across", PARALLEL)
+        ]
+        return tuple(sorted(found, key=lambda end: (end.line, end.place, end.x)))
+
+    def changes(self) -> list[Change]:
+        """Where two assemblies meet and motions go on, in order along the lines; the first and last pose count."""
+        pieces = self._curve.pieces
+        inner = [
+            Change(int(pieces.line[k]), float(pieces.end[k]), self._curve.margins.causes[number])
+            for k, number in self._at_joints("closure", TOUCHING)
+        ]
+        ended = {(end.line, end.place) for end in self.ends}
+        outer = (pieces.begin == 0.0) | (pieces.end == self._curve.poses.end)
+        line, place = pieces.line[outer], np.where(pieces.begin[outer] == 0.0, 0.0, float(self._curve.poses.end))
+        small = self._small("closure", TOUCHING, line, place, pieces.end[outer] - pieces.begin[outer])
+        rims = [
+            Change(int(line[k]), float(place[k]), self._curve.margins.causes[number])
+            for number, k in np.argwhere(small).tolist()
+            if (int(line[k]), float(place[k])) not in ended
+        ]
+        return sorted(inner + rims, key=lambda change: change[:2])
+
+    def _at_joints(self, role: str, least: float) -> list[tuple[int, int]]:
+        """Pieces at whose end, where the motion goes on, a margin of a role is zero, and the number of its cause."""
+        pieces = self._curve.pieces
+        piece = np.flatnonzero(pieces.joined_to_next)
+        length = pieces.end[piece] - pieces.begin[piece]
+        small = self._small(role, least, pieces.line[piece], pieces.end[piece], length)
+        return [(int(piece[k]), number) for number, k in np.argwhere(small).tolist()]
+
+    def _small(self, role: str, least: float, line: Ints, s: Floats, length: Floats) -> Flags:
+        """Which margins of a role are zero at ends of pieces of some length, shape (causes, n)."""
+        own = np.array([cause.role == role for cause in self._curve.margins.causes], dtype=bool)
+        if not own.any() or not len(line):
+            return np.zeros((len(own), len(line)), dtype=bool)
+        # At the place itself rounding may end the motion before later margins are known.
+        sides = np.concatenate([s + step * length for step in (-BESIDE, 0.0, BESIDE)])
+        smallest = np.fmin.reduce(
+            np.abs(self._curve.margins_at(np.tile(line, 3), sides)).reshape(len(own), 3, -1), axis=1
+        )
+        with np.errstate(invalid="ignore"):
+            return np.asarray(own[:, None] & (smallest <= least * self._sizes[:, line]))
+
+    def _causes(self, line: Ints, outside: Floats) -> list[Cause]:
+        """What ends motions right before some places: the margin that is farthest below zero there."""
+        if not len(line):
+            return []
+        values = self._curve.margins_at(line, outside) / self._sizes[:, line]
+        across = np.array([cause.role == "across" for cause in self._curve.margins.causes], dtype=bool)
+        values = np.where(np.isnan(values) | across[:, None], np.inf, values)
+        return [self._curve.margins.causes[k] for k in values.argmin(axis=0).tolist()]
+
+    def _named(self, piece: int, x: int, cause: Cause) -> Cause:
+        """The cause, of a group without a closed form by the group that turns back, or why it does not."""
+        if cause.role != "reached":
+            return cause
+        graph, pieces = self._curve.mechanism.graph, self._curve.pieces.take(np.array([piece]))
+        place = pieces.end[0] if x > 0 else pieces.begin[0]
+        inside = pieces.places(np.array([x * 0.9]))[0]
+        fold = self._curve.turning_point(int(pieces.line[0]), float(inside), 2 * abs(float(place - inside)))
+        if fold is not None:
+            group = self._curve.plan.structure.groups[fold[2]]
+            return replace(cause, joint=" ".join(graph.joined(group.edges)), group=fold[2])
+        pose = self._curve.solve(pieces.line, np.array([inside]))[1]
+        for slide in self._curve.margins.legs:
+            leg = graph.slides[slide]
+            if abs(float(np.ravel(pose.slides[slide])[0])) <= ZERO_LEG * self._curve.mechanism.size:
+                return Cause(ZERO_LENGTH, leg, leg, -1, "leg")
+        return replace(cause, kind=Reason.OTHER_ASSEMBLY.text)

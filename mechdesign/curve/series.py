@@ -1,0 +1,159 @@
+"""Functions along motions as Chebyshev series on pieces, which are halved until these are exact.
+
+One that has poles, such as a drive's effort at a singularity, is followed as the quotient of two that have none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from mechdesign.curve.motion import AT_ONCE, BUDGET, Curve
+from mechdesign.curve.pieces import MOST_HALVINGS, Pieces, largest
+from mechdesign.numerics import chebyshev
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+
+# Series that leave less than this part of a function's size are exact; near a singularity, where fewer digits are
+# known, as many times more as one is to the conditioning.
+EXACT = 2e-15
+# Means are known to this part of a function's size.
+MEAN_ERROR = 1e-10
+# Nodes of a piece at which a quotient may have no value.
+MOST_LOST = 4
+
+# Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
+Evaluate = Callable[[Ints, Floats], tuple[Floats, Floats]]
+
+
+class Series:
+    """Functions along the motions of a curve, as series.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The functions that `evaluate` gives, in its order.
+    sizes : sequence of float
+        What rounding of each is judged by, at least.
+    divisors : mapping of str to sequence of (str, int)
+        Of functions with poles: others, whose zeros these are, and of which order.
+    extremes, means, zeros : sequence of str
+        Functions of which these are wanted; the others are evaluated only.
+    ends : mapping of str to int
+        Of functions of which one extreme is wanted: 1 for the largest value, -1 for the smallest, 0 for both.
+    """
+
+    def __init__(
+        self, curve: Curve, names: Sequence[str], evaluate: Evaluate, sizes: Sequence[float],
+        divisors: Mapping[str, Sequence[tuple[str, int]]] | None = None, *,
+        extremes: Sequence[str] = (), means: Sequence[str] = (), zeros: Sequence[str] = (),
+        ends: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:  # fmt: skip
+        self.curve, self.names, self._evaluate = curve, {name: k for k, name in enumerate(names)}, evaluate
+        self._sizes = np.array(sizes, dtype=float)
+        self._divisors = {
+            self.names[name]: [(self.names[by], power) for by, power in by_what]
+            for name, by_what in (divisors or {}).items()
+        }
+        self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
+        self._means, self._zeros = (
+            np.array([name in wanted for name in names], dtype=bool) for wanted in (means, zeros)
+        )
+        # Whether the largest, and the smallest, values are wanted.
+        self._extremes = np.array(
+            [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
+        )
+        self.unresolved = np.zeros(curve.lines, dtype=bool)
+        self._follow()
+
+    def at(self, line: Ints, s: Floats) -> Floats:
+        """Values of all functions at places of lines, shape (functions, n)."""
+        return self._values(line, s)[0]
+
+    def _values(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        parts = [self._evaluate(line[k : k + AT_ONCE], s[k : k + AT_ONCE]) for k in range(0, max(len(s), 1), AT_ONCE)]
+        return np.concatenate([part[0] for part in parts], axis=1), np.concatenate([part[1] for part in parts])
+
+    def _sampled(self, pieces: Pieces) -> tuple[Floats, Floats, Floats]:
+        """At the nodes of pieces: functions (those with poles times their divisors), divisors, and exactness.
+
+        Of shapes (functions, pieces, nodes), twice, and (pieces,).
+        """
+        s = pieces.nodes
+        values, conditioning = self._values(np.repeat(pieces.line, s.shape[1]), s.ravel())
+        values = values.reshape(len(self.names), *s.shape)
+        divisors = np.ones_like(values)
+        for k, by_what in self._divisors.items():
+            for by, power in by_what:
+                divisors[k] *= values[by] ** power
+        with np.errstate(invalid="ignore", over="ignore"):
+            products = np.where(self._poled[:, None, None], values * divisors, values)
+        # At a pole itself a quotient has no value: its product goes on through the other nodes.
+        lost = ~np.isfinite(products) & self._poled[:, None, None]
+        number = np.count_nonzero(lost, axis=2)
+        for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
+            products[k, piece] = chebyshev.filled(products[k, piece], ~lost[k, piece])
+        least = np.where(np.isfinite(conditioning), conditioning, 1.0).reshape(s.shape).min(axis=1, initial=1.0)
+        return products, divisors, EXACT / np.clip(least, 1e-6, 1.0)
+
+    def _follow(self) -> None:
+        """Halve pieces until every function is known where it matters."""
+        lines, spent = self.curve.lines, np.zeros(self.curve.lines)
+        pieces = pending = self.curve.pieces
+        values, divisors, exact = self._sampled(pieces)
+        done: list[tuple[Pieces, Floats, Floats, Floats, Flags]] = []
+        self._scale = np.zeros((len(self.names), lines))
+        self._divisor_scale = np.zeros((len(self.names), lines))
+        best = np.full((2, len(self.names), lines), -np.inf)
+        span = max(float(self.curve.poses.end), 1.0)
+        while len(pending.line):
+            spent += chebyshev.COUNT * np.bincount(pending.line, minlength=lines)
+            finite = np.isfinite(values)
+            largest(self._scale, pending.line, np.where(finite, np.abs(values), 0.0).max(axis=2))
+            largest(self._divisor_scale, pending.line, np.abs(np.nan_to_num(divisors)).max(axis=2))
+            known = np.where(finite & ~self._poled[:, None, None], values, np.nan)
+            missing = np.isnan(known)
+            ends = [np.where(missing, -np.inf, sign * known).max(axis=2) for sign in (1.0, -1.0)]
+            for end, top in zip(ends, best, strict=True):
+                largest(top, pending.line, end)
+            scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
+            rest = chebyshev.remainder(chebyshev.series(values))
+            rough = ~(rest <= exact * scale) & finite.any(axis=2)
+            with np.errstate(invalid="ignore"):
+                steps = np.abs(np.diff(known, axis=2))
+                steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
+                above = [
+                    wanted[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
+                    for end, top, wanted in zip(ends, best, self._extremes, strict=True)
+                ]
+            mean = np.zeros_like(rough)
+            if self._means.any():
+                left = chebyshev.remainder(chebyshev.series(values[self._means] * pending.stretch))
+                mean[self._means] = left > MEAN_ERROR * span * scale[self._means]
+            crossed = np.where(finite, np.abs(values), np.inf).min(axis=2) <= steps
+            matters = (
+                (self._extremes.any(axis=0) & self._poled)[:, None]
+                | above[0]
+                | above[1]
+                | mean
+                | (self._zeros[:, None] & (self._poled[:, None] | crossed))
+            )
+            halve = (rough & matters).any(axis=0) & (pending.depth < MOST_HALVINGS)
+            self.unresolved |= np.bincount(pending.line[halve], minlength=lines).astype(bool) & (spent > BUDGET)
+            halve &= spent[pending.line] <= BUDGET
+            done.append((pending.take(~halve), values[:, ~halve], divisors[:, ~halve], exact[~halve], rough[:, ~halve]))
+            pending = pending.take(halve).halves()
+            if len(pending.line):
+                values, divisors, exact = self._sampled(pending)
+        parts = list(zip(*done, strict=True)) if done else None
+        if parts is None:
+            self.pieces = pieces
+            self._table = self._divisor = values
+            self._rough = np.zeros(values.shape[:2], dtype=bool)
+            return
+        joined = Pieces.joined(parts[0])
+        order = np.lexsort((joined.begin, joined.line))
+        self.pieces = joined.take(order)
+        self._table, self._divisor = (np.concatenate(part, axis=1)[:, order] for part in parts[1:3])
+        self._rough = np.concatenate(parts[4], axis=1)[:, order]

@@ -1,0 +1,170 @@
+"""What came of some cases, kept as numbers: texts that stand for all of them are of the first or the worst."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.analyses.together import Group
+from mechdesign.errors import explain
+from mechdesign.experiments.wanted import Wanted, judged
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.report import requirements
+from mechdesign.report.requirements import Verdict, command_of
+from mechdesign.results import Result
+from mechdesign.rows import UnknownColumnError
+from mechdesign.study import Study
+from mechdesign.study.designs import Designs
+from mechdesign.study.schema.optimize import Requirement
+
+# Exit code of a case that the mechanism, or what the case says of it, makes impossible.
+IMPOSSIBLE = 3
+
+
+@dataclass
+class Worst:
+    """The worst verdict on a requirement over cases, and how many of them do not meet it."""
+
+    case: int
+    verdict: Verdict
+    unmet: int = 0
+    first: int = 0  #: of those that do not meet it
+
+
+@dataclass(frozen=True, eq=False)
+class Answered:
+    """What came of some cases, in their order.
+
+    Parameters
+    ----------
+    table : ndarray, shape (cases, 3 + results + 2 * requirements)
+        Exit code (0 done; 1 a requirement is not met; 3 it is impossible; 4 a numerical failure), number of warnings,
+        number of the reason; what was wanted, nan where there is none; of each requirement the worst value, and 1
+        where it is met.
+    reasons : tuple of str
+        Why cases, or parts of them, could not be answered; empty where they were.
+    units : tuple of str
+        Of what was wanted and of each requirement; empty where none was found.
+    warned : tuple, optional
+        The first case with warnings, the first of these, and how many it has.
+    worst : tuple of Worst
+        Of each requirement.
+    """
+
+    table: Floats
+    reasons: tuple[str, ...]
+    units: tuple[str, ...]
+    warned: tuple[int, str, int] | None
+    worst: tuple[Worst, ...]
+
+
+class Sheet:
+    """What is found of some cases, command by command."""
+
+    def __init__(self, study: Study, wanted: Sequence[Wanted], count: int) -> None:
+        self._required, self._wanted, self._mobility = study.requirements, wanted, study.mechanism.mobility
+        self._numbers = np.full((count, len(wanted)), np.nan)
+        self._worst, self._margins = np.full((2, count, len(self._required)), np.nan)
+        self._met = np.zeros((count, len(self._required)), dtype=bool)
+        self._units = [""] * (len(wanted) + len(self._required))
+        self._reasons: list[dict[str, int]] = [{} for _ in range(count)]
+        self._warnings = np.zeros(count, dtype=np.intp)
+        self._first: dict[int, str] = {}
+        # Of each requirement the row of the worst case so far, and the verdict on it.
+        self._verdicts: dict[int, tuple[int, Verdict]] = {}
+
+    def failed(self, row: int, command: str, error: Exception) -> None:
+        """Note why a command has no answer, or a case no study."""
+        code, message = explain(error)
+        why = "; ".join(message.splitlines())
+        self._reasons[row][f"{command}: {why}" if command else why] = max(code, IMPOSSIBLE)
+
+    def note(self, rows: Ints, designs: Designs, group: Group) -> None:
+        """Take up the answers of a group of designs, which are the cases of some rows."""
+        command = group.result.command
+        for row, end in zip(rows.tolist(), group.ends, strict=True):
+            if end.error is not None:
+                self.failed(row, command, end.error)
+            if end.failed:
+                self._reasons[row][f"{command}: {end.failed}"] = IMPOSSIBLE
+            if end.warnings:
+                self._warnings[row] += len(end.warnings)
+                self._first.setdefault(row, f"{command}: {end.warnings[0]}")
+        self._read(rows, designs, group)
+
+    def _read(self, rows: Ints, designs: Designs, group: Group) -> None:
+        """Read numbers and verdicts of a group; where designs cannot be read at once, of each alone."""
+        command, good = group.result.command, np.array([end.error is None for end in group.ends])
+        try:
+            for k, each in enumerate(self._wanted if good.any() else ()):
+                if each.command == command:
+                    values, unit = each.find(group)
+                    self._numbers[rows[good], k] = values[good]
+                    self._units[k] = unit
+            for k, requirement in enumerate(self._required):
+                if command_of(requirement) == command:
+                    self._judge(k, requirement, rows, designs, group)
+        except UnknownColumnError as error:
+            if len(rows) == 1:
+                self._reasons[rows[0]][f"{command}: {error}"] = IMPOSSIBLE
+                return
+            for k in range(len(rows)):
+                answer = group.of(k)
+                alone = Group.alone(answer) if isinstance(answer, Result) else Group.failed(command, answer)
+                self._read(rows[k : k + 1], designs.take(group.rows[k : k + 1]), alone)
+
+    def _judge(self, k: int, requirement: Requirement, rows: Ints, designs: Designs, group: Group) -> None:
+        """Judge designs by a requirement."""
+        good = np.array([end.error is None for end in group.ends])
+        if good.any():
+            follows = any(getattr(each, "expression", None) for each in (requirement.at_least, requirement.at_most))
+            own = group.rows.tolist() if follows else group.rows[:1].tolist()
+            found = judged(group, [designs.required(row)[k] for row in own])
+            self._units[len(self._wanted) + k] = found.unit
+            for column, values in ((self._worst, found.worst), (self._margins, found.margin), (self._met, found.met)):
+                column[rows[good], k] = values[good]
+        margins = _ordered(self._margins[:, k])
+        least = int(margins[rows].argmin())
+        row, so_far = int(rows[least]), self._verdicts.get(k)
+        if so_far is not None and (margins[so_far[0]], so_far[0]) <= (margins[row], row):
+            return
+        answer, required = group.of(least), designs.required(int(group.rows[least]))[k]
+        verdict = _unanswered(required)
+        if isinstance(answer, Result):
+            verdict = requirements.judge(answer, required, self._mobility)
+        self._verdicts[k] = row, verdict
+
+    def answered(self) -> Answered:
+        """All that was found."""
+        codes = np.array([max(each.values(), default=0) for each in self._reasons], dtype=float)
+        codes = np.maximum(codes, ~self._met.all(axis=1))
+        reasons: dict[str, int] = {"": 0}
+        number = [reasons.setdefault("; ".join(each), len(reasons)) for each in self._reasons]
+        judged = np.stack([self._worst, self._met], axis=2).reshape(len(codes), -1)
+        table = np.column_stack([codes, self._warnings, number, self._numbers, judged])
+        warned = min(self._first, default=None)
+        return Answered(
+            table, tuple(reasons), tuple(self._units),
+            None if warned is None else (warned, self._first[warned], int(self._warnings[warned])),
+            tuple(self._worst_of(k) for k in range(len(self._required))),
+        )  # fmt: skip
+
+    def _worst_of(self, k: int) -> Worst:
+        row = int(_ordered(self._margins[:, k]).argmin())
+        known, verdict = self._verdicts.get(k, (-1, None))
+        unmet = np.flatnonzero(~self._met[:, k])
+        first = int(unmet[0]) if len(unmet) else 0
+        told = verdict if verdict is not None and known == row else _unanswered(self._required[k])
+        return Worst(row, told, len(unmet), first)
+
+
+def _unanswered(requirement: Requirement) -> Verdict:
+    """The verdict on a case that has no answer."""
+    return Verdict(requirements.in_words(requirement), met=False, worst=float("nan"))
+
+
+def _ordered(margins: Floats) -> Floats:
+    """Margins of which one that is not known is the least."""
+    return np.where(np.isnan(margins), -np.inf, margins)

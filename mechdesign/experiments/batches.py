@@ -1,0 +1,45 @@
+"""Answers of a command for many designs of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from mechdesign.analyses.kinematics import analysis as kinematics
+from mechdesign.analyses.look import ask
+from mechdesign.analyses.optimize.stacked import grouped, shared
+from mechdesign.analyses.stiffness import analysis as stiffness
+from mechdesign.analyses.together import Answers, Group
+from mechdesign.errors import MechdesignError
+from mechdesign.study import Study
+from mechdesign.study.designs import Designs
+from mechdesign.study.poses import Poses
+
+# Commands whose answers are found for many designs at once.
+TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {
+    "kinematics": kinematics.answers, "stiffness": stiffness.answers
+}  # fmt: skip
+
+
+def answers(designs: Designs, command: str) -> Answers:
+    """A command's answer for each design, or why it has none."""
+    found: list[Group] = []
+    if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
+        # What is wrong with some of them is found alone.
+        for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
+            with suppress(MechdesignError):
+                groups = TOGETHER[command](study, poses).groups
+                found += [replace(group, rows=rows[group.rows]) for group in groups]
+    left = set(range(designs.count)).difference(*(group.rows.tolist() for group in found))
+    return Answers([*found, *(_alone(designs, k, command) for k in sorted(left))])
+
+
+def _alone(designs: Designs, k: int, command: str) -> Group:
+    try:
+        group = Group.alone(ask(designs.one(k), command))
+    except Exception as error:
+        group = Group.failed(command, error)
+    return replace(group, rows=np.array([k]))

@@ -1,0 +1,109 @@
+"""Cases that differ in numbers alone, as designs of one study: a parameter stands in place of each number."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.study import Study
+from mechdesign.study.designs import Designs
+from mechdesign.study.schema.study_file import entry
+from mechdesign.study.text.document import KeyPath, has
+from mechdesign.study.text.units import QUANTITY, QuantityError
+from mechdesign.study.variants import Changes, with_entries
+
+# Forms of cases that are kept.
+_MOST_FORMS = 64
+_FORMS: dict[bytes, Form | None] = {}
+
+
+def form_of(changes: Changes) -> str:
+    """What cases that differ in numbers alone have in common."""
+    return json.dumps([[name, None if is_number(value) else value] for name, value in changes])
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """A study with a parameter in place of each number that cases of it have of their own."""
+
+    study: Study
+    parameters: Mapping[str, str]  # by the entry
+
+    def designs(self, cases: Sequence[Changes]) -> Designs | None:
+        """Cases as designs of the study; None where a quantity has another unit than its entry."""
+        columns = zip(*([value for _, value in changes] for changes in cases), strict=True)
+        by_name = dict(zip((name for name, _ in cases[0]), columns, strict=True))
+        try:
+            return Designs(self.study, {
+                own: np.array([_number(self.study, value) for value in by_name[name]])
+                for name, own in self.parameters.items()
+            })  # fmt: skip
+        except QuantityError:
+            return None
+
+
+def compiled(study: Study, changes: Changes, first: Changes) -> Form | None:
+    """The form of cases that have words and numbers as `changes`; None where a number decides how it is put together.
+
+    Numbers of the form are the study's own, or where it has none there those of the `first` case of all.
+    """
+    key = hashlib.sha256(json.dumps([study.resolved, form_of(changes), first, study.seed]).encode()).digest()
+    if key not in _FORMS:
+        while len(_FORMS) >= _MOST_FORMS:
+            _FORMS.pop(next(iter(_FORMS)))
+        _FORMS[key] = _compiled(study, changes, dict(first))
+    return _FORMS[key]
+
+
+def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form | None:
+    known, own, added = set(study.parameters.nominal), dict[str, str](), dict[str, Any]()
+    written: list[tuple[str, Any]] = []
+    for number, (name, value) in enumerate(changes):
+        if not is_number(value):
+            written.append((name, value))
+            continue
+        try:
+            keys = entry(study.resolved, name)
+        except StudyError:
+            return None
+        if keys[:2] == ("mechanism", "sketch"):
+            return None
+        if keys[:2] == ("mechanism", "parameters"):
+            own[name] = str(keys[2])
+            continue
+        parameter = f"entry_{number}"
+        while parameter in known:
+            parameter += "_"
+        own[name] = parameter
+        raw = _raw(study, keys)
+        added[parameter] = first[name] if raw is None else raw
+        written.append((name, parameter))
+    try:
+        form = Form(with_entries(study, written, added), own)
+    except MechdesignError:
+        return None
+    moved = Designs(form.study, dict.fromkeys(own.values(), np.zeros(1)))
+    return form if own and moved.alike else None
+
+
+def _raw(study: Study, keys: KeyPath) -> Any:
+    """What stands at a path of the data; None where nothing does."""
+    data: Any = study.resolved
+    for key in keys:
+        data = data[key] if has(data, key) else None
+    return data
+
+
+def is_number(value: Any) -> bool:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number or (isinstance(value, str) and QUANTITY.fullmatch(value) is not None)
+
+
+def _number(study: Study, value: Any) -> float:
+    return study.units.convert(value) if isinstance(value, str) else float(value)

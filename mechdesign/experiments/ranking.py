@@ -1,0 +1,96 @@
+"""Which cases are best: their order by the chosen results, and the Pareto front of these."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.analyses.together import Group
+from mechdesign.experiments.wanted import Numbers, Wanted
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.numerics.fronts import front
+from mechdesign.report.cases import FRONT, RANK
+from mechdesign.results import Column
+from mechdesign.study.schema.matrix import Best
+from mechdesign.terms import path_of, terms_of
+
+# Numbers of a result that are the same to this part of the largest are equal: as many digits as tables have.
+_RESOLUTION = 1e-12
+
+
+@dataclass(frozen=True)
+class Goal(Wanted):
+    """A number of a case that is to be large or small; of a motion of which a part is missing there is none."""
+
+    def find(self, group: Group) -> Numbers:
+        """The number of each design; see `Wanted.find`."""
+        numbers = super().find(group)
+        terms = terms_of(group.result, path_of(self.name), dict(self.where))
+        scoped = any(part.table.scope for part in terms.parts)
+        return numbers._replace(values=np.where(scoped & group.missing, np.nan, numbers.values))
+
+
+def goals_of(best: Best | None) -> dict[Goal, int]:
+    """What is to be large, with the sign -1, or small, with the sign 1."""
+    chosen = [] if best is None else [("maximize", -1, best.maximize), ("minimize", 1, best.minimize)]
+    return {
+        Goal(each.result, tuple(each.where.items()), ("matrix", "best", key, k)): sign
+        for key, sign, results in chosen
+        for k, each in enumerate(results)
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Ranking:
+    """The order of cases; arrays are of shape (cases,).
+
+    Parameters
+    ----------
+    rank : ndarray of float
+        1 is the best; cases that are equally good have the same, and as many numbers are left out behind them. nan of
+        cases that have no rank.
+    front : ndarray of bool
+        Cases that no other with a rank surpasses: none is as good in every goal and better in one.
+    """
+
+    rank: Floats
+    front: Flags
+
+    @classmethod
+    def of(cls, goals: Mapping[str, int], columns: Mapping[str, Floats], admitted: Flags) -> Ranking:
+        """Rank the cases that are admitted and have a number for each goal.
+
+        One goal ranks by itself, several by the sum of what part of each goal's range over these cases lies between a
+        case and the best one: the order of equal weights of an optimisation [S1, eqs. 27, 28].
+
+        Parameters
+        ----------
+        goals : dict of str to int
+            Results with 1 where they are to be small, -1 where they are to be large.
+        columns : dict of str to ndarray
+            Values of each case; nan where there is none.
+        admitted : ndarray of bool
+        """
+        values = np.stack([columns[name] for name in goals], axis=1)
+        rows = np.flatnonzero(admitted & np.isfinite(values).all(axis=1))
+        rank, on_front = np.full(len(admitted), np.nan), np.zeros(len(admitted), dtype=bool)
+        if len(rows):
+            steps = _steps(values[rows] * [*goals.values()])
+            spans = np.ptp(steps, axis=0)
+            shortfall = ((steps - steps.min(axis=0)) / np.where(spans > 0, spans, 1.0)).sum(axis=1)
+            rank[rows] = 1 + np.searchsorted(np.sort(shortfall), shortfall)
+            on_front[rows] = front(steps)
+        return cls(rank, on_front)
+
+    def columns(self) -> Iterator[Column]:
+        """The rank of each case, and whether it is on the front."""
+        yield Column(RANK, self.rank, "", "1 the best of the cases that meet every requirement; nan of others")
+        yield Column(FRONT, self.front, "", "1 where none of these cases is as good in every goal and better in one")
+
+
+def _steps(values: Floats) -> Floats:
+    """Values, shape (cases, goals), as whole numbers of the smallest differences that count."""
+    size = np.abs(values).max(axis=0)
+    return np.asarray(np.rint(values / (_RESOLUTION * np.where(size > 0, size, 1.0))))

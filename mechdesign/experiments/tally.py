@@ -1,0 +1,148 @@
+"""What becomes of many cases, kept as numbers: cases by the million are counted, not held."""
+
+from __future__ import annotations
+
+import json
+import time
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Worst
+from mechdesign.experiments.cases import Case
+from mechdesign.journal import Journal, digest
+from mechdesign.numerics.arrays import Floats
+from mechdesign.report.cases import changes_in_words
+from mechdesign.report.requirements import Verdict, over_cases
+
+# Cases after which, and seconds, a journal gets those that are finished.
+_BLOCK, _SECONDS = 1024, 5.0
+
+
+class Tally:
+    """What came of the first cases of a design; the texts that stand for all of them are of the first or the worst.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+        All of them.
+    results, requirements : int
+        Numbers that are wanted of each, and verdicts on it.
+    """
+
+    def __init__(self, cases: Sequence[Case], results: int, requirements: int) -> None:
+        self.cases = cases
+        self._results, self._requirements = results, requirements
+        self.width = 3 + results + 2 * requirements
+        self._rows = array("d")
+        self.reasons: dict[str, int] = {"": 0}
+        self._units = [""] * (results + requirements)
+        self.worst: list[Worst] = []
+        self.warned: tuple[int, str, int] | None = None  # the first case with warnings, the first of these, how many
+        self._sizes: list[int] = []  # of the blocks that the journal has
+        self._noted = time.monotonic()
+
+    def __len__(self) -> int:
+        return len(self._rows) // self.width
+
+    def add(self, answered: Answered) -> None:
+        """Take up the next cases."""
+        begin, table = len(self), answered.table.copy()
+        numbers = [self.reasons.setdefault(reason, len(self.reasons)) for reason in answered.reasons]
+        table[:, 2] = np.array(numbers)[table[:, 2].astype(np.intp)]
+        self._rows.frombytes(table.tobytes())
+        self._units = [known or unit for known, unit in zip(self._units, answered.units, strict=True)]
+        if self.warned is None and answered.warned is not None:
+            row, warning, number = answered.warned
+            self.warned = begin + row, warning, number
+        new = [replace(each, case=begin + each.case, first=begin + each.first) for each in answered.worst]
+        for worst, each in zip(self.worst, new, strict=bool(self.worst)):
+            if _margin(each.verdict) < _margin(worst.verdict):
+                worst.case, worst.verdict = each.case, each.verdict
+            worst.first = worst.first if worst.unmet else each.first
+            worst.unmet += each.unmet
+        self.worst = self.worst or new
+
+    @property
+    def table(self) -> Floats:
+        """Exit code, warnings, number of the reason, results, and of each requirement the worst value and whether it is
+        met; shape (cases, columns).
+        """
+        return np.frombuffer(self._rows, dtype=float).reshape(-1, self.width)
+
+    def result(self, k: int) -> tuple[Floats, str]:
+        """A wanted number of each case, and its unit."""
+        return self.table[:, 3 + k], self._units[k]
+
+    def required(self, k: int) -> tuple[Floats, Floats, str]:
+        """The worst value of each case that a requirement judges, 1 where it is met, and the unit of the value."""
+        at = 3 + self._results + 2 * k
+        return self.table[:, at], self.table[:, at + 1], self._units[self._results + k]
+
+    @property
+    def failed(self) -> list[int]:
+        """Cases that have no answer."""
+        return np.flatnonzero(self.table[:, 0] >= IMPOSSIBLE).tolist()
+
+    def reason(self, k: int) -> str:
+        """Why a case failed."""
+        return [*self.reasons][int(self.table[k, 2])]
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """The worst verdict on each requirement over the cases, and how many do not meet it."""
+        return tuple(
+            over_cases(each.verdict, self.named(each.case), each.unmet, len(self), each.first) for each in self.worst
+        )
+
+    def named(self, k: int) -> str:
+        """A case in words: its number, from 1, and its values."""
+        return f"case {k + 1} ({changes_in_words(self.cases[k].changes)})"
+
+    def note(self, journal: Journal, *, last: bool = False) -> None:
+        """Let a journal have the cases that it has not, if they are many or it is time, or they are the last."""
+        begin = sum(self._sizes)
+        few = len(self) - begin < _BLOCK and time.monotonic() - self._noted < _SECONDS
+        if begin == len(self) or (few and not last):
+            return
+        self._sizes.append(len(self) - begin)
+        journal.add(self._key(begin, len(self)), self.table[begin:].copy(), [json.dumps(self._state())])
+        self._noted = time.monotonic()
+
+    def recall(self, journal: Journal) -> None:
+        """Take up what a journal has of these cases."""
+        state = json.loads(journal.words[0]) if journal.words else {"sizes": []}
+        blocks: dict[bytes, Floats] = {}
+        begin = 0
+        for size in state["sizes"]:
+            key = self._key(begin, begin + size)
+            block = journal.recall(key)
+            if block is None:
+                return
+            blocks[key] = block
+            begin += size
+        if not blocks:
+            return
+        for key, block in blocks.items():
+            self._rows.extend(block.ravel().tolist())
+            self._sizes.append(len(block))
+            journal.add(key, block, journal.words)
+        self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
+        self._units, self.warned = state["units"], tuple(state["warned"]) if state["warned"] else None
+        self.worst = [Worst(**each | {"verdict": Verdict(**each["verdict"])}) for each in state["worst"]]
+
+    def _state(self) -> Mapping[str, Any]:
+        return {
+            "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units, "warned": self.warned,
+            "worst": [asdict(each) for each in self.worst],
+        }  # fmt: skip
+
+    def _key(self, begin: int, end: int) -> bytes:
+        return digest([np.array([begin, end], dtype=float)])
+
+
+def _margin(verdict: Verdict) -> float:
+    return -np.inf if np.isnan(verdict.margin) else verdict.margin

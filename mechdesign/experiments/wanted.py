@@ -1,0 +1,126 @@
+"""Numbers of cases by the names of results, and how far they are from what is required: of many cases at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mechdesign.analyses.optimize.goals import bounds_of
+from mechdesign.analyses.together import Group
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.rows import Chosen, UnknownColumnError
+from mechdesign.study.schema.matrix import Named
+from mechdesign.study.schema.optimize import Requirement
+from mechdesign.study.text.document import KeyPath
+from mechdesign.terms import Sum, path_of, terms_of
+from mechdesign.terms import command_of as command_named
+
+
+class Numbers(NamedTuple):
+    """A number of each case, shape (cases,), and its unit."""
+
+    values: Floats
+    unit: str
+
+
+class Judged(NamedTuple):
+    """The worst value of each case, its margin to the nearer limit, and whether it is met; each of shape (cases,)."""
+
+    worst: Floats
+    margin: Floats
+    met: Flags
+    unit: str
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A number of a case by the name of a result.
+
+    Parameters
+    ----------
+    name : str
+        ``COMMAND.COLUMN``, ``COMMAND.TABLE.COLUMN`` or ``COMMAND.TABLE.ROW.COLUMN`` as requirements have it, or a
+        number of the workspace alone (``GII``); of several rows followed by one of `mechdesign.statistics.STATISTICS`;
+        or a sum of such numbers.
+    where : tuple of (str, value)
+        Only rows whose columns have these values count.
+    keys : tuple
+        Where the study names it.
+    """
+
+    name: str
+    where: tuple[tuple[str, Any], ...] = ()
+    keys: KeyPath = ()
+
+    @property
+    def title(self) -> str:
+        """The name, and in parentheses which rows count."""
+        where = ", ".join(f"{column} {value}" for column, value in self.where)
+        return f"{self.name} ({where})" if where else self.name
+
+    @property
+    def command(self) -> str:
+        """The command whose result it is of."""
+        return command_named(self.name) or "workspace"
+
+    def find(self, group: Group) -> Numbers:
+        """The number of each design, shape (designs,); nan where a row that counts has none.
+
+        Raises
+        ------
+        UnknownColumnError
+            If there is no such column or row, or several rows count and no statistic is named; also where designs have
+            not as many rows each, and have to be asked one by one.
+        """
+        terms = _terms(group, path_of(self.name), dict(self.where))
+        return Numbers(terms.numbers(len(group.ends)), terms.unit)
+
+
+def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:
+    """What a section of the study names as its results."""
+    return [
+        Wanted(each.result, tuple(each.where.items()), (section, "results", k)) for k, each in enumerate(results)
+    ]  # fmt: skip
+
+
+def judged(group: Group, required: Sequence[Requirement]) -> Judged:
+    """The worst value of each design that a requirement judges, as `mechdesign.report.requirements.judge` finds it.
+
+    Parameters
+    ----------
+    required : sequence of Requirement
+        That of each design where its limits follow what changes; else a single one for all.
+
+    Raises
+    ------
+    UnknownColumnError
+        See `Wanted.find`.
+    """
+    (one, *_), found = required, []
+    limits = zip(*(bounds_of(each) for each in required), strict=True)
+    for own in limits:
+        goal = own[0]
+        terms = _terms(group, goal.column, dict(goal.where))
+        values = goal.judge(group.result, len(group.ends)).values
+        beyond = values - np.array([terms.bound(each.bound) for each in own])
+        found.append((values, -beyond if goal.smallest else beyond))
+    values, margins = (np.stack(part) for part in zip(*found, strict=True))
+    nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
+    worst, margin = (np.take_along_axis(part, nearer, axis=0)[0] for part in (values, margins))
+    partly = group.missing if any(part.table.scope for part in terms.parts) and one.unassembled is None else False
+    return Judged(worst, margin, (margin >= 0) & ~np.asarray(partly), terms.unit)
+
+
+def _terms(group: Group, path: str, where: dict[str, Any]) -> Chosen | Sum:
+    """What a path names, of which each design has as many rows and at least one that counts."""
+    terms, designs = terms_of(group.result, path, where), len(group.ends)
+    if designs == 1 and terms.missing:
+        raise UnknownColumnError(terms.missing)
+    for part in terms.parts if designs > 1 else ():
+        even = part.table.name not in group.uneven
+        if not even or not (part.part or part.counts.reshape(designs, -1).any(axis=1).all()):
+            raise UnknownColumnError(f"designs have not as many rows of {part.table.name} each")
+    return terms

@@ -1,0 +1,23 @@
+"""Pictures of the cases of a matrix: what each entry does to each result, every two against another, and as maps."""
+
+from __future__ import annotations
+
+from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.sweep.effects import main_effects, scatter
+from mechdesign.report.figures.sweep.maps import response
+from mechdesign.report.figures.sweep.quantities import Axis
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+
+def figures(study: Study, result: Result) -> Gallery:
+    """``main_effects`` and ``scatter``; of two numbers that vary or more ``response``."""
+    table, found = result.main, Gallery()
+    entries = [Axis.of(table.column(name)) for name in result.drawn["entries"]]
+    entries = [each for each in entries if len(each.distinct) > 1]
+    results = [Axis.of(table.column(name), *limits, varied=False) for name, limits in result.drawn["results"].items()]
+    if entries and results:
+        found.add("main_effects", main_effects, entries, results, len(table))
+        found.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
+        found.add("response", response, entries, results, table, result.drawn["goals"])
+    return found

@@ -1,0 +1,206 @@
+"""What the pictures of a sweep show of its cases: entries that vary, and results with what is required of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+
+from mechdesign.errors import counted, cut
+from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
+from mechdesign.report.cases import FRONT, RANK, best_of, short
+from mechdesign.report.figures import style
+from mechdesign.results import Column, Table
+from mechdesign.study.text.units import Amount
+
+# More values than that are gathered into classes of as many cases.
+MOST_VALUES = 12
+CLASSES = 8
+MOST_LETTERS = 10  # of a word at an axis
+MOST_LINES = 3  # of a name
+PLURALS = {"entry": "entries", "result": "results"}
+FEW_VALUES = 4  # whose ticks are the values themselves
+NAME, TITLE = 9.0, 10.0  # points
+GAP = 0.1  # inches
+_LETTER = 0.09
+_APART = 0.22  # part of the range between values whose numbers do not touch
+_ROOM_AROUND = 0.08  # part of the range beyond the values
+# Cases that are drawn one by one, at most, and over a map.
+MOST_DRAWN, MOST_OVER_MAP = 5000, 800
+_GOLDEN = 0.5 * (5**0.5 - 1)
+_STAR, _DOT, _SMALL_DOT = 11.0, 4.0, 2.2  # points
+_FEW_DOTS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """An entry that varies or a result: its values over the cases, words as 0, 1, 2, and the limits required of it."""
+
+    name: str
+    unit: str
+    values: Floats
+    words: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    varied: bool = True
+
+    @classmethod
+    def of(cls, column: Column, low: float | None = None, high: float | None = None, *, varied: bool = True) -> Axis:
+        """The axis of a column."""
+        name = short(column.name)
+        if column.numeric:
+            low, high = (None if each is None else Amount.of(each).within(column.unit) for each in (low, high))
+            return cls(name, column.unit, column.values.astype(float), (), low, high, varied)
+        words = tuple(dict.fromkeys(map(str, column.values)))
+        return cls(name, "", np.array([words.index(str(word)) for word in column.values], dtype=float), words)
+
+    @property
+    def limits(self) -> list[float]:
+        """The limits that there are."""
+        return [limit for limit in (self.low, self.high) if limit is not None]
+
+    @cached_property
+    def distinct(self) -> Floats:
+        """The values, each once."""
+        return np.unique(self.values)
+
+    @property
+    def ends(self) -> list[float]:
+        """The smallest and the largest value; empty where there is none."""
+        known = self.distinct[np.isfinite(self.distinct)]
+        return [float(known[0]), float(known[-1])] if len(known) else []
+
+    def label(self, room: float) -> str:
+        """Name and unit in lines of so many inches; a long name is broken after its points, or cut in front."""
+        bar, plain = self.name[: self.name.startswith("|")], self.name.lstrip("|")
+        for name in (self.name, bar + (plain.partition(".")[2] or plain)):
+            text = style.axis_label(name.replace(".", ". "), self.unit)
+            lines = [line.replace(". ", ".") for line in style.folded(text, NAME, room).split("\n")]
+            if len(lines) < MOST_LINES:
+                break
+        return "\n".join(lines[:MOST_LINES])
+
+    def span(self) -> tuple[float, float]:
+        """From the lowest to the highest value or limit, and some room."""
+        known = [*self.ends, *self.limits]
+        low, high = (min(known), max(known)) if known else (0.0, 1.0)
+        room = _ROOM_AROUND * (high - low) or 0.5 * max(abs(low), 1e-12)
+        return (-0.5, len(self.words) - 0.5) if self.words else (low - room, high + room)
+
+    def groups(self) -> list[tuple[float, Flags]]:
+        """Cases of each value, or where there are many of each class of values: its middle, and which they are."""
+        values = self.distinct
+        if len(values) <= MOST_VALUES:
+            return [(float(value), self.values == value) for value in values]
+        order = np.argsort(np.argsort(self.values, kind="stable"), kind="stable")
+        number = order * CLASSES // len(order)
+        return [(float(self.values[number == k].mean()), number == k) for k in range(CLASSES)]
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Cases that are drawn alike: in words, their colour and marker, which they are, how large at least."""
+
+    words: str
+    color: str
+    marker: str
+    cases: Flags
+    least: float = 0.0  # points
+
+    def draw_key(self, axes: Axes) -> None:
+        """Draw what a legend shows."""
+        self.draw(axes, np.zeros(0), np.zeros(0), np.zeros(0, dtype=np.intp), 6.0)
+
+    def draw(self, axes: Axes, x: Floats, y: Floats, drawn: Ints, size: float) -> None:
+        """Draw those of some cases at their values, with markers of a size in points."""
+        rows = drawn[self.cases[drawn]]
+        axes.plot(
+            x[rows], y[rows], self.marker, color=self.color, markersize=max(size, self.least), linestyle="none",
+            markeredgewidth=1.0 if self.least else 0.4, markeredgecolor="white", zorder=3, label=self.words,
+        )  # fmt: skip
+
+
+def kinds_of(table: Table, *, required: bool) -> list[Kind]:
+    """Cases by how they ended, and where they are ranked those on the front and the best, the better ones on top."""
+    codes = table["exit_code"]
+    met = "meets every requirement" if required else "answered"
+    looks = [
+        ("failed", style.FAINT, "s", codes > 1), ("does not meet one", style.VERMILION, "X", codes == 1),
+        (met, style.BLUE, "o", codes == 0),
+    ]  # fmt: skip
+    best = best_of(table)
+    if best is not None and best.front > best.equals:
+        looks.append(("on the Pareto front", style.ORANGE, "D", table[FRONT] == 1))
+    kinds = [
+        Kind(f"{words} ({counted(int(cases.sum()), 'case')})", color, marker, cases)
+        for words, color, marker, cases in looks
+        if cases.any()
+    ]
+    return kinds if best is None else [*kinds, Kind(f"best: {best.words}", style.INK, "*", table[RANK] == 1, _STAR)]
+
+
+def sample(table: Table, most: int) -> tuple[Ints, float]:
+    """Numbers of the cases that are drawn, and the size of their dots in points.
+
+    Where there are more cases than that, a sample with as many of those on the front at most, and with the best. Its
+    numbers are multiples of the golden ratio, so that no period of a grid shows.
+    """
+    count = len(table)
+    if count <= most:
+        return np.arange(count), _DOT if count <= _FEW_DOTS else _SMALL_DOT
+    rows = (np.arange(1, most + 1) * _GOLDEN % 1 * count).astype(np.intp)
+    if RANK in table:
+        on_front = np.flatnonzero(table[FRONT])
+        rows = np.concatenate([rows, on_front[evenly(len(on_front), most)], np.flatnonzero(table[RANK] == 1)[:1]])
+    return np.unique(rows), _SMALL_DOT
+
+
+def draw_limits(axes: Axes, of: Axis, *, upright: bool) -> None:
+    """Dashed lines at the limits of a requirement, and what lies beyond them in grey."""
+    line, span = (axes.axvline, axes.axvspan) if upright else (axes.axhline, axes.axhspan)
+    lowest, highest = of.span()
+    for limit, end in ((of.low, lowest), (of.high, highest)):
+        if limit is not None:
+            line(limit, color=style.INK, linestyle=style.DASHES[1], linewidth=1.0, zorder=1.5)
+            span(min(limit, end), max(limit, end), color=style.FAINT, alpha=0.18, linewidth=0, zorder=0.5)
+
+
+def draw_ticks(axes: Axes, x: Axis, y: Axis, room: float, *, outer_x: bool, outer_y: bool) -> None:
+    """Few ticks, words where there are words, at the outer edges only; `room` is the width of the panel."""
+    for axis, of, outer in ((axes.xaxis, x, outer_x), (axes.yaxis, y, outer_y)):
+        if of.words:
+            letters = MOST_LETTERS if of is y else max(3, int(room / len(of.words) / _LETTER))
+            axis.set_ticks(range(len(of.words)), [cut(word, letters) if outer else "" for word in of.words])
+            continue
+        axis.set_major_locator(MaxNLocator(2 if style.narrow() else 4, steps=[1, 2, 2.5, 5, 10]))
+        values = of.distinct
+        if of.varied and len(values) <= FEW_VALUES and np.diff(values).min() > _APART * np.ptp(values):
+            axis.set_major_locator(FixedLocator(values.tolist()))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value)))
+        axis.set_tick_params(labelbottom=outer, labelleft=outer)
+
+
+def number_text(value: float) -> str:
+    return f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
+
+
+def title(words: str) -> tuple[str, float]:
+    """A title in lines, and the room that it takes (inches)."""
+    folded = style.folded(words, TITLE, style.width() - 0.2)
+    return folded, style.line(TITLE) * (folded.count("\n") + 1) + 2 * GAP
+
+
+def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], what: str) -> str:
+    """How many quantities, each of which is a `what`, have no room."""
+    left = len([each for each in all_of if each not in shown])
+    return f"; {left} more {what if left == 1 else PLURALS[what]} in sweep.csv" if left else ""
+
+
+def without_number(shown: Sequence[Axis], count: int) -> str:
+    """How many cases have not every number."""
+    lost = int(np.isnan([each.values for each in shown]).any(axis=0).sum())
+    return f"; {lost} of {counted(count, 'case')} without a number left out" if lost else ""

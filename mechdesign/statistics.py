@@ -1,0 +1,175 @@
+"""What is told of a quantity in one number, over the rows of a table or along a motion, and the part that counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Floats
+
+# Values of rows so far beyond an end of an interval, as a part of the end (or of a turn), are at it.
+AT_END = 1e-9
+
+
+class Spread(Protocol):
+    """Values of each design; every number is of shape (designs,), nan where there are no values."""
+
+    def end(self, sign: int) -> Floats:
+        """The largest value, or with the sign -1 the smallest."""
+
+    def mean(self, power: int) -> Floats:
+        """Mean of a power of the values."""
+
+    def size(self) -> Floats:
+        """Mean of the absolute values."""
+
+
+class Statistic(NamedTuple):
+    """A number that is told of values.
+
+    Parameters
+    ----------
+    meaning : str
+    of : callable
+        The number of each design.
+    pure : bool
+        Whether it has no unit; else that of the values.
+    integral : bool
+        Whether it has a mean in it.
+    """
+
+    meaning: str
+    of: Callable[[Spread], Floats]
+    pure: bool = False
+    integral: bool = False
+
+
+def _evenness(values: Spread) -> Floats:
+    fluctuation = values.end(1) - values.end(-1)
+    return np.where(np.isinf(fluctuation), -np.inf, 1.0 - fluctuation / values.size())
+
+
+STATISTICS: Mapping[str, Statistic] = {
+    "min": Statistic("smallest value", lambda values: values.end(-1)),
+    "max": Statistic("largest value", lambda values: values.end(1)),
+    "mean": Statistic("mean value", lambda values: values.mean(1), integral=True),
+    "range": Statistic("largest less smallest value", lambda values: values.end(1) - values.end(-1)),
+    "rms": Statistic("root of the mean square", lambda values: np.sqrt(values.mean(2)), integral=True),
+    "peak": Statistic("largest absolute value", lambda values: np.maximum(values.end(1), -values.end(-1))),
+    "evenness": Statistic("1 less the range over the mean absolute value", _evenness, pure=True, integral=True),
+}
+"""What is told of a column, by the word behind its name.
+
+The evenness is 1 less the coefficient of fluctuation, which of a speed is its range over its mean (Norton, Design of
+Machinery; Shigley's Mechanical Engineering Design, both in the chapter on flywheels). Of what changes its sign the mean
+of the absolute values stands below, as the mean may be zero.
+"""
+# Which statistic is the worst value where the largest one is, and where the smallest one is.
+WORST: Mapping[bool, frozenset[str]] = {True: frozenset(("", "max", "peak")), False: frozenset(("", "min"))}
+
+
+@dataclass(frozen=True, eq=False)
+class RowSpread:
+    """Values of the rows of a table that count.
+
+    Parameters
+    ----------
+    values : ndarray, shape (designs, rows)
+    counts : bool array, of the same shape
+    """
+
+    values: Floats
+    counts: Flags
+
+    def end(self, sign: int) -> Floats:
+        """The largest value, or with the sign -1 the smallest; nan where a row has none."""
+        return worst(self.values, self.counts, largest=sign > 0)
+
+    def mean(self, power: int) -> Floats:
+        """Mean of a power of the values."""
+        return self._mean(self.values**power)
+
+    def size(self) -> Floats:
+        """Mean of the absolute values."""
+        return self._mean(np.abs(self.values))
+
+    def _mean(self, values: Floats) -> Floats:
+        number = self.counts.sum(axis=-1)
+        total = np.where(self.counts, values, 0.0).sum(axis=-1)
+        return np.asarray(np.where(number > 0, total / np.maximum(number, 1), np.nan))
+
+
+def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
+    """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
+    none = -np.inf if largest else np.inf
+    inside = np.where(counts, values, none)
+    found = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
+    return np.where(counts.any(axis=-1), found, np.nan)
+
+
+class Interval(NamedTuple):
+    """Values from one to another, in the unit of a column; of an angle whole turns aside, where `turn` is not 0."""
+
+    low: float = -np.inf
+    high: float = np.inf
+    turn: float = 0.0
+
+    def holds(self, values: Floats) -> Flags:
+        """Which values lie in it, but for rounding; nan does not."""
+        if self.turn:
+            slack = AT_END * self.turn
+            return np.asarray((values - self.low + slack) % self.turn <= (self.high - self.low) % self.turn + 2 * slack)
+        low, high = self.low - AT_END * abs(self.low), self.high + AT_END * abs(self.high)
+        return np.asarray((values >= low) & (values <= high))
+
+    def over(self, values: Floats) -> list[Floats]:
+        """Functions of the values that cross zero where they pass an end of it."""
+        ends = [end for end in (self.low, self.high) if np.isfinite(end)]
+        return [np.sin(np.pi * (values - end) / self.turn) if self.turn else values - end for end in ends]
+
+
+# Columns of a motion, and where these lie in a part of it.
+Part = tuple[tuple[str, Interval], ...]
+
+
+class Asked(NamedTuple):
+    """What is asked of a column along a motion: of which part of it, and whether its means are.
+
+    `end` is 1 where its largest value alone is asked, -1 where its smallest is, else 0.
+    """
+
+    column: str
+    part: Part = ()
+    integral: bool = False
+    end: int = 0
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The column, and those that bound the part."""
+        return (self.column, *(name for name, _ in self.part))
+
+
+class Course(Spread, Protocol):
+    """A column along the motion of each design, or a part of it, between the poses as well."""
+
+    @property
+    def followed(self) -> Flags:
+        """Which motions are followed between their poses, shape (designs,)."""
+
+    def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
+        """The largest value times the sign (of absolute values, where these count) and its place in rows.
+
+        The value is that of the function; both are of shape (designs,).
+        """
+
+    def at(self, parts: Floats) -> Floats:
+        """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
+
+    def shown(self, place: float) -> str:
+        """A place of the motion of the first design in words."""
+
+    def of(self, design: int) -> Course | None:
+        """The column along the motion of one of the designs; None where it is not followed."""

@@ -1,0 +1,222 @@
+"""Designs of a study, one or thousands at once, that differ in parameters or single places of the geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
+
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import Problem, StudyError
+from mechdesign.expressions import Number
+from mechdesign.mechanism.mechanism import Variant
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.study.expansion import Numbers
+from mechdesign.study.loading import Study, load_document
+from mechdesign.study.schema.optimize import Requirement
+from mechdesign.study.schema.targets import Target
+from mechdesign.study.text.document import Document, Mark
+from mechdesign.study.text.fields import Model, own_numbers, parts_of, positive
+from mechdesign.study.text.units import Amount
+from mechdesign.study.variants import changed_data, remeasured
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """Designs of a study by the values of what changes, each of shape (count,), in the study's units."""
+
+    study: Study
+    changed: Mapping[str, Floats]
+
+    @cached_property
+    def count(self) -> int:
+        """Number of designs."""
+        return len(next(iter(self.changed.values()), (0,)))
+
+    @cached_property
+    def parameters(self) -> dict[str, Floats]:
+        """Parameters that differ from the study's own design, shape (count,)."""
+        values = self.study.parameters.values(self.changed)
+        moved = self.study.parameters.moved(self.changed)
+        return {name: self._each(value) for name, value in values.items() if name in moved}
+
+    @cached_property
+    def places(self) -> dict[str, Floats]:
+        """Places of the geometry that do, in lengths and radians, shape (count,)."""
+        return {name: self._each(value) for name, value in self.study.parameters.places(self.changed).items()}
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        """What a study's poses are made of."""
+        nominal = self.study.parameters.nominal
+        return Numbers(self.count, self.parameters, self.places, nominal, frozenset(self.changed))
+
+    def one(self, k: int) -> Study:
+        """The study of one design, as if its file had these numbers; the assembly stays the sketch's.
+
+        A place that is changed itself becomes a number: parameters no longer change it.
+
+        Raises
+        ------
+        StudyError
+            If its numbers make no study.
+        MechanismError, AssemblyError
+            See `mechdesign.mechanism.mechanism.Variant`.
+        """
+        study, old = self.study, self.study.parameters
+        if not self.changed:
+            return study
+        changed = {name: float(values[k]) for name, values in self.changed.items()}
+        if self.faults[k]:
+            raise StudyError([Problem(self.faults[k], "mechanism", str(study.path or ""))])
+        resolved = changed_data(study, changed)
+        if not self.alike:
+            file = str(study.path or "")
+            return load_document(
+                Document(file, resolved, values={(): Mark(file)}), study.path, study.folder, study.text,
+                study.text_sha256, study.overrides, study.seed, study.mechanism,
+            )  # fmt: skip
+        parameters = {name: float(value) for name, value in old.values(changed).items()}
+        places = {name: float(values[k]) for name, values in self.places.items()}
+        description = study.mechanism.description
+        new = {name: replace(description.places[name], nominal=value) for name, value in places.items()}
+
+        def number(amount: Amount) -> Amount:
+            assert amount.expression is not None
+            return Amount(float(amount.expression.evaluate(parameters)), amount.text, amount.expression)
+
+        sections: dict[str, Any] = {
+            name: section.with_numbers(number)
+            for name in COMMANDS if isinstance(section := getattr(study, name), Model)
+        }  # fmt: skip
+        return replace(
+            study,
+            **sections,
+            requirements=tuple(each.with_numbers(number) for each in study.requirements),
+            targets={owner: _retabled(target, number) for owner, target in study.targets.items()},
+            resolved=resolved,
+            mechanism=Variant(study.mechanism, replace(description, places={**description.places, **new})),
+            parameters=replace(
+                old,
+                nominal=parameters,
+                formulas={name: formula for name, formula in old.formulas.items() if name not in changed},
+                dependent={place: formula for place, formula in old.dependent.items() if place not in changed},
+                measured=old.measured.difference(changed),
+            ),
+        )
+
+    @cached_property
+    def alike(self) -> bool:
+        """Whether designs differ in numbers alone: not in whole numbers, nor in what is measured from the sketch."""
+        moved = self.study.parameters.moved(self.changed)
+        return moved.isdisjoint(self.study.fixed) and not remeasured(self.study, self.changed)
+
+    def required(self, k: int) -> tuple[Requirement, ...]:
+        """What is required of a design."""
+        if not self.parameters:
+            return self.study.requirements
+
+        def number(amount: Amount) -> Amount:
+            return Amount(float(self.numbers.of(amount)[k]), "", amount.expression)
+
+        return tuple(each.with_numbers(number) for each in self.study.requirements)
+
+    def take(self, rows: Ints) -> Designs:
+        """Some of the designs."""
+        return Designs(self.study, {name: values[rows] for name, values in self.changed.items()})
+
+    @cached_property
+    def faults(self) -> NDArray[np.object_]:
+        """Why the numbers of each design make no study, shape (count,); empty where they do."""
+        reasons = np.full(self.count, "", dtype=object)
+
+        def note(wrong: Any, message: str) -> None:
+            reasons[np.broadcast_to(wrong, self.count) & (reasons == "")] = message
+
+        with np.errstate(all="ignore"):
+            self._judge_geometry(note)
+            for command in COMMANDS:
+                section = getattr(self.study, command)
+                if isinstance(section, Model):
+                    self._judge(section, command, note)
+        return reasons
+
+    def _each(self, value: Number) -> Floats:
+        return np.broadcast_to(np.asarray(value, dtype=float), self.count)
+
+    def _judge_geometry(self, note: Any) -> None:
+        """Note numbers of the geometry that make no mechanism."""
+        places, nominal = self.places, self.study.mechanism.nominal
+        for name, value in (*self.parameters.items(), *places.items()):
+            note(~np.isfinite(value), f"{name} has no finite value")
+        for name, value in places.items():
+            owner, _, last = name.rpartition(".")
+            if owner in self.study.mechanism.description.links and last == "length":
+                note(~(value > 0), f"{name} is not positive")
+        for a, b, gap in self.study.mechanism.contradictions(places):
+            note(gap > 0, f"the angles of the slides and clamps between '{a}' and '{b}' contradict each other")
+        for index, limit in enumerate(self.study.mechanism.description.limits):
+            ends = [f"limits.{index}.{end}" for end in ("min", "max")]
+            low, high = (places.get(end, nominal.get(end)) for end in ends)
+            if low is not None and high is not None:
+                note(np.asarray(high) < low, f"limits.{index}: the maximum is below the minimum")
+            for end in (low, high):
+                if limit.kind == "distance" and end is not None:
+                    note(np.asarray(end) < 0, f"limits.{index}: a distance is never negative")
+
+    def _judge(self, section: Model, name: str, note: Any) -> None:
+        """Note numbers of a section that it does not allow."""
+        for key, part in parts_of(section, name):
+            moved = [number for number in own_numbers(part) if self._moves(number)]
+            values = {id(number): self.numbers.of(number) for number in moved}
+            if isinstance(part, Amount) and moved:
+                (column,) = values.values()
+                note(~np.isfinite(column), f"{key} has no finite value")
+                if part.least is not None:
+                    small = column <= part.least if part.exclusive else column < part.least
+                    note(small, f"{key} must be {positive(part.least, exclusive=part.exclusive)}")
+            elif isinstance(part, Model) and moved and part.rules():
+                for k in range(self.count):
+                    try:
+                        part.with_numbers(_of_design(values, k)).judge()
+                    except PydanticCustomError as error:
+                        note(np.arange(self.count) == k, f"{key}: {error.message()}")
+
+    def _moves(self, number: Amount) -> bool:
+        """Whether designs differ in a number."""
+        return number.expression is not None and not number.expression.names.isdisjoint(self.parameters)
+
+
+def variant(study: Study, changed: Mapping[str, float]) -> Study:
+    """The study with other values of parameters or single places, in its units; see `Designs.one`.
+
+    Raises
+    ------
+    StudyError
+        If a name is neither a parameter nor a place, or the values make no study.
+    """
+    known = study.parameters.known()
+    unknown = [name for name in changed if name not in known]
+    if unknown:
+        file = str(study.path or "")
+        raise StudyError([Problem("is neither a parameter nor a dimension", name, file) for name in unknown])
+    return Designs(study, {name: np.array([value], dtype=float) for name, value in changed.items()}).one(0)
+
+
+def _retabled(target: Target, number: Callable[[Amount], Amount]) -> Target:
+    """A target whose table has other numbers where they follow parameters."""
+    if not target.rows:
+        return target
+    rows = [[number(each) if isinstance(each, Amount) and each.expression else each for each in row]
+            for row in target.rows]  # fmt: skip
+    return replace(target, rows=rows, table=np.array(rows, dtype=float))
+
+
+def _of_design(values: Mapping[int, Floats], k: int) -> Callable[[Amount], float]:
+    """A function that gives numbers, by their identity, the value of one design."""
+    return lambda number: float(values[id(number)][k]) if id(number) in values else number

@@ -1,0 +1,130 @@
+"""Entries of a study that cases and designs change: that the study has them, and that none is named twice."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from mechdesign.commands import COMMANDS
+from mechdesign.errors import StudyError, suggestion
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.matrix import MatrixSection
+from mechdesign.study.schema.optimize import OptimizeSection
+from mechdesign.study.schema.study_file import entry, kinds_of
+from mechdesign.study.schema.variable import Variable
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import shown
+
+# Sections of which designs may differ in an entry.
+_DESIGNED = ("mechanism", *(command for command in COMMANDS if command != "optimize"))
+
+
+def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str]) -> str:
+    """Name of the parameter, or of the place of the geometry, at a path of a study; empty where there is none."""
+    section, *path = keys
+    if section != "mechanism" or len(path) < 2:
+        return ""
+    kind, owner, *rest = path
+    if kind == "parameters":
+        return str(owner) if owner in parameters else ""
+    if kind == "links" and rest:
+        rest = ["length"] if rest == [2] else [each for each in rest if each != "points"]
+        rest[-1] = "x" if rest[-1] == 0 else "y" if rest[-1] == 1 else rest[-1]
+    place = ".".join(map(str, ([kind] if kind == "limits" else []) + [owner, *rest]))
+    return place if place in places else ""
+
+
+class _Varied:
+    """Entries that were named so far."""
+
+    def __init__(self, checker: Checker) -> None:
+        self._checker = checker
+        self._names: dict[KeyPath, str] = {}
+
+    def add(self, path: KeyPath, name: str, place: KeyPath) -> None:
+        """Note an entry, and report it at a place where it is, holds or lies in one that was named before."""
+        for keys, other in self._names.items():
+            if path[: len(keys)] == keys[: len(path)]:
+                message = f"{name} and {other} are, or hold, the same entry; vary one of them"
+                self._checker.report(place, message, at_key=True)
+        self._names[path] = name
+
+
+def check_varied(matrix: MatrixSection, checker: Checker) -> None:
+    """Check that the study has the entries that a matrix varies, each named once, and none inside another."""
+    at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
+    try:
+        names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
+    except StudyError as error:
+        checker.report(at, str(error))
+        return
+    varied = _Varied(checker)
+    for name in names:
+        place = (*at, name) if matrix.vary is not None else at
+        try:
+            path = entry(checker.reporter.document.data, name)
+        except StudyError as error:
+            checker.report(place, str(error) if matrix.vary is not None else f"column {name!r}: {error}", at_key=True)
+            continue
+        if path[0] == "matrix":
+            checker.report(place, "a matrix does not vary itself", at_key=True)
+        varied.add(path, name, place)
+
+
+def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSection:
+    """Check names, bounds, choices and units of the design variables.
+
+    Returns the section, in which what is a parameter or a dimension has the name of that.
+    """
+    parameters, varied = checker.parameters, _Varied(checker)
+    variables: dict[str, Variable] = {}
+    above = [name for name in parameters.nominal if name not in section.variables]
+    for name, variable in section.variables.items():
+        path: KeyPath = ("optimize", "variables", name)
+        for key, bound in (("from", variable.from_), ("to", variable.to)):
+            for unknown in sorted(bound.names - {*above} if bound is not None else ()):
+                below = " above it" if unknown in section.variables else ""
+                message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
+                checker.report((*path, key), message)
+        if section.method == "grid" and not variable.stepped and variable.step is None and variable.number is None:
+            checker.report(path, "a variable of a grid needs either 'step' or 'number'")
+        own, keys = _named(name, variable, checker)
+        varied.add(keys, name, path)
+        variables[own] = variable
+        if own in parameters.known():
+            above.append(own)
+            _check_number(own, variable, path, checker)
+        elif len(kinds := kinds_of(keys)) == 1:
+            checker.kind(path, *kinds)
+    return section.model_copy(update={"variables": variables})
+
+
+def _named(name: str, variable: Variable, checker: Checker) -> tuple[str, KeyPath]:
+    """The name of a design variable, of a parameter or dimension its own, and a path that no other variable has."""
+    known, path = checker.parameters.known(), ("optimize", "variables", name)
+    if name in known:
+        return name, ("", name)
+    if name.partition(".")[0] not in _DESIGNED:
+        what = "parameter or dimension" if "." not in name else "parameter, dimension or entry"
+        checker.known(name, known, what, path, at_key=True)
+        return name, ("", name)
+    try:
+        keys = entry(checker.reporter.document.data, name)
+    except StudyError as error:
+        checker.report(path, str(error), at_key=True)
+        return name, ("", name)
+    if keys in (("mechanism",), ("mechanism", "parameters")):
+        checker.report(path, f"{name} holds every parameter; name those that vary, one by one", at_key=True)
+    own = number_at(keys, checker.parameters.nominal, checker.places) if variable.numeric else ""
+    return (own, ("", own)) if own else (name, keys)
+
+
+def _check_number(name: str, variable: Variable, path: KeyPath, checker: Checker) -> None:
+    """Check a variable that is a parameter or a dimension."""
+    if name in checker.parameters.formulas:
+        message = f"parameter {name!r} follows from others by its expression; vary those, or give it a number"
+        checker.report(path, message, at_key=True)
+    for k, choice in enumerate(variable.choices or ()):
+        if not isinstance(choice, int | float) or isinstance(choice, bool):
+            checker.report((*path, "choices", k), f"{name} is a number, and {shown(choice)} is none")
+    if (quantity := checker.quantity(name)) is not None:
+        checker.kind(path, quantity)

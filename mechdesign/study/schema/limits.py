@@ -1,0 +1,82 @@
+"""Limits of errors, and of values, as the study file gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pydantic import ValidationInfo, model_validator
+
+from mechdesign.study.text import fields
+from mechdesign.study.text.fields import Context, failure, read_number, shown
+from mechdesign.study.text.units import Amount
+
+# What the names of errors of positions, velocities and accelerations end in.
+SUFFIXES = ("", "_velocity", "_acceleration")
+
+
+def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
+    """The coordinate (or point) that a name is about, and whether it means the position, velocity or acceleration."""
+    for order, suffix in enumerate(SUFFIXES):
+        if not known(name) and name.endswith(suffix) and known(name.removesuffix(suffix)):
+            return name.removesuffix(suffix), order
+    return name, 0
+
+
+class ErrorLimit(fields.Model):
+    """Bounds of an error (``min``, ``max``), of the value itself (``lsl``, ``usl``), or of a point's distance from its
+    place (``radius``). A number alone is +- about 0, two are lowest and highest error.
+    """
+
+    short = (fields.NUMBER_FORM, fields.PAIR_FORM)
+    min: fields.Number | None = None
+    """Lowest error. Left out: none. Example: -0.05"""
+    max: fields.Number | None = None
+    """Highest error. Left out: none. Example: 0.05"""
+    lsl: fields.Number | None = None
+    """Lower specification limit: lowest value of the output itself, at every pose. Example: 99.9"""
+    usl: fields.Number | None = None
+    """Upper specification limit: highest value of the output itself. An angle between both is counted at the turn
+    nearest to them. Example: 100.1
+    """
+    radius: fields.NonNegative | None = None
+    """Of a point: distance from its nominal place that is allowed. Example: 0.05"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any, info: ValidationInfo) -> Any:
+        if isinstance(raw, list):
+            if len(raw) != 2:
+                raise failure(f"expected a number, or the lowest and highest error such as [-1, 0.8], not {shown(raw)}")
+            return {"min": raw[0], "max": raw[1]}
+        if not isinstance(raw, int | float | str) or isinstance(raw, bool):
+            return raw
+        size = read_number(raw, info.context or Context())
+        if size < 0:
+            raise failure(f"must be at least 0, not {size:g}")
+        return {"min": Amount.by("-size", size=size), "max": size}
+
+    @model_validator(mode="after")
+    def _some(self) -> ErrorLimit:
+        kinds = [given for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (given := self.given(*keys))]
+        if not kinds:
+            raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
+        if len(kinds) > 1:
+            raise failure(
+                f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
+                "'usl' the value itself, 'radius' the place of a point"
+            )
+        low, high = self.ends
+        if low is not None and high is not None and high < low:
+            raise failure(f"the maximum {high:g} is below the minimum {low:g}")
+        return self
+
+    @property
+    def absolute(self) -> bool:
+        """Whether it is a limit of the value itself."""
+        return self.lsl is not None or self.usl is not None
+
+    @property
+    def ends(self) -> tuple[float | None, float | None]:
+        """Lowest and highest error, or value where it is absolute."""
+        return (self.lsl, self.usl) if self.absolute else (self.min, self.max)
