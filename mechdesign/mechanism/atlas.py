@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
@@ -17,6 +17,9 @@ from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.state import State
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 # Distance of neighbouring poses, as a part of the mechanism's size.
 SPACING = 0.03
@@ -294,6 +297,8 @@ class Atlas:
             design = design[parent]
             lattice = np.array([step for _, step in fresh], dtype=complex)
             table, outside = table[:, parent], outside[parent]
+        from scipy.spatial import cKDTree
+
         design, lattice, table = (np.concatenate(parts, axis=-1) for parts in zip(*layers, strict=True))
         slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
         found = []

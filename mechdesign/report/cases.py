@@ -65,7 +65,7 @@ class Best:
 
 def best_of(table: Table) -> Best | None:
     """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
-    if RANK not in table:
+    if FRONT not in table:
         return None
     found: tuple[int, str] | None = None
     numbers = np.zeros(3, dtype=np.intp)

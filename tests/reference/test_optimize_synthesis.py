@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.gallery import meet, result_of, row, study_named
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 import mechdesign
 
@@ -176,6 +176,14 @@ def test_straightness_against_uniform_speed() -> None:
     order = np.argsort(up)
     assert (np.diff(along[order]) < 0).all()
     assert front["knee"].sum() == 1
-    # Neither end of the front is anywhere near the other in its own goal.
+    # Neither end of the front is anywhere near the other in its own goal. The straightest design has the best speed for it.
     assert up.max() > 5 * up.min()
-    assert along.max() > 5 * along.min()
+    l1, l3, pin = front["l1"][order[0]], front["l3"][order[0]], np.exp(1j * crank)
+    x = (pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)).real
+
+    def unevenness(speed: float) -> float:
+        return float(np.abs(x - l1 + speed * (crank - np.pi)).max())
+
+    best = minimize_scalar(unevenness, bounds=(1.35, 1.6), method="bounded", options={"xatol": 1e-12}).fun
+    assert along.max() == pytest.approx(best, rel=1e-5)
+    assert along.max() > 4 * along.min()

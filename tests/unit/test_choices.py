@@ -84,11 +84,12 @@ def test_goals_of_designs_are_those_of_studies_with_these_entries() -> None:
 
 @pytest.mark.parametrize("method", ["search", "pareto"])
 def test_search_and_front_find_the_optimum_of_the_grid_and_evaluate_each_design_once(method: str) -> None:
-    asked = mechdesign.optimize(press("", f"optimize.method={method}"))
+    asked = mechdesign.optimize(press("", f"optimize.method={method}", "optimize.weights=[[1, 1]]"))
     gridded = mechdesign.optimize(press())
     assert sorted(designs_of(asked)) == sorted(BRUTE)
     for name in ("d", "l", "stiffness.elastic.rod", "score"):
-        assert asked.tables["optimum"][name].tolist() == gridded.tables["optimum"][name].tolist()
+        # Of a front the optima for weights stand behind its knee and its ends.
+        assert asked.tables["optimum"][name][-1:].tolist() == gridded.tables["optimum"][name].tolist()
 
 
 def test_a_front_names_the_choices() -> None:

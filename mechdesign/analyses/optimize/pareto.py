@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import count
 from math import comb
 from typing import Any
 
@@ -21,8 +22,8 @@ from mechdesign.results import Column, Table
 
 # Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
-# Parts of them, at most: for the ends of the front before it is spread, and for exact ends after that.
-ENDS_PART, LAST_PART = 3, 20
+# Parts of them, at most: for the best of each goal, and for what is best in the others there.
+BEST_PART, END_PART = 6, 20
 # Size of a population of two goals; generations that it is given of the evaluations that are left, at least; and
 # divisions of each goal by which more goals are spread.
 POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
@@ -31,13 +32,22 @@ MOST_DIVISIONS = 3
 MOST_GENERATIONS = 1_000_000
 # Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
 BESIDE = 1e-6
-# Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ.
-DESIGN_DISTANCE = 1e-4
+# Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ;
+# of more than two goals, whose fronts are surfaces of many thousand designs.
+DESIGN_DISTANCE, SURFACE_DISTANCE = 1e-4, 2e-3
 # A front whose hypervolume grows by more than this part in the last quarter of the designs since it was spread
 # is not at its end; it is looked at after so many generations.
 STILL_GROWING, LOOKS = 1e-3, 20
+# Rounds of spreading and filling end when one brings no more than this part of the hypervolume.
+ROUND_GROWTH = 2e-4
+# Distances on a front, in parts of its extent, at which designs midway between neighbours are evaluated: the widest is
+# halved down to the finest, which is wider for more goals; and how many cells apart neighbours are at most.
+WIDEST_GAP, FINEST_GAPS, FINEST_GAP = 0.25, {2: 1 / 256, 3: 1 / 32}, 1 / 8
+BESIDE_CELL = 1.5
+# Part of a front's extent below which values of a goal are equal.
+ROUNDING = 1e-8
 # Corner of the hypervolume, in parts of the way from each goal's best value on the front to its worst, and rows of it.
-CORNER, VOLUME_ROWS = 1.1, 20
+CORNER, VOLUME_ROWS = 1.1, 10
 
 
 def allowance(goals: int, *, alone: bool) -> int:
@@ -58,15 +68,19 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         Whether all evaluations are used; else it ends when the front's hypervolume no longer grows.
     """
     budget, goals = explorer.left, np.eye(len(signs))
-    explorer.left = budget // ENDS_PART
+    explorer.left = budget // BEST_PART
     search(explorer, (signs > 0).tolist(), goals.tolist(), seed, use_all=False)
-    explorer.left += budget - budget // ENDS_PART
-    explorer.reserve, begun = budget // LAST_PART, explorer.evaluated
-    _spread(explorer, signs, seed, use_all=use_all)
-    explorer.reserve = 0
+    explorer.left += budget - budget // BEST_PART
+    explorer.reserve = max(0, explorer.left - budget // END_PART)
     _end(explorer, signs)
+    explorer.reserve, begun = 0, explorer.evaluated
+    for k in count():
+        before = explorer.evaluated
+        _spread(explorer, signs, seed + k, use_all=use_all)
+        _fill(explorer, signs)
+        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before, ROUND_GROWTH)):
+            break
     if use_all:
-        _spread(explorer, signs, seed + 1, use_all=True)
         # Of a population that is larger than what is left nothing was evaluated.
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
     return begun
@@ -76,7 +90,7 @@ def _spread(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> N
     """Spread a population along the front, begun in the widest gaps so far."""
     partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
     size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
-    size = int(np.clip((explorer.left - explorer.reserve) // GENERATIONS, SMALLEST_POPULATION, size))
+    size = int(np.clip((explorer.left - explorer.reserve) // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
     known = explorer.known
     begun = np.flatnonzero(known.feasible)
     if len(begun):
@@ -98,6 +112,31 @@ def _end(explorer: Explorer, signs: Floats) -> None:
     weights = signs / np.where(span > 0, span, np.inf) * (np.eye(len(signs)) + BESIDE)
     with suppress(Spent):
         descend(explorer, [(weights[k], int(rows[end])) for k, end in enumerate(ends(normalised(values)))])
+
+
+def _fill(explorer: Explorer, signs: Floats) -> None:
+    """Evaluate designs midway between neighbours on the front, at finer and finer distances.
+
+    Designs on a front are as a rule those of a smooth surface: midway between two of them lies nearly another.
+    """
+    from scipy.spatial import cKDTree
+
+    distance = WIDEST_GAP
+    while distance >= FINEST_GAPS.get(len(signs), FINEST_GAP):
+        known = explorer.known
+        rows = np.flatnonzero(known.feasible)
+        rows = rows[front(known.values[rows] * signs)]
+        if not len(rows):
+            return
+        share = normalised(known.values[rows] * signs)
+        # One design in each cell of this width, and those in the cells beside it.
+        cells = np.unique(np.floor(share / distance), axis=0, return_index=True)[1]
+        pairs = cells[cKDTree(share[cells]).query_pairs(BESIDE_CELL * distance, output_type="ndarray")]
+        pairs = pairs[np.linalg.norm(share[pairs[:, 0]] - share[pairs[:, 1]], axis=1) > distance / 2]
+        middles = known.u[rows[pairs]].mean(axis=1)
+        with suppress(Spent):
+            explorer(middles)
+        distance /= 2
 
 
 def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *, use_all: bool = True) -> None:
@@ -132,7 +171,9 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *,
         if goals == 2:
             algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
         else:
-            partitions = DIVISIONS.get(goals, MOST_DIVISIONS)
+            # No more directions than members of the population.
+            most = DIVISIONS.get(goals, MOST_DIVISIONS)
+            partitions = max(n for n in range(1, most + 1) if n == 1 or comb(n + goals - 1, n) <= len(first))
             directions = get_reference_directions("das-dennis", goals, n_partitions=partitions)
             algorithm = NSGA3(ref_dirs=directions, pop_size=len(first), sampling=first)
         algorithm.setup(problem, termination=("n_gen", MOST_GENERATIONS), seed=seed, verbose=False)
@@ -149,19 +190,18 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *,
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                if not use_all and not _grows(explorer.known, signs, begun):
+                last = _last_quarter(begun, np.array(explorer.evaluated)).item()
+                if not use_all and not _grows(explorer.known, signs, last):
                     return
     except Spent:
         return
 
 
-def _grows(known: Known, signs: Floats, begun: int) -> bool:
-    """Whether the hypervolume of the front still grows, by the last quarter of what was evaluated since row `begun`."""
+def _grows(known: Known, signs: Floats, begun: int, least: float = STILL_GROWING) -> bool:
+    """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
-    whole = np.array([len(known.u)])
-    counts = np.concatenate([_last_quarter(begun, whole), whole])
-    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, counts))
-    return bool(last - before > STILL_GROWING * last)
+    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))
+    return bool(last - before > least * last)
 
 
 def _last_quarter(begun: int, counts: Ints) -> Ints:
@@ -169,7 +209,7 @@ def _last_quarter(begun: int, counts: Ints) -> Ints:
     return np.asarray(counts - np.maximum(counts - begun, 0) // 4)
 
 
-def volumes(values: Floats, counts: Ints) -> list[float]:
+def volumes(values: Floats, counts: Ints) -> Floats:
     """Hypervolumes of the fronts of the first so many rows of values, shape (designs, goals), less being better.
 
     They are in units of the box between each goal's best value on the front of all rows and its worst, and reach a
@@ -178,19 +218,27 @@ def volumes(values: Floats, counts: Ints) -> list[float]:
     from pymoo.indicators.hv import HV
 
     if not len(values):
-        return [0.0] * len(counts)
+        return np.zeros(len(counts))
     last = values[front(values)]
     low, span = last.min(axis=0), np.ptp(last, axis=0)
     shares = (values - low) / np.where(span > 0, span, 1.0)
-    volume = HV(ref_point=np.full(values.shape[1], CORNER))
-    parts = [shares[:count] for count in counts]
-    return [float(volume(part[front(part)])) if len(part) else 0.0 for part in parts]
+    volume, found = HV(ref_point=np.full(values.shape[1], CORNER)), np.zeros(len(counts))
+    rows, done = np.empty(0, dtype=np.intp), 0
+    for k in np.argsort(counts, kind="stable").tolist():
+        # What another design surpassed once stays off the front.
+        rows = np.concatenate([rows, np.arange(done, counts[k])])
+        rows, done = rows[front(shares[rows])], int(counts[k])
+        found[k] = volume(shares[rows]) if len(rows) else 0.0
+    return found
 
 
 def front(values: Floats) -> Ints:
     """Rows of values, shape (designs, goals), that no other surpasses, less being better; of equals the first."""
     rows = np.flatnonzero(fronts.front(values))
-    return np.sort(rows[np.unique(values[rows], axis=0, return_index=True)[1]])
+    # Of designs that rounding alone tells apart in one goal the better ones in the others.
+    settled = np.round(normalised(values[rows]) / ROUNDING) if len(rows) else values
+    unique = np.unique(settled, axis=0, return_index=True)[1]
+    return np.sort(rows[unique[fronts.front(settled[unique])]])
 
 
 def normalised(values: Floats) -> Floats:
@@ -200,13 +248,17 @@ def normalised(values: Floats) -> Floats:
 
 
 def distinct(values: Floats) -> Ints:
-    """Rows of a front, its ends among them, of which no two are closer than `DESIGN_DISTANCE` in every goal."""
+    """Rows of a front, its ends among them, of which no two are as near in every goal as counts as one."""
+    from scipy.spatial import cKDTree
+
     share = normalised(values)
-    kept: list[int] = []
-    for k in (*ends(share), *range(len(share))):
-        if (np.abs(share[kept] - share[k]).max(axis=1, initial=0.0) > DESIGN_DISTANCE).all():
-            kept.append(k)
-    return np.sort(np.array(kept, dtype=np.intp))
+    order = np.array([*dict.fromkeys((*ends(share), *range(len(share))))])
+    kept = np.ones(len(share), dtype=bool)
+    distance = DESIGN_DISTANCE if values.shape[1] == 2 else SURFACE_DISTANCE
+    pairs = np.sort(cKDTree(share[order]).query_pairs(distance, p=np.inf, output_type="ndarray"), axis=1)
+    for one, other in pairs[np.lexsort(pairs.T[::-1])].tolist():
+        kept[other] &= not kept[one]
+    return np.sort(order[kept])
 
 
 def ends(share: Floats) -> list[int]:
@@ -317,10 +369,10 @@ def growth_table(designs: Designs, begun: int) -> Table:
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = _last_quarter(begun, counts)
     values = designs.values[rows] * signs_of(designs)
-    volume, before = (np.array(volumes(values, np.searchsorted(rows, ends))) for ends in (counts, earlier))
+    volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
     columns = (
         Column("designs", counts, "", "designs that were evaluated until then"),
-        Column("front", np.array([len(front(values[: np.searchsorted(rows, count)])) for count in counts]), "",
+        Column("front", np.array([len(front(values[: np.searchsorted(rows, number)])) for number in counts]), "",
                "how many of them no other surpassed"),
         Column("hypervolume", volume, "", "of their front, in boxes between the last front's best and worst values, "
                "up to a tenth beyond"),
