@@ -23,7 +23,7 @@ _TABLES = {
 _PICTURES = {
     "kinematics": "motion paths poses transmission modes",
     "workspace": "workspace range path speed_ratio ellipses inscribed drives",
-    "optimize": "CPI objective indices designs pareto convergence optimum",
+    "optimize": "CPI objective indices designs pareto hypervolume convergence optimum",
     "reliability": "bands means deviations difference deviation_map failure_map reliability density density_contours "
     "histogram convergence estimate contributions allocation",
     "stiffness": "springs deflections free directions stiffness joint_forces force_hodographs",

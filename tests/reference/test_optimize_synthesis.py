@@ -176,7 +176,7 @@ def test_straightness_against_uniform_speed() -> None:
     order = np.argsort(up)
     assert (np.diff(along[order]) < 0).all()
     assert front["knee"].sum() == 1
-    # Neither end of the front is anywhere near the other in its own goal. The straightest design has the best speed for it.
+    # Neither end of the front is anywhere near the other in its own goal. The straightest design has its best speed.
     assert up.max() > 5 * up.min()
     l1, l3, pin = front["l1"][order[0]], front["l3"][order[0]], np.exp(1j * crank)
     x = (pin + 2 * (meet(pin, l3, l1, l3, 1) - pin)).real

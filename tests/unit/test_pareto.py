@@ -163,3 +163,84 @@ optimize:
         # Between the front f2 = 1 - sqrt(f1) and the corner (1, 1) lies an area of 2/3.
         area = np.sum(np.diff(np.append(x, 1.0)) * (1 - np.minimum(y, 1)))
         assert (area < 0.995 * 2 / 3) == grows
+
+
+HEAD = """\
+mechanism:
+  parameters: {{{parameters}}}
+  links: {{ground: {{O: [0, 0]}}, arm: [O, P, 10]}}
+  drives: [arm]
+  sketch: {{P: [10, 0]}}
+optimize: {{method: pareto, minimize: [{goals}], variables: {{{variables}}}}}
+"""
+
+
+def functions(count: int, formulas: dict[str, str], goals: list[str], *changes: str):
+    """A study of functions of parameters between 0 and 1."""
+    names = [f"x{k + 1}" for k in range(count)]
+    parameters = [f"{name}: 0.5" for name in names] + [f'{name}: "{formula}"' for name, formula in formulas.items()]
+    variables = [f"{name}: {{from: 0, to: 1}}" for name in names]
+    texts = {"parameters": parameters, "goals": goals, "variables": variables}
+    return study_of(HEAD.format(**{name: ", ".join(text) for name, text in texts.items()}), *changes)
+
+
+# [Zitzler, Deb & Thiele, 2000], with the hypervolumes of 200,001 points of the true fronts.
+G = "1 + 9/4*(x2 + x3 + x4 + x5)"
+ZDT = {
+    "zdt1": ("g*(1 - sqrt(x1/g))", 0.87664),
+    "zdt3": ("g*(1 - sqrt(x1/g) - x1/g*sin(1800*x1))", 1.33176),
+}
+
+
+def hypervolume(values, corner):
+    """The area between a front of two goals and a corner."""
+    x, y = values[np.argsort(values[:, 0])].T
+    return float(np.sum(np.diff(np.append(x, corner)) * (corner - y)))
+
+
+@pytest.mark.parametrize("name", ZDT)
+def test_the_default_front_has_nearly_all_of_the_hypervolume(name):
+    formula, whole = ZDT[name]
+    result = mechdesign.optimize(functions(5, {"g": G, "f2": formula}, ["x1", "f2"]))
+    values = np.column_stack([result.main["x1"], result.main["f2"]])
+    assert whole * 0.998 < hypervolume(values, 1.1) <= whole * (1 + 1e-5)
+    assert not result.warnings
+    growth = result.tables["hypervolume"]
+    assert growth["designs"][-1] == len(result.tables["designs"])
+    assert (np.diff(growth["hypervolume"]) >= -1e-12).all()
+
+
+def test_optima_of_a_front_are_its_knee_and_its_ends():
+    """The second goal leaves y free: of designs that are best in the first the best in the second is the end."""
+    formulas = {"f1": "1 + (x1 - 0.5)**2", "f2": "(x1 - 0.75)**2 + (x2 - 0.25)**2"}
+    result = mechdesign.optimize(functions(2, formulas, ["f1", "f2"]))
+    optimum = result.tables["optimum"]
+    assert optimum["what"].tolist() == ["knee", "best f1", "best f2"]
+    assert optimum["f1"][1:] == pytest.approx([1, 1.0625], abs=1e-6)
+    assert optimum["f2"][1:] == pytest.approx([0.0625, 0], abs=1e-6)
+    # f1 - 1 = t^2 and f2 = (1/4 - t)^2: the line between the ends is farthest at t = 1/8.
+    assert optimum["x1"][0] == pytest.approx(0.625, abs=0.005)
+    assert result.files["knee.yaml"] == result.files["optimum.yaml"]
+    best = result.tables["best"]
+    assert best["x1"][best["rank"] == 1].tolist() == optimum["x1"].tolist()
+    weighted = mechdesign.optimize(functions(2, formulas, ["f1", "f2"], "optimize.weights=[[1, 1]]"))
+    assert weighted.tables["optimum"]["what"].tolist() == ["knee", "best f1", "best f2", "weights"]
+
+
+def test_a_front_of_three_goals_is_a_surface():
+    """DTLZ2: an eighth of the unit sphere [Deb et al., Scalable test problems, 2005]; few evaluations are no error."""
+    formulas = {
+        "g": "1 + (x3 - 0.5)**2 + (x4 - 0.5)**2", "f1": "g*cos(90*x1)*cos(90*x2)",
+        "f2": "g*cos(90*x1)*sin(90*x2)", "f3": "g*sin(90*x1)",
+    }  # fmt: skip
+    for evaluations in (40, 6000):
+        study = functions(4, formulas, ["f1", "f2", "f3"], f"optimize.evaluations={evaluations}")
+        given = mechdesign.optimize(study)
+        assert given.counts["designs"] <= evaluations
+        values = np.column_stack([given.main[name] for name in ("f1", "f2", "f3")])
+        assert (np.linalg.norm(values, axis=1) > 1 - 1e-12).all()
+    assert np.median(np.linalg.norm(values, axis=1)) < 1.01
+    # Every direction of a coarse grid has a design near it.
+    steps = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)], dtype=float)
+    directions = steps / np.linalg.norm(steps, axis=1)[:, None]
+    assert np.linalg.norm(directions[:, None] - values, axis=2).min(axis=1).max() < 0.15

@@ -77,7 +77,7 @@ def optimize(
     with workers(evaluator, jobs, processes=True, travels=True) as compute:
         judge = Judge(study, evaluator, compute, progress, journal)
         try:
-            doubts, begun = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)
+            doubts = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)
             designs = judge.designs(weights, meanings)
             if not designs.feasible.any():
                 raise _nothing_feasible(study, designs, judge.nearest())
@@ -96,7 +96,7 @@ def optimize(
         best_table(designs), sensitivity,
     ]  # fmt: skip
     if section.method == "pareto":
-        growth = pareto.growth_table(designs, begun)
+        growth = pareto.growth_table(designs)
         tables = [pareto.pareto_table(designs), *tables, growth]
         doubts += tuple(pareto.doubts(growth, budget))
     files, wrong = design_files(study, designs, _optima(designs))
@@ -108,18 +108,15 @@ def optimize(
 
 def _ask(
     study: Study, judge: Judge, evaluator: Evaluator, weights: Floats, budget: int, seed: int
-) -> tuple[tuple[str, ...], int]:  # fmt: skip
-    """Evaluate the designs of the study's method.
-
-    Returns what is to be warned of, and how many designs came before a population was spread along a front.
-    """
+) -> tuple[str, ...]:  # fmt: skip
+    """Evaluate the designs of the study's method; returns what is to be warned of."""
     assert study.optimize is not None
     section = study.optimize
     if section.method == "grid":
         variables = grid(study)
         judge.progress.start(len(next(iter(variables.values()))), "designs")
         judge.evaluate(variables)
-        return (), 0
+        return ()
     dimensions, smallest = len(section.variables), [each.smallest for each in judge.goals]
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
@@ -130,9 +127,10 @@ def _ask(
         ending = searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all)
         names = [[goal.name for goal, weight in zip(judge.goals, row, strict=True) if weight] for row in weights]
         objectives = [own[0] if len(own) == 1 else "a weighted sum" for own in names]
-        return tuple(_doubts(ending, budget, objectives)), 0
+        return tuple(_doubts(ending, budget, objectives))
     signs = np.where(smallest, 1.0, -1.0)
-    return (), pareto.search_front(explorer, signs, seed, use_all=section.evaluations is not None)
+    pareto.search_front(explorer, signs, seed, use_all=section.evaluations is not None)
+    return ()
 
 
 def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[str]:

@@ -131,6 +131,13 @@ class Designs:
         scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights[len(self.chosen) :]]
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
+    def merits(self, row: int) -> str:
+        """What a design is best for: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        places = np.flatnonzero(self.winners == row).tolist()
+        marks = [self.marks[place] for place in places if place < len(self.chosen)]
+        weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]
+        return ", ".join([*marks, *([f"best for {' '.join(f'({own})' for own in weights)}"] if weights else [])])
+
     @property
     def best(self) -> int:
         """The optimum that is best on the whole; of a front its knee."""

@@ -22,8 +22,8 @@ from mechdesign.results import Column, Table
 
 # Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
-# Parts of them, at most: for the best of each goal, and for what is best in the others there.
-BEST_PART, END_PART = 6, 20
+# Parts of them, at most: for the best of each goal, for the best in the others there, for the weighted sums of a round.
+BEST_PART, END_PART, SUMS_PART = 6, 20, 10
 # Size of a population of two goals; generations that it is given of the evaluations that are left, at least; and
 # divisions of each goal by which more goals are spread.
 POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
@@ -32,14 +32,16 @@ MOST_DIVISIONS = 3
 MOST_GENERATIONS = 1_000_000
 # Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
 BESIDE = 1e-6
+# Weighted sums in a round.
+WEIGHTED_SUMS = 12
 # Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ;
 # of more than two goals, whose fronts are surfaces of many thousand designs.
 DESIGN_DISTANCE, SURFACE_DISTANCE = 1e-4, 2e-3
-# A front whose hypervolume grows by more than this part in the last quarter of the designs since it was spread
-# is not at its end; it is looked at after so many generations.
-STILL_GROWING, LOOKS = 1e-3, 20
-# Rounds of spreading and filling end when one brings no more than this part of the hypervolume.
-ROUND_GROWTH = 2e-4
+# A population is spread until the last quarter of its designs adds no more than this part of the hypervolume, looked at
+# after so many generations; rounds of spreading and filling end when one adds no more than that part.
+SPREAD_GROWTH, LOOKS, ROUND_GROWTH = 1e-3, 20, 2e-4
+# A front whose last tenth of designs adds more than this part of its hypervolume still grows.
+STILL_GROWING = 1e-3
 # Distances on a front, in parts of its extent, at which designs midway between neighbours are evaluated: the widest is
 # halved down to the finest, which is wider for more goals; and how many cells apart neighbours are at most.
 WIDEST_GAP, FINEST_GAPS, FINEST_GAP = 0.25, {2: 1 / 256, 3: 1 / 32}, 1 / 8
@@ -55,10 +57,8 @@ def allowance(goals: int, *, alone: bool) -> int:
     return (ALONE_FRONT_EVALUATIONS if alone else FRONT_EVALUATIONS) * goals
 
 
-def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> int:
+def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
     """Find the front: what is best in each goal alone, then designs between, then the exact ends.
-
-    Returns how many designs were evaluated before a population was spread along the front.
 
     Parameters
     ----------
@@ -71,22 +71,20 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
     explorer.left = budget // BEST_PART
     search(explorer, (signs > 0).tolist(), goals.tolist(), seed, use_all=False)
     explorer.left += budget - budget // BEST_PART
-    explorer.reserve = max(0, explorer.left - budget // END_PART)
-    _end(explorer, signs)
-    explorer.reserve, begun = 0, explorer.evaluated
+    _end(explorer, signs, budget // END_PART)
     for k in count():
         before = explorer.evaluated
-        _spread(explorer, signs, seed + k, use_all=use_all)
+        _spread(explorer, signs, seed + k)
+        _bulge(explorer, signs, budget // SUMS_PART, seed + k)
         _fill(explorer, signs)
         if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before, ROUND_GROWTH)):
             break
     if use_all:
         # Of a population that is larger than what is left nothing was evaluated.
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
-    return begun
 
 
-def _spread(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
+def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     """Spread a population along the front, begun in the widest gaps so far."""
     partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
     size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
@@ -97,11 +95,25 @@ def _spread(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> N
         rows = begun[front(known.values[begun] * signs)]
         begun = rows[np.argsort(-crowding(known.values[rows] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
-    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed, use_all=use_all)
+    evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
 
 
-def _end(explorer: Explorer, signs: Floats) -> None:
+def _end(explorer: Explorer, signs: Floats, most: int) -> None:
     """Descend to the ends of the front, each goal's best; the others count as far as that one leaves them free."""
+    _descend(explorer, signs, np.eye(len(signs)) + BESIDE, most)
+
+
+def _bulge(explorer: Explorer, signs: Floats, most: int, seed: int) -> None:
+    """Descend to designs between the ends by weighted sums of the goals, which find them where the front is convex."""
+    weights = np.random.default_rng(seed).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
+    _descend(explorer, signs, weights, most)
+
+
+def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> None:
+    """Descend from the front by sums of the normalised goals with weights, shape (sums, goals).
+
+    At most so many designs are evaluated.
+    """
     known = explorer.known
     rows = np.flatnonzero(known.feasible)
     if not len(rows):
@@ -109,9 +121,12 @@ def _end(explorer: Explorer, signs: Floats) -> None:
     rows = rows[front(known.values[rows] * signs)]
     values = known.values[rows] * signs
     span = np.ptp(values, axis=0)
-    weights = signs / np.where(span > 0, span, np.inf) * (np.eye(len(signs)) + BESIDE)
+    begun = rows[np.argmin(weights @ normalised(values).T, axis=1)]
+    factors = weights * signs / np.where(span > 0, span, np.inf)
+    explorer.reserve = max(0, explorer.left - most)
     with suppress(Spent):
-        descend(explorer, [(weights[k], int(rows[end])) for k, end in enumerate(ends(normalised(values)))])
+        descend(explorer, [*zip(factors, begun.tolist(), strict=True)])
+    explorer.reserve = 0
 
 
 def _fill(explorer: Explorer, signs: Floats) -> None:
@@ -139,11 +154,11 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
         distance /= 2
 
 
-def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *, use_all: bool = True) -> None:
-    """Spread a population along the front, from points of shape (points, dimensions), while evaluations last.
+def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
+    """Spread a population along the front, from points of shape (points, dimensions), while its hypervolume grows.
 
-    Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. Unless all evaluations are to be
-    used it ends when the front's hypervolume no longer grows, or the population brings nothing new.
+    Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. It ends with the evaluations,
+    too, and where the population brings nothing new.
     """
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.algorithms.moo.nsga3 import NSGA3
@@ -190,23 +205,18 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int, *,
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                last = _last_quarter(begun, np.array(explorer.evaluated)).item()
-                if not use_all and not _grows(explorer.known, signs, last):
+                last_quarter = (begun + 3 * explorer.evaluated) // 4
+                if not _grows(explorer.known, signs, last_quarter, SPREAD_GROWTH):
                     return
     except Spent:
         return
 
 
-def _grows(known: Known, signs: Floats, begun: int, least: float = STILL_GROWING) -> bool:
+def _grows(known: Known, signs: Floats, begun: int, least: float) -> bool:
     """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
     before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))
     return bool(last - before > least * last)
-
-
-def _last_quarter(begun: int, counts: Ints) -> Ints:
-    """Rows at which the last quarter of the designs since row `begun` begins, when so many designs are evaluated."""
-    return np.asarray(counts - np.maximum(counts - begun, 0) // 4)
 
 
 def volumes(values: Floats, counts: Ints) -> Floats:
@@ -356,18 +366,18 @@ def optima(designs: Designs, typed: Floats) -> Designs:
 
 
 def doubts(growth: Table, evaluations: int) -> Iterator[str]:
-    """A warning of a front whose hypervolume still grows in the last quarter of its designs."""
+    """A warning of a front whose hypervolume still grows in the last tenth of its designs."""
     share = float(growth["growth"][-1])
     if share > STILL_GROWING:
-        yield (f"the front still grows: its hypervolume by {100 * share:.2g} % in the last quarter of its designs; "
+        yield (f"the front still grows: its hypervolume by {100 * share:.2g} % in the last tenth of its designs; "
                f"allow more, e.g. optimize.evaluations: {4 * evaluations}")  # fmt: skip
 
 
-def growth_table(designs: Designs, begun: int) -> Table:
-    """Hypervolume of the front after so many designs, and how it grew; `begun` designs came before it was spread."""
+def growth_table(designs: Designs) -> Table:
+    """Hypervolume of the front after so many designs, and how it grew."""
     rows = np.flatnonzero(designs.feasible)
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
-    earlier = _last_quarter(begun, counts)
+    earlier = counts - counts // 10
     values = designs.values[rows] * signs_of(designs)
     volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
     columns = (
@@ -377,7 +387,7 @@ def growth_table(designs: Designs, begun: int) -> Table:
         Column("hypervolume", volume, "", "of their front, in boxes between the last front's best and worst values, "
                "up to a tenth beyond"),
         Column("growth", np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0), "",
-               "part of the hypervolume that the last quarter of these designs since it was spread brought"),
+               "part of the hypervolume that the last tenth of these designs brought"),
     )  # fmt: skip
     return Table("hypervolume", columns, "how the front grew, and whether it still does")
 

@@ -119,7 +119,7 @@ def best_table(designs: Designs) -> Table:
     for row, weights in enumerate(designs.weights):
         score = np.where(designs.feasible, designs.score(weights), -np.inf)
         for rank in range(MAX_BEST):
-            k = int(np.argmax(score))
+            k = int(np.argmax(score) if rank else designs.winners[row])
             if score[k] == -np.inf:
                 break
             chosen.append((row + 1, rank + 1, k, float(score[k])))

@@ -62,6 +62,20 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
               min(float(every.max()), high + 0.6 * span) + 0.04 * span)  # fmt: skip
 
 
+def growth_figure(growth: Table) -> Figure:
+    """Hypervolume of the front over the designs that were evaluated, and what the last quarter of them brought."""
+    figure = style.new_figure(3.2)
+    axes = figure.add_subplot()
+    axes.plot(growth["designs"], growth["hypervolume"], "o-", color=style.BLUE, markersize=4)
+    axes.set_xlabel("designs evaluated")
+    axes.set_ylabel("hypervolume of the front")
+    axes.set_title(
+        f"Growth of the front: {100 * growth['growth'][-1]:.2g} % by the last tenth of the designs", loc="left"
+    )
+    axes.margins(x=0.02)
+    return figure
+
+
 def marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
     """Designs of a front that are shown, and their rows: the best of each goal, and the knee between them."""
     found: dict[int, str] = {}

@@ -18,7 +18,7 @@ from mechdesign.analyses.optimize.variables import variables_of
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.designs import folded, head, label, listed, tick, value_text
-from mechdesign.report.figures.front import chosen, described, front_figure, marked
+from mechdesign.report.figures.front import chosen, described, front_figure, growth_figure, marked
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
@@ -45,7 +45,8 @@ _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``CPI`` (``objective`` of one goal), ``indices``, ``designs``, ``pareto``, ``convergence``, ``optimum``."""
+    """``CPI`` (``objective`` of one goal), ``indices``, ``designs``, ``pareto``, ``hypervolume``,
+    ``convergence``, ``optimum``."""
     assert study.optimize is not None
     designs: Designs = result.drawn["designs"]
     found = Gallery()
@@ -60,6 +61,7 @@ def figures(study: Study, result: Result) -> Gallery:
         found.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
         found.add("pareto", front_figure, designs, result.tables["pareto"])
+        found.add("hypervolume", growth_figure, result.tables["hypervolume"])
     if study.optimize.method == "search":
         found.add("convergence", convergence, designs)
     found.add("optimum", _optimum, result, designs)
@@ -183,11 +185,10 @@ def score_surface(designs: Designs) -> Figure:
     what = "composite performance index CPI" if many else label(designs, goals[0])
     digits = FuncFormatter(lambda value, _: f"{value:.3g}")
     style.color_bar(figure, filled, what, ax=axes, pad=0.02, format=digits).minorticks_off()
-    shown: dict[int, list[str]] = {}
-    for row, weights in zip(designs.winners.tolist(), designs.weights, strict=True):
-        shown.setdefault(row, []).append(f"({', '.join(f'{weight:g}' for weight in weights)})")
-    for k, (row, rows) in enumerate(shown.items()):
-        words = ", ".join(map(value_text, designs.design(row).values())) + ": best" + f" for {' '.join(rows)}" * many
+    shown = [*dict.fromkeys(designs.winners.tolist())]
+    for k, row in enumerate(shown):
+        merits = designs.merits(row) if many else "best"
+        words = f"{', '.join(map(value_text, designs.design(row).values()))}: {merits}"
         words = style.folded(words, 9.0, style.width() - 0.6)
         place = [column[row] for column in designs.variables.values()]
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
