@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.fronts import FRONTS
 from helpers.studies import study_of
 from helpers.syntheses import PROBLEMS
+from pymoo.indicators.hv import HV
 from scipy.optimize import differential_evolution
 
 import mechdesign
@@ -67,3 +69,16 @@ def test_as_good_as_ten_times_the_evaluations_of_differential_evolution(benchmar
         evolved=evolved.min(), evolved_worst=evolved.max(),
     )  # fmt: skip
     assert (found <= 1.01 * evolved).sum() >= SEEDS - 1
+
+
+@pytest.mark.parametrize(("name", "variables"), [("zdt1", 30), ("zdt3", 30), ("dtlz2", 12)])
+def test_default_fronts_have_all_but_a_hundredth_of_the_hypervolume(benchmark: Any, name: str, variables: int) -> None:
+    problem = FRONTS[name]
+    study = problem.study(variables)
+    results = benchmark.pedantic(lambda: [mechdesign.optimize(study, seed=k) for k in range(3)], rounds=1)
+    volume = HV(ref_point=np.full(len(problem.goals), 1.1))
+    missing = [
+        1 - volume(np.column_stack([each.main[g] for g in problem.goals])) / problem.hypervolume for each in results
+    ]
+    benchmark.extra_info.update(missing=max(missing), designs=max(each.counts["designs"] for each in results))
+    assert max(missing) < 0.01

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.fronts import FRONTS, dtlz2, functions
 from helpers.studies import study_of
 from helpers.syntheses import tray
 
@@ -165,43 +166,16 @@ optimize:
         assert (area < 0.995 * 2 / 3) == grows
 
 
-HEAD = """\
-mechanism:
-  parameters: {{{parameters}}}
-  links: {{ground: {{O: [0, 0]}}, arm: [O, P, 10]}}
-  drives: [arm]
-  sketch: {{P: [10, 0]}}
-optimize: {{method: pareto, minimize: [{goals}], variables: {{{variables}}}}}
-"""
-
-
-def functions(count: int, formulas: dict[str, str], goals: list[str], *changes: str):
-    """A study of functions of parameters between 0 and 1."""
-    names = [f"x{k + 1}" for k in range(count)]
-    parameters = [f"{name}: 0.5" for name in names] + [f'{name}: "{formula}"' for name, formula in formulas.items()]
-    variables = [f"{name}: {{from: 0, to: 1}}" for name in names]
-    texts = {"parameters": parameters, "goals": goals, "variables": variables}
-    return study_of(HEAD.format(**{name: ", ".join(text) for name, text in texts.items()}), *changes)
-
-
-# [Zitzler, Deb & Thiele, 2000], with the hypervolumes of 200,001 points of the true fronts.
-G = "1 + 9/4*(x2 + x3 + x4 + x5)"
-ZDT = {
-    "zdt1": ("g*(1 - sqrt(x1/g))", 0.87664),
-    "zdt3": ("g*(1 - sqrt(x1/g) - x1/g*sin(1800*x1))", 1.33176),
-}
-
-
 def hypervolume(values, corner):
     """The area between a front of two goals and a corner."""
     x, y = values[np.argsort(values[:, 0])].T
     return float(np.sum(np.diff(np.append(x, corner)) * (corner - y)))
 
 
-@pytest.mark.parametrize("name", ZDT)
+@pytest.mark.parametrize("name", ["zdt1", "zdt3"])
 def test_the_default_front_has_nearly_all_of_the_hypervolume(name):
-    formula, whole = ZDT[name]
-    result = mechdesign.optimize(functions(5, {"g": G, "f2": formula}, ["x1", "f2"]))
+    whole = FRONTS[name].hypervolume
+    result = mechdesign.optimize(FRONTS[name].study(5))
     values = np.column_stack([result.main["x1"], result.main["f2"]])
     assert whole * 0.998 < hypervolume(values, 1.1) <= whole * (1 + 1e-5)
     assert not result.warnings
@@ -228,14 +202,9 @@ def test_optima_of_a_front_are_its_knee_and_its_ends():
 
 
 def test_a_front_of_three_goals_is_a_surface():
-    """DTLZ2: an eighth of the unit sphere [Deb et al., Scalable test problems, 2005]; few evaluations are no error."""
-    formulas = {
-        "g": "1 + (x3 - 0.5)**2 + (x4 - 0.5)**2", "f1": "g*cos(90*x1)*cos(90*x2)",
-        "f2": "g*cos(90*x1)*sin(90*x2)", "f3": "g*sin(90*x1)",
-    }  # fmt: skip
+    """DTLZ2, an eighth of the unit sphere; few evaluations are no error."""
     for evaluations in (40, 6000):
-        study = functions(4, formulas, ["f1", "f2", "f3"], f"optimize.evaluations={evaluations}")
-        given = mechdesign.optimize(study)
+        given = mechdesign.optimize(dtlz2(4, f"optimize.evaluations={evaluations}"))
         assert given.counts["designs"] <= evaluations
         values = np.column_stack([given.main[name] for name in ("f1", "f2", "f3")])
         assert (np.linalg.norm(values, axis=1) > 1 - 1e-12).all()
