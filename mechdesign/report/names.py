@@ -13,7 +13,7 @@ ANIMATION = "motion.gif"
 _TABLES = {
     "kinematics": "motion instant_centres extremes jacobian limits loops toggles targets modes",
     "workspace": "indices path totals pieces boundary local singularities",
-    "optimize": "optimum designs bounds best sensitivity pareto nearest",
+    "optimize": "optimum designs bounds best sensitivity pareto hypervolume nearest",
     "reliability": "moments reliability capability contributions density histogram convergence estimate allocation "
     "confirmation",
     "stiffness": "stiffness compliance eigen springs deflections displacements forces",

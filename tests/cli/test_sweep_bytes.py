@@ -39,7 +39,7 @@ def processes():
 def asked(request, folder, invoke):
     """A sweep of 160 cases in three batches, with its file as it is without any workers."""
     (folder / "press.yaml").write_text(STUDY)
-    (folder / "pools.py").write_text(POOLS)
+    (folder / "sweep_pools.py").write_text(POOLS)
     arguments = ["sweep", "press.yaml", *VARY, *ASKED[request.param], "--no-plots", "--quiet"]
     assert invoke(*arguments, "--out", "alone", "--jobs", "1").exit_code == 3
     return arguments
@@ -58,8 +58,8 @@ def test_on_workers(asked, invoke):
     assert {row["exit_code"] for row in table} == {"0", "1", "3"}
     workers = {
         "two": ["--jobs", "2"],
-        "threads": ["--executor", "pools:threads"],
-        "processes": ["--executor", "pools:processes"],
+        "threads": ["--executor", "sweep_pools:threads"],
+        "processes": ["--executor", "sweep_pools:processes"],
     }
     for name, options in workers.items():
         assert invoke(*asked, "--out", name, *options).exit_code == 3

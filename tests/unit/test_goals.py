@@ -521,7 +521,7 @@ def test_expressions_alone_are_searched(method: str) -> None:
     section = f"""
 optimize:
   method: {method}
-  evaluations: 400
+  evaluations: 1000
   variables: {{l1: {{from: 10, to: 90}}, l2: {{from: 10, to: 90}}}}
   minimize: ["hypot(l1, l2)"{', "abs(l1 - 60)"' * (method == "pareto")}]
   subject_to: [{{result: l1 + l2, at_least: 100}}]
