@@ -58,7 +58,7 @@ def allowance(goals: int, *, alone: bool) -> int:
 
 
 def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
-    """Find the front: what is best in each goal alone, then designs between, then the exact ends.
+    """Find the front: the best design of each goal, with what is best in the others there, then designs between.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
     for k in count():
         before = explorer.evaluated
         _spread(explorer, signs, seed + k)
-        _bulge(explorer, signs, budget // SUMS_PART, seed + k)
+        _descend_between(explorer, signs, budget // SUMS_PART, seed + k)
         _fill(explorer, signs)
         if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before, ROUND_GROWTH)):
             break
@@ -84,16 +84,21 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
 
 
+def _front_rows(known: Known, signs: Floats) -> Ints:
+    """Rows of the feasible designs that no other surpasses."""
+    rows = np.flatnonzero(known.feasible)
+    return np.asarray(rows[front(known.values[rows] * signs)])
+
+
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     """Spread a population along the front, begun in the widest gaps so far."""
     partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
     size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
-    size = int(np.clip((explorer.left - explorer.reserve) // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
+    size = int(np.clip(explorer.left // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
     known = explorer.known
-    begun = np.flatnonzero(known.feasible)
+    begun = _front_rows(known, signs)
     if len(begun):
-        rows = begun[front(known.values[begun] * signs)]
-        begun = rows[np.argsort(-crowding(known.values[rows] * signs), kind="stable")[: size // 2]]
+        begun = begun[np.argsort(-crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
     evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
 
@@ -103,7 +108,7 @@ def _end(explorer: Explorer, signs: Floats, most: int) -> None:
     _descend(explorer, signs, np.eye(len(signs)) + BESIDE, most)
 
 
-def _bulge(explorer: Explorer, signs: Floats, most: int, seed: int) -> None:
+def _descend_between(explorer: Explorer, signs: Floats, most: int, seed: int) -> None:
     """Descend to designs between the ends by weighted sums of the goals, which find them where the front is convex."""
     weights = np.random.default_rng(seed).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
     _descend(explorer, signs, weights, most)
@@ -115,10 +120,9 @@ def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> N
     At most so many designs are evaluated.
     """
     known = explorer.known
-    rows = np.flatnonzero(known.feasible)
+    rows = _front_rows(known, signs)
     if not len(rows):
         return
-    rows = rows[front(known.values[rows] * signs)]
     values = known.values[rows] * signs
     span = np.ptp(values, axis=0)
     begun = rows[np.argmin(weights @ normalised(values).T, axis=1)]
@@ -139,8 +143,7 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
     distance = WIDEST_GAP
     while distance >= FINEST_GAPS.get(len(signs), FINEST_GAP):
         known = explorer.known
-        rows = np.flatnonzero(known.feasible)
-        rows = rows[front(known.values[rows] * signs)]
+        rows = _front_rows(known, signs)
         if not len(rows):
             return
         share = normalised(known.values[rows] * signs)
