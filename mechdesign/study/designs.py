@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import PydanticCustomError
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError
@@ -172,24 +171,21 @@ class Designs:
     def _judge(self, section: Model, name: str, note: Any) -> None:
         """Note numbers of a section that it does not allow."""
         for key, part in parts_of(section, name):
-            moved = [number for number in own_numbers(part) if self._moves(number)]
-            values = {id(number): self.numbers.of(number) for number in moved}
+            moved = [number for number in own_numbers(part) if self.numbers.moves(number)]
             if isinstance(part, Amount) and moved:
-                (column,) = values.values()
+                column = self.numbers.of(part)
                 note(~np.isfinite(column), f"{key} has no finite value")
                 if part.least is not None:
                     small = column <= part.least if part.exclusive else column < part.least
                     note(small, f"{key} must be {positive(part.least, exclusive=part.exclusive)}")
-            elif isinstance(part, Model) and moved and part.rules():
-                for k in range(self.count):
-                    try:
-                        part.with_numbers(_of_design(values, k)).judge()
-                    except PydanticCustomError as error:
-                        note(np.arange(self.count) == k, f"{key}: {error.message()}")
+            elif isinstance(part, Model) and moved:
+                for misfit in part.with_numbers(self._numbers_of).misfits():
+                    for k in np.flatnonzero(np.broadcast_to(misfit.wrong, self.count)).tolist():
+                        note(np.arange(self.count) == k, f"{key}: {misfit.message(k)}")
 
-    def _moves(self, number: Amount) -> bool:
-        """Whether designs differ in a number."""
-        return number.expression is not None and not number.expression.names.isdisjoint(self.parameters)
+    def _numbers_of(self, number: Amount) -> float | Floats:
+        """A number of all designs, or of each where they differ in it."""
+        return self.numbers.of(number) if self.numbers.moves(number) else number
 
 
 def variant(study: Study, changed: Mapping[str, float]) -> Study:
@@ -215,8 +211,3 @@ def _retabled(target: Target, number: Callable[[Amount], Amount]) -> Target:
     rows = [[number(each) if isinstance(each, Amount) and each.expression else each for each in row]
             for row in target.rows]  # fmt: skip
     return replace(target, rows=rows, table=np.array(rows, dtype=float))
-
-
-def _of_design(values: Mapping[int, Floats], k: int) -> Callable[[Amount], float]:
-    """A function that gives numbers, by their identity, the value of one design."""
-    return lambda number: float(values[id(number)][k]) if id(number) in values else number

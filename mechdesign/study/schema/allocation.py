@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
-from typing import Annotated, Any, Self
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mechdesign.mechanism.model import Place
 from mechdesign.study.building.parameters import Parameters
@@ -77,11 +77,11 @@ class Allocate(fields.Model):
     2}}
     """
 
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        if self.reliability is not None and not self.reliability < 1.0:
-            raise failure(f"a reliability lies between 0 and 1, not {self.reliability:g}")
-        return self
+    def misfits(self) -> Iterator[fields.Misfit]:
+        if self.reliability is not None:
+            yield fields.Misfit(
+                self.reliability >= 1, "a reliability lies between 0 and 1, not {}", (self.reliability,)
+            )
 
 
 def half_widths(

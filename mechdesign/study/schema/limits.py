@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from pydantic import ValidationInfo, model_validator
@@ -66,10 +66,12 @@ class ErrorLimit(fields.Model):
                 f"{kinds[0][0]!r} and {kinds[1][0]!r} exclude each other: 'min' and 'max' limit the error, 'lsl' and "
                 "'usl' the value itself, 'radius' the place of a point"
             )
-        low, high = self.ends
-        if low is not None and high is not None and high < low:
-            raise failure(f"the maximum {high:g} is below the minimum {low:g}")
         return self
+
+    def misfits(self) -> Iterator[fields.Misfit]:
+        low, high = self.ends
+        if low is not None and high is not None:
+            yield fields.Misfit(high < low, "the maximum {} is below the minimum {}", (high, low))
 
     @property
     def absolute(self) -> bool:

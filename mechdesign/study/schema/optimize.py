@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
 from typing import Annotated, Any, ClassVar, Self
 
@@ -109,11 +109,14 @@ class Span(fields.Model):
         given = self.given("from_", "to", "at_least", "at_most")
         if not given or (given != ["from_", "to"] and {"from_", "to"} & {*given}):
             raise failure("a part of a motion has 'from' and 'to', or 'at_least', 'at_most' or both")
-        if self.from_ is not None and self.from_ == self.to:
-            raise failure(f"nothing lies between {written(self.from_)} and {written(self.to)}")
-        if self.at_least is not None and self.at_most is not None and not self.at_least < self.at_most:
-            raise failure(f"nothing is at least {written(self.at_least)} and at most {written(self.at_most)}")
         return self
+
+    def misfits(self) -> Iterator[fields.Misfit]:
+        if self.from_ is not None:
+            yield fields.Misfit(self.from_ == self.to, "nothing lies between {} and {}", (self.from_, self.to))
+        if self.at_least is not None and self.at_most is not None:
+            ends = (self.at_least, self.at_most)
+            yield fields.Misfit(self.at_least >= self.at_most, "nothing is at least {} and at most {}", ends)
 
     def interval(self, unit: str) -> Interval:
         """The values in a unit; see `mechdesign.rows.Span`.
@@ -216,9 +219,12 @@ class Condition(Judged):
     def _bounded(self) -> Condition:
         if self.at_least is None and self.at_most is None:
             raise failure("a condition needs 'at_least', 'at_most' or both")
-        if self.at_least is not None and self.at_most is not None and self.at_most < self.at_least:
-            raise failure(f"nothing is at least {written(self.at_least)} and at most {written(self.at_most)}")
         return self
+
+    def misfits(self) -> Iterator[fields.Misfit]:
+        if self.at_least is not None and self.at_most is not None:
+            ends = (self.at_least, self.at_most)
+            yield fields.Misfit(self.at_most < self.at_least, "nothing is at least {} and at most {}", ends)
 
 
 class Requirement(Condition):

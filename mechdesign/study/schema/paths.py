@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import numpy as np
@@ -65,11 +66,8 @@ class Arc(fields.Model):
     to: Radians
     """Angle of the last place; less than ``from``: clockwise. Example: 180"""
 
-    @model_validator(mode="after")
-    def _some(self) -> Arc:
-        if self.from_ == self.to:
-            raise failure("an arc needs two different angles 'from' and 'to'")
-        return self
+    def misfits(self) -> Iterator[fields.Misfit]:
+        yield fields.Misfit(self.from_ == self.to, "an arc needs two different angles 'from' and 'to'")
 
 
 def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:

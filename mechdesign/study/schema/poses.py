@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -52,9 +52,13 @@ class Sweep(fields.Model):
     def _spacing(self) -> Sweep:
         if (self.step is None) == (self.number is None):
             raise failure("a sweep needs either 'step' or 'number'")
-        if self.step is not None and (self.step == 0 or self.step * (self.to - self.from_) < 0):
-            raise failure(f"a step of {self.step:g} never leads from {self.from_:g} to {self.to:g}")
         return self
+
+    def misfits(self) -> Iterator[fields.Misfit]:
+        if self.step is not None:
+            astray = (self.step == 0) | (self.step * (self.to - self.from_) < 0)
+            numbers = (self.step, self.from_, self.to)
+            yield fields.Misfit(astray, "a step of {} never leads from {} to {}", numbers)
 
 
 def _poses(raw: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -54,13 +55,17 @@ class Profile(fields.Model):
             raise failure(
                 "a section is {E, width, height}, {E, diameter}, {E, diameter, inner_diameter} or {E, area, inertia}"
             )
-        if self.inner_diameter is not None and self.diameter is not None and self.inner_diameter >= self.diameter:
-            raise failure(f"the inner diameter {self.inner_diameter:g} is not below the outer one {self.diameter:g}")
         if self.shear and self.G is None:
             raise failure("'shear: true' needs the shear modulus 'G'")
         if self.shear_factor is not None and not self.shear:
             raise failure("a 'shear_factor' counts with 'shear: true' only")
         return self
+
+    def misfits(self) -> Iterator[fields.Misfit]:
+        if self.inner_diameter is not None and self.diameter is not None:
+            diameters = (self.inner_diameter, self.diameter)
+            solid = self.inner_diameter >= self.diameter
+            yield fields.Misfit(solid, "the inner diameter {} is not below the outer one {}", diameters)
 
     @property
     def extent(self) -> tuple[Number, Number, Number]:

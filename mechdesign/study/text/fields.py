@@ -17,6 +17,7 @@ from functools import cache
 from itertools import islice, pairwise
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
 
+import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -25,7 +26,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from mechdesign.errors import cut, suggestion
 from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.study.text.document import read
-from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure
+from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, Units, measure, written
 
 Form = dict[str, Any]
 """JSON Schema of a part of the study; a title says in words what is accepted."""
@@ -329,6 +330,27 @@ class OrShort:
         return {"anyOf": [found, *(self.forms or [found["items"]])]}
 
 
+class Misfit(NamedTuple):
+    """Numbers of a section that do not fit each other.
+
+    Parameters
+    ----------
+    wrong : bool, or bool array, shape (designs,)
+        Where they do not.
+    text : str
+        Why, with ``{}`` for each of the numbers.
+    numbers : sequence of float, or of float array, shape (designs,)
+    """
+
+    wrong: Any
+    text: str
+    numbers: Sequence[Any] = ()
+
+    def message(self, design: int = 0) -> str:
+        """The text with the numbers of one design."""
+        return self.text.format(*(written(each[design] if np.ndim(each) else each) for each in self.numbers))
+
+
 class KeyText(NamedTuple):
     """What the docstring under an attribute of a model says: text in one line, and examples as a study writes them."""
 
@@ -433,6 +455,13 @@ class Model(BaseModel):
             raise failure(self.one_of[0] + (f"; {' and '.join(given)} are given" if given else ""))
         return self
 
+    @model_validator(mode="after")
+    def _fitting_numbers(self) -> Self:
+        for misfit in self.misfits():
+            if misfit.wrong:
+                raise failure(misfit.message())
+        return self
+
     def given(self, *keys: str) -> list[str]:
         """Those of the keys that are not None."""
         return [key for key in keys if getattr(self, key) is not None]
@@ -442,22 +471,9 @@ class Model(BaseModel):
         """Which of the keys of `one_of` is given."""
         return self.given(*self.one_of[1:])[0]
 
-    @classmethod
-    def rules(cls) -> list[Callable[[Any], Any]]:
-        """What the section checks of its numbers together: functions of it that raise PydanticCustomError."""
-        validators = cls.__pydantic_decorators__.model_validators
-        return [each.func for name, each in validators.items() if each.info.mode == "after" and name != "_exactly_one"]
-
-    def judge(self) -> None:
-        """Check the numbers together once more.
-
-        Raises
-        ------
-        PydanticCustomError
-            Where the section does not allow them.
-        """
-        for rule in self.rules():
-            rule(self)
+    def misfits(self) -> Iterator[Misfit]:
+        """What the section does not allow of its numbers together; of designs the numbers are arrays."""
+        return iter(())
 
     def with_numbers(self, value: Callable[[Amount], Any]) -> Self:
         """The section where the numbers that follow parameters are what `value` makes of them, perhaps arrays."""
