@@ -56,6 +56,7 @@ def test_a_turn_is_a_loop_of_bounded_size(folder, invoke):
     assert manifest["animate"] is True
 
 
+@pytest.mark.nightly
 def test_the_same_study_gives_the_same_bytes(folder, invoke):
     for out in ("one", "two"):
         invoke("kinematics", "slider.yaml", "--animate", "--out", out)
@@ -70,6 +71,7 @@ def test_a_sweep_that_does_not_close_goes_there_and_back(folder, invoke):
     assert not (shown[0] == shown[2]).all()
 
 
+@pytest.mark.nightly
 def test_poses_that_fail_have_no_frame(folder, invoke):
     (folder / "rocker.yaml").write_text(ROCKER)
     done = invoke("kinematics", "rocker.yaml", "--animate")
@@ -91,6 +93,7 @@ def test_what_is_no_motion_is_told(folder, invoke, poses):
     assert not (folder_of(folder) / "motion.gif").exists()
 
 
+@pytest.mark.nightly
 def test_without_the_option_an_older_animation_goes(folder, invoke):
     invoke("kinematics", "slider.yaml", "--animate")
     assert (folder_of(folder) / "motion.gif").exists()

@@ -116,6 +116,7 @@ sensitivities: {results: [kinematics.B.x.max], parameters: [q]}
     assert keys == ["requirements.0", "matrix.results.0", "sensitivities.parameters.0"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("arguments", [["--no-plots"], []])
 def test_checking_imports_no_solver_of_scipy(folder, arguments):
     code = (

@@ -11,6 +11,7 @@ import pytest
 SHELL = shutil.which("bash")
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(SHELL is None, reason="there is no bash")
 def test_bash_completes_what_is_typed(folder):
     """The script that is installed, in a bash of its own: it defines a function that a Tab calls."""

@@ -49,6 +49,7 @@ def test_without_a_word_there_is_an_overview(invoke):
     assert any(line.startswith("function: sqrt") for line in lines)
 
 
+@pytest.mark.nightly
 def test_several_words_and_one_that_nobody_knows(invoke):
     assert invoke("docs", "sweep", "GRI").stdout.count("GRI (") == 1
     done = invoke("docs", "sweep", "clearence")

@@ -264,6 +264,7 @@ def test_a_kill_at_any_instant_leaves_whole_files(here, analysis, invoke):
     assert any(broken)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("instant", [0, 1, 2, 3, 4, 6, 8])
 def test_a_kill_between_two_files(here, analysis, invoke, monkeypatch, instant):
     """The n-th step on the way of files into place is the last one."""
@@ -502,6 +503,7 @@ def test_inputs_of_one_name_are_told_apart(here, invoke):
         assert "kept" not in invoke(*arguments).stdout
 
 
+@pytest.mark.nightly
 def test_a_poor_environment(here):
     """No home, no locale, few files: names of other letters stay whole on the disk."""
     (here / "größe.yaml").write_text("name: Größe → µm\n" + SLIDER.partition("\n")[2], encoding="utf-8")

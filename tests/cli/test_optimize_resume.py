@@ -198,6 +198,7 @@ def test_an_interrupted_question_is_not_kept_by_run(study, invoke, interrupt):
     assert not calls
 
 
+@pytest.mark.nightly
 def test_interrupt_of_a_run_with_workers(study, invoke):
     """A real signal: whatever was finished by then, the resumed results are those of one run."""
     arguments = ("optimize", str(study()), "--no-plots", "--jobs", "2", "--set", "optimize.variables.r1.number=600")

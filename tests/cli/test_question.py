@@ -239,6 +239,7 @@ def test_pictures_as_vectors_are_the_same_bytes_at_every_run(folder, invoke):
     assert not any(name.endswith(".png") for name in files)
 
 
+@pytest.mark.nightly
 def test_pictures_for_paper_are_as_wide_as_a_column(folder, invoke):
     wide = 88 / 25.4  # inches
     asked = ("run", "slider.yaml", "--style", "paper", "--format", "png,svg,pdf", "--out", "out")

@@ -50,6 +50,7 @@ def interrupted(folder, stage, *changes):
     return process.wait(60), int(memory[1])
 
 
+@pytest.mark.nightly
 def test_a_billion_samples_interrupted(tmp_path):
     code, kilobytes = interrupted(tmp_path, rb"[1-9]\d*/3000000000", "reliability.samples=1000000000")
     assert code == 130

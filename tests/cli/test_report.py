@@ -130,6 +130,7 @@ def test_the_same_study_gives_the_same_page(folder, invoke):
     assert Path("one/report.html").read_bytes() == Path("two/report.html").read_bytes()
 
 
+@pytest.mark.nightly
 def test_a_page_of_kept_questions_is_whole(folder, analysis, invoke):
     computed = []
     analysis(lambda study, **options: computed.append(study) or kinematics(study))
@@ -150,6 +151,7 @@ def test_a_page_of_kept_questions_is_whole(folder, analysis, invoke):
     check(Page(page))
 
 
+@pytest.mark.nightly
 def test_a_fine_motion_with_its_curves_is_small(folder, invoke):
     (folder / "fine.yaml").write_text(FINE)
     done = invoke("kinematics", "fine.yaml", "--report")

@@ -192,6 +192,7 @@ def test_nothing_is_wider_than_the_screen(opened, width):
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.nightly
 def test_without_script_and_in_print_it_is_a_still_drawing(opened):
     page = opened("slider_crank", java_script_enabled=False)
     assert page.locator(".moving [data-at=B]:has(circle)").is_visible()

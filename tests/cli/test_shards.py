@@ -58,6 +58,7 @@ def test_four_shards_merged_are_one_run(studies, invoke):
     assert "they are whole" in again.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["two_link_arm", "slider_crank_tolerances"])
 def test_shards_of_one_command(studies, invoke, name):
     asked = [f"{name}.yaml", *ARM, "--no-plots"]
@@ -77,6 +78,7 @@ def test_shards_of_cases_that_the_command_line_names(studies, invoke):
     assert content("parts") == content("whole")
 
 
+@pytest.mark.nightly
 def test_shards_that_cannot_be_merged(studies, invoke):
     asked = ["two_link_arm.yaml", *ARM, "--no-plots", "--out", "parts"]
     told = invoke("merge", *asked)
@@ -160,6 +162,7 @@ def test_dask_that_is_not_installed(studies, invoke, monkeypatch):
     assert "needs dask, which is not installed: pip install 'mechdesign[cluster]'" in told.stderr
 
 
+@pytest.mark.nightly
 def test_the_same_files_on_executors(studies, invoke):
     (studies / "pools.py").write_text(
         "from concurrent.futures import ThreadPoolExecutor\ndef two():\n    return ThreadPoolExecutor(2)\n"

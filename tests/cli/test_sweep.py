@@ -149,6 +149,7 @@ def test_pictures_and_report(study, invoke):
     }  # fmt: skip
 
 
+@pytest.mark.nightly
 def test_the_best_case_is_told_on_the_terminal_and_in_the_report_also_of_what_is_kept(study, invoke):
     vary = ["--vary", f"{R}=25:40:5", "--vary", "mechanism.parameters.l=90:120:10"]
     goals = ["--maximize", "kinematics.B.x.range", "--minimize", "kinematics.B.x.max"]

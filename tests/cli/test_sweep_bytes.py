@@ -51,6 +51,7 @@ def files(name: str) -> dict[str, bytes]:
     return found
 
 
+@pytest.mark.nightly
 def test_on_workers(asked, invoke):
     with Path("alone/sweep.csv").open(newline="") as stream:
         table = list(csv.DictReader(stream))
@@ -71,6 +72,7 @@ def test_on_workers(asked, invoke):
     assert files("dask") == files("alone")
 
 
+@pytest.mark.nightly
 def test_in_shards(asked, invoke):
     for k in (2, 3, 1):
         assert invoke(*asked, "--out", "parts", "--shard", f"{k}/3").exit_code == 0
@@ -78,6 +80,7 @@ def test_in_shards(asked, invoke):
     assert files("parts") == files("alone")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("batches", [1, 2])
 def test_gone_on_with(asked, invoke, monkeypatch, batches):
     answers, begun = room.answers, []

@@ -101,6 +101,7 @@ def test_the_table_of_what_is_under_way_has_room_for_it():
     assert all(word in text for word in ("kinematics", "requirement not met", "reliability", "samples", "1 failed"))
 
 
+@pytest.mark.nightly
 def test_no_bar_for_what_is_quick_and_one_for_what_is_not(tmp_path):
     _, quick = at_terminal(tmp_path, 0)
     assert "%" not in quick

@@ -159,6 +159,7 @@ def test_every_writer_leaves_what_is_not_its_own(folder, invoke, uncomputed, nam
     assert (folder / name).is_symlink() == (link and name != "slider.yaml")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("kind", ["png", "svg", "pdf"])
 def test_own_files_are_replaced(folder, analysis, invoke, kind):
     """Of every writer, a second time: also what no manifest lists."""

@@ -54,6 +54,7 @@ def along(configurations: list[Configuration], coordinate: Coordinate) -> list[F
     return values
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms())
 def test_velocities_in_the_pose_drawn_are_those_of_its_own_equations(made: Made) -> None:
@@ -68,6 +69,7 @@ def test_velocities_in_the_pose_drawn_are_those_of_its_own_equations(made: Made)
         assert got == pytest.approx(value, rel=1e-8, abs=1e-8), name
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms())
 def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
@@ -121,6 +123,7 @@ def _state(made: Made, time: Floats, changes: dict[str, Floats]) -> tuple[Config
     return configuration, linear, velocity, linear.acceleration(velocity, bent)
 
 
+@pytest.mark.nightly
 @settings(max_examples=40)
 @given(mechanisms())
 def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
@@ -157,6 +160,7 @@ def test_sensitivities_of_every_order_are_derivatives(made: Made) -> None:
                 agree(derivative, slopes(values, h), 1e-7, f"order {order} of {name} by {place}")
 
 
+@pytest.mark.nightly
 @settings(max_examples=40)
 @given(mechanisms())
 def test_a_pin_off_its_place_in_one_link_moves_the_others_with_it_and_leaves_guides_alone(made: Made) -> None:

@@ -74,6 +74,7 @@ def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
             assert (wrap(miss) if coordinate[0] == "angle" else miss) == pytest.approx(0, abs=1e-9), name
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms(), st.sampled_from([0.2, 1.0, 4.0]))
 def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
@@ -93,6 +94,7 @@ def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
         assert np.all(np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off) < bound), drive
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(
     mechanisms(),
@@ -165,6 +167,7 @@ def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
     assert np.all(np.max(leaps, axis=0)[both] <= allowed[both])
 
 
+@pytest.mark.nightly
 @settings(max_examples=20)
 @given(mechanisms(most=2))
 def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:

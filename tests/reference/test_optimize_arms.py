@@ -59,6 +59,7 @@ def test_the_arm_that_can_be_isotropic_has_links_of_root_two_to_one() -> None:
     assert tables["optimum"]["l1"][0] == pytest.approx(0.55)
 
 
+@pytest.mark.nightly
 def test_the_front_of_reach_and_room_has_equal_links() -> None:
     """Area 4 pi l1 l2 against the square around it, 4 (l1 + l2)^2: their ratio is at most pi/4, at l1 = l2."""
     front = optimised(

@@ -61,6 +61,7 @@ def sine_errors(k1, k2, k3, crank_0, follower_0):
     return np.degrees(np.angle(np.exp(1j * (found - follower))))
 
 
+@pytest.mark.nightly
 def test_sine_generator_against_three_exact_values() -> None:
     """F. Freudenstein, Approximate synthesis of four-bar linkages (1955), with Chebyshev's spacing and without it.
 
@@ -125,6 +126,7 @@ def test_straightest_line_between_the_textbooks_steps() -> None:
     assert (optimum["l1"][0], optimum["l3"][0]) == pytest.approx(best.x, abs=1e-5)
 
 
+@pytest.mark.nightly
 def test_path_through_five_points_of_a_line() -> None:
     """Problem 7 of A. P. Morgan and C. W. Wampler, Solving a planar four-bar design using continuation (1990).
 
@@ -162,6 +164,7 @@ def test_path_through_five_points_of_a_line() -> None:
     assert [optimum[name][0] for name in "abcuv"] == pytest.approx(unknown[:5], abs=1e-7)
 
 
+@pytest.mark.nightly
 def test_straightness_against_uniform_speed() -> None:
     """Every design of the front by the closed form; none is better than another in both errors."""
     front = optimised("straight_line_front")["pareto"]

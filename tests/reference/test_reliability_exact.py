@@ -56,6 +56,7 @@ def share_needed(count: int) -> float:
     return CONFIDENCE - 4 * np.sqrt(CONFIDENCE * (1 - CONFIDENCE) / count)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", SAMPLED)
 @pytest.mark.parametrize("limit", ARM)
 def test_intervals_of_the_arm_cover_at_their_rate(method: str, limit: float) -> None:
@@ -63,6 +64,7 @@ def test_intervals_of_the_arm_cover_at_their_rate(method: str, limit: float) -> 
     assert np.mean([covers(table, ARM[limit]).all() for table in tables]) >= share_needed(len(tables))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("limit", ARM)
 def test_importance_sampling_and_auto_are_precise_at_every_limit(limit: float) -> None:
     changes = ("reliability.precision=0.05", "reliability.samples=30000")

@@ -138,6 +138,7 @@ def test_areas_are_the_closed_form_for_every_design() -> None:
     assert table["area"] == pytest.approx(exact, rel=1e-7)
 
 
+@pytest.mark.nightly
 def test_the_equal_weight_optimum_of_the_true_indices() -> None:
     """With accurate integrals it moves from l_min = 1.15 to near 1.10, and the 2-RPR is best at 1.00 throughout."""
     assert optimised("two_rrr").tables["optimum"]["l_min"][6] == pytest.approx(1.10, abs=0.031)
@@ -153,6 +154,7 @@ def sample() -> tuple[dict[str, np.ndarray], int]:
     return {name: np.broadcast_to(np.asarray(value), 48) for name, value in places.items()}, 48
 
 
+@pytest.mark.nightly
 def test_error_estimates_are_honest() -> None:
     """Never smaller than half of the true error, over many designs, and not idle: within the tolerance asked for."""
     places, count = sample()

@@ -26,6 +26,7 @@ def test_scara_covers_its_joints_ranges_but_for_the_post() -> None:
     assert np.diff(around, append=around[0] + 2 * np.pi).max() < np.radians(10)
 
 
+@pytest.mark.nightly
 def test_rrr_platform_at_several_orientations_reaches_three_annuli() -> None:
     """Merlet, Gosselin and Mouly (1998); the exact area by arcs. On the singularities the rods meet or are parallel."""
     study = study_named("rrr_orientations")

@@ -98,6 +98,7 @@ def test_five_bar_has_the_published_jacobian() -> None:
     assert abs(np.linalg.det(jacobian)) == pytest.approx(abs(motion["det_J"][0]), rel=1e-12)
 
 
+@pytest.mark.nightly
 def test_three_telescopic_legs_at_several_orientations() -> None:
     """3-RPR: J.-P. Merlet, C. M. Gosselin and N. Mouly, Workspaces of planar parallel manipulators, MMT 33 (1998).
 
@@ -108,6 +109,7 @@ def test_three_telescopic_legs_at_several_orientations() -> None:
     assert found["area"] == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_three_cranks_at_several_orientations() -> None:
     """3-RRR: a leg of two links reaches an annulus too (Merlet, Gosselin and Mouly)."""
     found = mechdesign.workspace(study_of(RRR)).main
@@ -137,6 +139,7 @@ def test_the_arcs_against_counted_points() -> None:
         assert common_area(legs(0.3, 0.75, angle)) == pytest.approx(inside.sum() * 1e-6, abs=2e-4)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("every", "inside"), [(False, turning.reached), (True, turning.always)])
 @pytest.mark.parametrize(("study", "held", "bounds"), [
     (RPR, "[0, 15, -30]", (0.3, 0.75)),
@@ -169,6 +172,7 @@ def test_the_turning_legs_against_counted_orientations() -> None:
     assert np.mean(turning.always(z, reach, *span) != held.all(axis=0)) < 2e-3
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("measures", ["{}", "{turn: platform.angle*1}"])
 def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> None:
     """Whether the inverse problem has a closed form or, for a measure that is an expression, has none."""
@@ -206,6 +210,7 @@ def aligned(z: np.ndarray, phi: float, cranked: bool) -> tuple[np.ndarray, np.nd
     return good, np.linalg.det(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize(("study", "held", "cranked", "drawn", "span"), [
     (RPR, "[0, 15, -30]", False, 0.52 + 0.34j, (-20, -5)),
@@ -234,6 +239,7 @@ def test_over_a_range_the_assembly_of_the_sketch(
     assert abs(area - sector * share) <= doubt + error
 
 
+@pytest.mark.nightly
 def test_a_range_is_sampled_closely_enough_for_what_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twice as many samples of the range give the same area; with half as many a stretch was missed, 2e-4 of it."""
     sector = RPR.replace("[0, 15, -30]", "{from: -10, to: 25}").replace("assembly: any", "assembly: same")

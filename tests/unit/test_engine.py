@@ -201,6 +201,7 @@ def test_the_same_seed_gives_the_same_bits() -> None:
     assert sampled(case.problem, 5).failure != sampled(case.problem, 6).failure
 
 
+@pytest.mark.slow
 def test_design_points_leave_no_wide_gap_on_a_circle() -> None:
     """Where all of a circle is as near, what lies in a gap between its points is not sampled, and not missed."""
     for seed in range(40):

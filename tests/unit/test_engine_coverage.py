@@ -56,6 +56,7 @@ def plain(problem: Problem, seed: int, count: int) -> Estimate:
     return Estimate(broken / count, *binomial(broken, count), count, count, broken)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_importance_sampling(case: Case) -> None:
     intervals = []
@@ -68,6 +69,7 @@ def test_importance_sampling(case: Case) -> None:
     check(intervals, case.exact)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("case", HARD.values(), ids=HARD)
 def test_importance_sampling_of_many_places_of_failure(case: Case) -> None:
     """One limit that is broken in many corners, or in boxes where nothing has a slope."""
@@ -81,6 +83,7 @@ def test_importance_sampling_of_many_places_of_failure(case: Case) -> None:
     check(intervals, case.exact)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["four_branches", "parabola", "ring"])
 def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
     case, intervals = CASES[name], []
@@ -92,6 +95,7 @@ def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
     check(intervals, case.exact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "samples"), [("half_space_2", 2**14), ("parabola", 2**17), ("half_space_5", 2**15)])
 def test_quasi_monte_carlo(name: str, samples: int) -> None:
     """Where replicates give the interval, and not the few failures."""
@@ -101,6 +105,7 @@ def test_quasi_monte_carlo(name: str, samples: int) -> None:
     check([(each.low, each.high) for each in found], case.exact)
 
 
+@pytest.mark.slow
 def test_quasi_monte_carlo_of_few_failures() -> None:
     case = CASES["four_branches"]
     found = [quasi_monte_carlo(case.problem, 16 * seed, 2**12) for seed in range(50)]
@@ -108,6 +113,7 @@ def test_quasi_monte_carlo_of_few_failures() -> None:
     check([(each.low, each.high) for each in found], case.exact)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "used"), [
     ("half_space_2", "monte_carlo"), ("four_branches_in_one", "importance_sampling"), ("ring", "importance_sampling"),
 ])  # fmt: skip

@@ -37,6 +37,7 @@ def precise(found: Estimate, precision: Precision) -> bool:
     return reached(precision, found.failure, found.low, found.high)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("case", "share", "used"), [
     (limit_states.linear(3, 0.0), 0.2, "monte_carlo"),
     (limit_states.linear(3, 1.0), 0.05, "monte_carlo"),

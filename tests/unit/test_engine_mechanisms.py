@@ -68,6 +68,7 @@ def estimates(result: Result) -> dict[str, Estimate]:
     return dict(zip(table["method"].tolist(), (Estimate(*row) for row in zip(*columns, strict=True)), strict=True))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", STUDIES)
 def test_methods_agree(name: str) -> None:
     methods = "reliability.methods=[monte_carlo, quasi_monte_carlo, form, importance_sampling, auto]"
@@ -113,6 +114,7 @@ def tangents() -> float:
     return float(1 - stats.multivariate_normal(cov=normal @ normal.T, allow_singular=True, seed=0).cdf(distance))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["newton_group", "contact"])
 def test_the_number_of_threads_and_a_second_run_change_nothing(name: str) -> None:
     changes = ("reliability.methods=[form, importance_sampling, auto]", "reliability.samples=4000")
@@ -123,6 +125,7 @@ def test_the_number_of_threads_and_a_second_run_change_nothing(name: str) -> Non
             assert column.values.tobytes() == threads.tables[key][column.name].tobytes()
 
 
+@pytest.mark.nightly
 def test_auto_along_a_sweep() -> None:
     sweep = ["reliability.poses=null", "reliability.sweep={theta1: {from: 0, to: 360, step: 15}, theta2: 60}"]
     result = ask("correlation", "reliability.methods=[auto, quasi_monte_carlo]", "reliability.precision=0.0673", *sweep)

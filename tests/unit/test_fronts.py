@@ -14,6 +14,7 @@ def by_definition(values: Floats) -> Flags:
     return np.asarray(~smaller.any(axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goals", [1, 2, 3, 4, 5])
 @pytest.mark.parametrize("levels", [2, 5, 40, 0])
 def test_a_front_is_what_no_other_point_surpasses(goals, levels):
@@ -27,6 +28,7 @@ def test_no_points_have_no_front():
     assert front(np.empty((0, 3))).shape == (0,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goals", [2, 3, 4])
 def test_points_of_a_sphere_are_all_on_the_front_and_nothing_outside_of_it_is(goals):
     directions = np.abs(np.random.default_rng(3).standard_normal((20_000, goals))) + 1e-3

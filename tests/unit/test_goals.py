@@ -71,6 +71,7 @@ def agree(study: Study, goals: list[Goal], designs: Designs, *, together: bool =
     assert (lost == ~feasible).all()
 
 
+@pytest.mark.slow
 def test_values_ranges_and_errors_of_a_sweep() -> None:
     """A function generator: parameters that others follow from, targets that depend on them, angles without jumps."""
     names = ["frame", "crank.length"]
@@ -97,6 +98,7 @@ def test_targets_follow_the_parameters_of_each_design() -> None:
     agree(study, goals, {"follower_0": np.array([20.0, 25.0, 30.0, 35.0])})
 
 
+@pytest.mark.slow
 def test_full_turns_with_derivatives_and_refined_extremes() -> None:
     """A crank-rocker, some designs of which no longer turn fully."""
     names = ["crank.length", "coupler.length", "ground.D.x", "coupler.C.y"]
@@ -116,6 +118,7 @@ def test_full_turns_with_derivatives_and_refined_extremes() -> None:
     assert "a pose cannot be assembled" in reasons
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["gallery/jansen.yaml", "gallery/slider_crank.yaml", "gallery/whitworth.yaml"])
 def test_studies_of_the_gallery(path: str) -> None:
     names = [name for name in mechdesign.load(CONFIGS / path).mechanism.nominal if name.endswith(".length")][:3]
@@ -133,6 +136,7 @@ def test_groups_without_a_closed_form_start_from_their_own_sketch() -> None:
     agree(study, goals, around(study, names, 1, 0.02))
 
 
+@pytest.mark.slow
 def test_jacobian_and_limits_of_listed_poses() -> None:
     study = varied("five_bar.yaml", ["R", "lower_1.length", "limits.0.max"])
     goals = [goal("kinematics.inverse_condition"), goal("kinematics.det_J"), goal("kinematics.jacobian.C.x_by_q1")]
@@ -149,6 +153,7 @@ def test_stiffness(path: str) -> None:
     agree(study, goals, around(study, names, 5, 0.05))
 
 
+@pytest.mark.slow
 def test_what_has_no_common_tables_is_asked_of_each_design() -> None:
     """Here a tolerance is a part of what is varied, and so follows it."""
     tolerance = "reliability.dimensions.r1=0.003*r1"
@@ -172,6 +177,7 @@ reliability:
 """
 
 
+@pytest.mark.slow
 def test_first_order_errors_of_many_designs() -> None:
     """Parameters, lengths, points, directions, pins; positions, velocities and accelerations."""
     names = ["ground.G.y", "rod.P.y", "guide.direction", "guide.angle", "slider.S.x", "crank.length"]
@@ -190,6 +196,7 @@ def test_first_order_errors_of_many_designs() -> None:
     agree(study, goals, around(study, names, 5, 0.1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "names"),
     [
@@ -203,6 +210,7 @@ def test_first_order_errors_of_the_configurations(path: str, names: list[str]) -
     agree(study, judged, around(study, names, 4, 0.05))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
@@ -237,6 +245,7 @@ def test_workspaces_where_the_section_depends_on_a_variable() -> None:
         assert np.ptp(found.table[:2, k]) > 0
 
 
+@pytest.mark.slow
 def test_stiffness_as_an_index_of_the_workspace() -> None:
     study = varied("five_bar.yaml", ["lower_1.length"], "workspace={point: C, integrate: {tolerance: 1e-2}}")
     wanted = goal("workspace.k_min_mean")
@@ -274,6 +283,7 @@ kinematics: {sweep: {crank: {from: 0, to: 300, number: 6}}, outputs: [P, S]}
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "name", "value", "output"),
     [
@@ -516,6 +526,7 @@ def test_the_unit_of_an_expression_is_given_where_it_is_known(expression: str, u
     assert unit_of(study_of(FOUR_BAR), expression) == unit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["search", "pareto"])
 def test_expressions_alone_are_searched(method: str) -> None:
     section = f"""

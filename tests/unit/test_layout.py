@@ -5,6 +5,8 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 import mechdesign
 
 ROOT = Path(mechdesign.__file__).parent
@@ -60,6 +62,7 @@ def rank(name: str) -> int:
     return RANKS[name]
 
 
+@pytest.mark.slow
 def test_no_file_imports_itself_by_way_of_others():
     # A cycle raises an error that names its files. The door of the package imports what is asked of it by name.
     TopologicalSorter({name: used - {"mechdesign.__init__"} for name, used in imports().items()}).prepare()

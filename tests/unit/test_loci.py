@@ -63,6 +63,7 @@ def each(table: Table) -> list[tuple[str, str, np.ndarray]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]"])
 def test_forward_singularities_of_a_five_bar(about: str) -> None:
     """Both forearms in line: with elbows out, both on the same side of P, so that the elbows meet at (0, +-0.2).
@@ -84,6 +85,7 @@ def test_forward_singularities_of_a_five_bar(about: str) -> None:
         assert steps.sum() == pytest.approx(2 * 0.4 * np.arcsin(0.24 / 0.4), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_they_bound_the_region_of_one_assembly() -> None:
     """The same curves, now told as the boundary: to the corners where a leg is folded or stretched as well."""
     tables = {
@@ -101,6 +103,7 @@ def test_they_bound_the_region_of_one_assembly() -> None:
     assert lengths["same"] == pytest.approx(lengths["any"], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_inverse_singularities_lie_where_a_leg_is_stretched_or_folded() -> None:
     curves = each(mechdesign.workspace(study_of(FIVE_BAR, "workspace.assembly=any")).tables["singularities"])
     told = {"left-fore_left": -0.15, "right-fore_right": 0.15}
@@ -132,6 +135,7 @@ def test_limits_are_named_by_what_they_limit() -> None:
         assert np.abs(z[rows] - base) == pytest.approx(np.full(rows.sum(), length), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_every_boundary_point_of_an_arm_says_why() -> None:
     """Stretched and folded on circles about the base; the joint limit's arcs on circles about the held elbow."""
     edge = mechdesign.workspace(study_of(ARM)).tables["boundary"]

@@ -184,6 +184,7 @@ def test_the_default_front_has_nearly_all_of_the_hypervolume(name):
     assert (np.diff(growth["hypervolume"]) >= -1e-12).all()
 
 
+@pytest.mark.nightly
 def test_optima_of_a_front_are_its_knee_and_its_ends():
     """The second goal leaves y free: of designs that are best in the first the best in the second is the end."""
     formulas = {"f1": "1 + (x1 - 0.5)**2", "f2": "(x1 - 0.75)**2 + (x2 - 0.25)**2"}
@@ -201,6 +202,7 @@ def test_optima_of_a_front_are_its_knee_and_its_ends():
     assert weighted.tables["optimum"]["what"].tolist() == ["knee", "best f1", "best f2", "weights"]
 
 
+@pytest.mark.nightly
 def test_a_front_of_three_goals_is_a_surface():
     """DTLZ2, an eighth of the unit sphere; few evaluations are no error."""
     for evaluations in (40, 6000):

@@ -32,6 +32,7 @@ kinematics: {poses: [{q1: 0, q2: 30}]}
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("command", "study", "options", "expected"), [
     ("kinematics", FOUR_BAR, {"all_modes": True}, {"motion.png", "paths.png", "modes.png", "mechanism.png"}),
     ("workspace", ARM, {}, {"workspace.png"}),

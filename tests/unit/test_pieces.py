@@ -128,6 +128,7 @@ def check(result: Result, filled: Filled, number: int) -> None:
     assert f"{pieces['area'][1:].sum():.4g}" in warning
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]", "[0.7, 0.1]", "[0, -0.3]"])
 def test_two_pieces_of_equal_determinant_signs(about: str) -> None:
     """Limits of the motors cut what the assembly leaves in two: seen from inside, from between, and from outside."""
@@ -139,6 +140,7 @@ def test_two_pieces_of_equal_determinant_signs(about: str) -> None:
     assert result.main["rectangle_y"][0] > 0.2
 
 
+@pytest.mark.slow
 def test_means_and_extremes_are_of_the_sketchs_piece() -> None:
     """As of a scan that meets nothing else."""
     text = (FIVE_BAR, "workspace.indices=[inverse_condition, resistivity]")
@@ -150,6 +152,7 @@ def test_means_and_extremes_are_of_the_sketchs_piece() -> None:
         assert one[name][0] == pytest.approx(alone.main[name][0], rel=1e-4), name
 
 
+@pytest.mark.slow
 def test_a_piece_over_angle_zero_is_one() -> None:
     """Two lenses left and right of a gap along the vertical, seen from the middle: the right one lies about angle 0."""
     limits = f"mechanism.limits=[{WIDE}, {{measure: across, min: 0.2}}]"
@@ -166,6 +169,7 @@ def test_a_piece_over_angle_zero_is_one() -> None:
     assert result.tables["pieces"]["x"][0] < 0 < result.tables["pieces"]["x"][1]
 
 
+@pytest.mark.nightly
 def test_pieces_that_touch_in_the_centre_of_the_scan_are_two() -> None:
     """x y > 0 within two rings about bases on the axis: opposite quadrants meet in one point."""
     limits = f"mechanism.limits=[{WIDE}, {{measure: d, min: 0}}]"
@@ -193,6 +197,7 @@ def test_a_hole_that_cuts_a_ring_in_two() -> None:
     assert result.tables["pieces"]["y"][0] > 0
 
 
+@pytest.mark.slow
 def test_the_largest_piece_counts_where_the_sketch_lies_in_none() -> None:
     """Drawn in the gap, right of its middle."""
     limits = f"mechanism.limits=[{WIDE}, {{measure: across, min: 0.2}}]"
@@ -221,6 +226,7 @@ def values(names: Sequence[str], changes: dict[str, np.ndarray], text: str) -> d
     return dict(zip(names, found.table.T, strict=False))
 
 
+@pytest.mark.nightly
 def test_optimize_judges_the_piece_that_workspace_reports() -> None:
     """Designs of one, two and three pieces in a batch, each beside a study of its own."""
     names = ("GII", "SUI", "workspace.area", "workspace.resistivity_min")
@@ -246,6 +252,7 @@ THIN = {
 }
 
 
+@pytest.mark.nightly
 def test_optimize_finds_thin_gaps_and_tips() -> None:
     """As a study of its own that is looked at more closely."""
     names = {"workspace.area": 1e-6, "GII": 1e-5, "SUI": 1e-6}
@@ -269,6 +276,7 @@ def design_area(text: str, limit: str, sizes: str) -> float:
     return float(mechdesign.optimize(study).tables["designs"]["area"][0])
 
 
+@pytest.mark.slow
 def test_breaks_between_alike_rays_do_not_lose_a_piece() -> None:
     """A bay that opens and ends between two rays: its neighbours were no part of any piece."""
     text = """
@@ -330,6 +338,7 @@ workspace: {point: P, indices: []}
 """
 
 
+@pytest.mark.slow
 def test_an_expression_that_turns_often_along_a_ray() -> None:
     """Three sectors of an arm, of which the sketch's counts."""
     text = SECTORS.replace("A: [5, 4], P: [5, 11]", "A: [8, 6], P: [8, 12]")
@@ -338,6 +347,7 @@ def test_an_expression_that_turns_often_along_a_ray() -> None:
     assert found == pytest.approx(4 * np.pi * 6.585 * 7.825 * np.arccos(-0.622222) / (3 * np.pi), rel=1e-4)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hand", ["[5, 11]", "[3, 8]"])
 @pytest.mark.parametrize(
     ("measure", "limit", "sizes", "angle"),
@@ -361,6 +371,7 @@ def test_sectors_that_nearly_meet_beside_a_pin(
     assert answer(question, {}, 1, SINGLE).values["area"][0] == pytest.approx(exact, rel=1e-7)
 
 
+@pytest.mark.slow
 def test_a_gap_beside_where_the_arm_is_folded() -> None:
     """A band of 12 degrees is left out: of a ray only what lies between its first two samples."""
     sizes = 7.2289861088316592, 7.2385926641287055
@@ -372,6 +383,7 @@ def test_a_gap_beside_where_the_arm_is_folded() -> None:
     assert found == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
     names = ("workspace.area", "GII", "SUI")
     together = values(names, THIN, FIVE_BAR)
@@ -381,6 +393,7 @@ def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
             assert together[name][k] == pytest.approx(alone[name][0], rel=1e-9), (name, k)
 
 
+@pytest.mark.slow
 def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
     poses = workspace_nodes(study_of(FIVE_BAR))
     (group,) = poses.groups
@@ -407,6 +420,7 @@ workspace: {point: P, indices: []}
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, -0.18]", "[0, -0.157]", "[3, 1]", "[90, 0]"])
 def test_a_determinant_that_touches_zero_on_a_circle_divides_nothing(about: str) -> None:
     """The two rings' common part below the motors, from anywhere: by a fine grid."""
@@ -430,6 +444,7 @@ TOO_WIDE = [
 ]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("changes", TOO_WIDE)
 def test_a_scan_is_a_turn_at_most(changes: tuple[str, ...]) -> None:
     with pytest.raises(StudyError, match="more than a turn beyond 'from'"):
@@ -439,6 +454,7 @@ def test_a_scan_is_a_turn_at_most(changes: tuple[str, ...]) -> None:
     assert area[1] == pytest.approx(area[0], rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_more_beyond_the_assembly_is_told_with_both_areas() -> None:
     # Two legs of up to 2 reach a lens, and the assembly ends on its middle line; a limit leaves a strip on one side.
     below = 4 * np.pi / 3 - np.sqrt(3)

@@ -161,6 +161,7 @@ def test_every_link_has_its_own_end_of_a_pin(case: Case) -> None:
                for point, links in case.pins.items() if point in case.springs and "ground" not in links)  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_plain_name_of_a_pin_is_midway_between_its_links_and_of_a_pin_on_the_ground_fixed(case: Case) -> None:
     expected, _ = case.solve()
@@ -195,6 +196,7 @@ def test_the_spring_in_a_slider_cranks_rod(theta: float) -> None:
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["analytic", "second_order", "monte_carlo", "form", "auto"])
 def test_a_limit_is_of_the_end_that_it_names(method: str) -> None:
     """The slider's end errs by F / (k cos^2 b) with F of 500 +- 50: 0.3 is far below, and 0.6 hardly above."""
@@ -250,6 +252,7 @@ def test_a_measure_of_a_plain_pin_that_gives_is_told() -> None:
     assert not midway(mechdesign.reliability(rigid))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_stiffness_of_an_end(case: Case) -> None:
     """A force on the end itself; with its link as a body the same, and a moment besides."""
@@ -299,6 +302,7 @@ def test_what_cannot_be_meant_is_refused(changes: list[str], message: str) -> No
         study_of(SLIDER_CRANK, *changes)
 
 
+@pytest.mark.nightly
 def test_the_point_of_a_workspace_may_be_an_end() -> None:
     """The map says of every node what the question says there."""
     from mechdesign.analyses.poses import study_poses

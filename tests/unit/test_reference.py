@@ -35,6 +35,7 @@ def test_every_key_has_a_text():
             assert form["title"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "example"), EXAMPLES, ids=[f"{key.path}-{text}" for key, text in EXAMPLES])
 def test_every_example_is_read(key: Key, example: str):
     document = read(f"{key.name}: {example}".encode(), key.path)

@@ -75,6 +75,7 @@ def uniform(half: float) -> np.ndarray:
     return random.uniform(-half, half, SAMPLES) + 1j * random.uniform(-half, half, SAMPLES)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[1.2, 0.3]", "[-0.7, 0.9]", "[6, 1]"])
 def test_crescent_of_an_arm_with_joint_limits(about: str) -> None:
     """dA = a b |sin q2| dq1 dq2, seen from anywhere: thin parts along the rays and between them are met."""
@@ -84,6 +85,7 @@ def test_crescent_of_an_arm_with_joint_limits(about: str) -> None:
     assert error < 1e-5 * exact
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[1, 1]"])
 def test_joint_limits_just_short_of_a_turn(about: str) -> None:
     """Half a degree short of stretched and folded, and a narrow gap all across: slivers wherever one looks from."""
@@ -92,6 +94,7 @@ def test_joint_limits_just_short_of_a_turn(about: str) -> None:
     assert found == pytest.approx(1.5 * np.radians(320) * 2 * np.cos(np.radians(1)), rel=1e-7)
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_forearm_gives_two_arcs_and_their_sweep() -> None:
     """The forearm within 120 deg of the world: the elbow's circle moved along, with the elbow on one side only."""
     limits = "mechanism.limits=[{angle: [ground, lower], min: -60, max: 60}]"
@@ -100,6 +103,7 @@ def test_a_limit_of_the_forearm_gives_two_arcs_and_their_sweep() -> None:
     assert found == pytest.approx(1.5 * 2 * np.pi / 3 * 2, rel=1e-6)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]", "[0.6, 0.3]"])
 def test_five_bar_with_holes(about: str) -> None:
     """Common part of two rings about the motors: a known area, seen from the hole, from inside, outside."""
@@ -108,6 +112,7 @@ def test_five_bar_with_holes(about: str) -> None:
     assert error < 1e-6
 
 
+@pytest.mark.slow
 def test_five_bar_cut_by_limits_and_singularities() -> None:
     """Against samples whose legs are solved here: elbows out, motors within limits."""
     limits = "mechanism.limits=[{drive: t1, min: 30, max: 200}, {drive: t2, min: -20, max: 150}]"
@@ -140,6 +145,7 @@ def rings(low: float, high: float) -> float:
     return lens(high, high, 2) - 2 * lens(low, high, 2) + lens(low, low, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("low", "high", "about"),
     [
@@ -161,6 +167,7 @@ def test_common_part_of_two_rings(low: float, high: float, about: str) -> None:
     assert found == pytest.approx(rings(low, high), rel=1e-7)
 
 
+@pytest.mark.slow
 def test_a_band_of_a_measure_leaves_pieces() -> None:
     limits = (
         "mechanism.limits=[{drive: l1, min: low, max: high}, {drive: l2, min: low, max: high}, "
@@ -181,6 +188,7 @@ def reached(z: np.ndarray, degrees: float) -> np.ndarray:
     return np.asarray(((lengths >= [0.4, 0.4, 0.3]) & (lengths <= [1.4, 1.4, 1.6])).all(axis=1))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("every", [False, True])
 def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
     """Where some orientation is reached, and where every one is."""
@@ -198,6 +206,7 @@ def test_a_platform_over_a_range_of_orientations(every: bool) -> None:
     assert (np.abs(edge["platform.angle"]) <= 10).all()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("low", [0, -60])
 def test_a_limit_on_half_an_angle(low: float) -> None:
     """The angle lies within half a turn of the sketch's 127 deg: at -53 deg its half jumps from -27 to 153.
@@ -219,6 +228,7 @@ def test_a_limit_on_half_an_angle(low: float) -> None:
     assert found or any("jumps" in warning for warning in result.warnings)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("degrees", [-15, 0, 10, 40])
 def test_a_platform_at_constant_orientation(degrees: float) -> None:
     """The common part of three rings about the bases moved by the platform's points: area by arcs."""
@@ -232,6 +242,7 @@ def test_a_platform_at_constant_orientation(degrees: float) -> None:
     assert found["area"][0] == pytest.approx(common_area(rings_there), rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effort", [BATCH, SINGLE], ids=["batch", "single"])
 @pytest.mark.parametrize("assembly", ["any", "same"])
 def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effort) -> None:

@@ -55,6 +55,7 @@ def pick(result: Result, table: str, column: str, **chosen: object) -> np.ndarra
     return found[column][rows]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["two_link_arm", "toggle"])
 def test_the_number_of_threads_changes_no_bit(name: str) -> None:
     study = mechdesign.load(CONFIGS / f"{name}.yaml", overrides=["reliability.samples=20000"])
@@ -253,6 +254,7 @@ def test_a_listed_pose_that_fails_is_named_and_the_others_are_computed(tmp_path:
         ask(tmp_path, SLIDER_CRANK.replace("{theta: 60}", "{B.x: 500}"), "dimensions: {a: 0.3}")
 
 
+@pytest.mark.slow
 def test_moments_along_a_sweep_import_no_scipy(tmp_path: Path) -> None:
     """It takes as long to import as a thousand samples at every pose of a cycle take to draw."""
     file = tmp_path / "study.yaml"

@@ -56,6 +56,7 @@ def row(result: Result, method: str) -> dict[str, Any]:
     return {column.name: column.values[rows[0]] for column in table.columns}
 
 
+@pytest.mark.slow
 def test_share_of_four_bars_that_cannot_turn_fully() -> None:
     """0.02975 of 1, 3.5, 3, 4 with +-0.8 on crank, coupler and rocker; both extremes, 0 and 180 deg, are poses."""
     result = ask(FOUR_BAR, jobs=2)
@@ -115,6 +116,7 @@ NODES = ["workspace.point=P", "workspace.scan.rays=3", "workspace.scan.about=[0,
 GRID = "sweep: {theta1: {from: 30, to: 50, number: 3}, theta2: {from: 40, to: 60, number: 3}}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("poses", "scopes"),
     [
@@ -141,6 +143,7 @@ def test_a_cycle_through_a_pose_that_cannot_be_assembled_has_no_probability() ->
     assert not found["valid"]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["monte_carlo", "quasi_monte_carlo", "auto"])
 def test_the_number_of_threads_changes_nothing(method: str) -> None:
     change = f"reliability.methods=[{method}]"
@@ -156,6 +159,7 @@ def test_auto_stops_at_its_precision() -> None:
     assert found["samples"] < 100_000
 
 
+@pytest.mark.slow
 def test_auto_tells_that_its_precision_was_not_reached() -> None:
     changes = ["reliability.methods=[auto]", "reliability.precision=0.01", "reliability.samples=20000"]
     result = ask(FOUR_BAR, *changes)
@@ -177,6 +181,7 @@ def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bou
     assert f"monte_carlo: no failure in 40000 made mechanisms over the whole cycle: {told}" in result.warnings
 
 
+@pytest.mark.slow
 def test_an_interrupt_gives_the_cycles_that_were_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = 0
     whole = cycle.count_chunk

@@ -121,6 +121,7 @@ def test_where_several_limits_and_a_dead_centre_count_simulation_agrees() -> Non
     assert capability["ppm"].min() >= 1e6 * ndtr(-3.5 / (math.hypot(1, 2, 1.5, 3) / 3)) * (1 - 1e-3)
 
 
+@pytest.mark.slow
 def test_links_that_are_solved_together() -> None:
     """Equal legs cannot be shorter than 1 on the mean; the probability is that of their mean but for curvature."""
     text = platform(6.0)

@@ -86,6 +86,7 @@ def batch_of(study, names, count=6, width=0.2, seed=1):
     return Designs(study, {name: study.sizes[name] * (1 + width * rng.uniform(-1, 1, count)) for name in names})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_all_designs_at_once_are_each_by_itself(kind):
     text, section, names = KINDS[kind]
@@ -123,6 +124,7 @@ def test_loads_and_measured_values_follow_designs(tmp_path):
     check(mechdesign.load(study), ["k", "t"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [["s"], ["w"], ["k", "half", "r"], ["rod.T.x", "rod.T.y"]], ids="-".join)
 def test_what_yields_under_the_load_follows_designs(names):
     """Sections, actuators, bearings and loads, and the points along a link that bends."""

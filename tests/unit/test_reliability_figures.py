@@ -82,6 +82,7 @@ def texts(figure: Figure) -> str:
     return " ".join(text.get_text() for text in figure.texts)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_alone_is_drawn(method: str) -> None:
     found, _ = drawn(SLIDER, LISTED, f"reliability.methods=[{method}]")
@@ -90,6 +91,7 @@ def test_every_method_alone_is_drawn(method: str) -> None:
     assert legend(found["reliability"])[0].startswith(look(method).words)
 
 
+@pytest.mark.slow
 def test_a_listed_pose_without_a_value_is_left_empty() -> None:
     found, _ = drawn(ARM, "reliability.poses=[{q1: 30, q2: 90}, {P.x: 300, P.y: 0}]",
                      "reliability.methods=[analytic, monte_carlo]")  # fmt: skip
@@ -103,6 +105,7 @@ def test_methods_look_different() -> None:
         assert len({getattr(look(name), aspect) for name in METHODS}) == len(METHODS)
 
 
+@pytest.mark.slow
 def test_intervals_are_drawn_where_a_method_claims_one() -> None:
     found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
     axes = found["reliability"].axes[0]
@@ -114,6 +117,7 @@ def test_intervals_are_drawn_where_a_method_claims_one() -> None:
     assert legend(found["reliability"]) == ["first order", "FORM", "Monte Carlo"]
 
 
+@pytest.mark.slow
 def test_auto_tells_what_it_used_and_what_it_cost() -> None:
     found, result = drawn(SLIDER, LISTED, "reliability.methods=[auto]", "reliability.limits.B.x=0.5")
     table = result.tables["reliability"]
@@ -122,6 +126,7 @@ def test_auto_tells_what_it_used_and_what_it_cost() -> None:
     assert legend(found["reliability"]) == [f"auto by {look(used).words}, {table['evaluations'].sum():,} solved"]
 
 
+@pytest.mark.slow
 def test_no_failure_seen_is_an_arrow_at_the_upper_end() -> None:
     found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic, monte_carlo]",
                           "reliability.limits.B.x=1.2")  # fmt: skip
@@ -134,6 +139,7 @@ def test_no_failure_seen_is_an_arrow_at_the_upper_end() -> None:
     assert axes.get_yscale() == "log"
 
 
+@pytest.mark.slow
 def test_sweep_has_bands_with_limits_and_the_cycle() -> None:
     found, result = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]")
     assert set(found) == {"bands", "means", "deviations", "difference", "reliability", "contributions", "histogram",
@@ -151,6 +157,7 @@ def test_sweep_has_bands_with_limits_and_the_cycle() -> None:
     assert {"whole cycle, bounds by first order", "whole cycle, Monte Carlo"} <= set(legend(found["reliability"]))
 
 
+@pytest.mark.slow
 def test_a_far_limit_does_not_squeeze_the_bands() -> None:
     found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic]", "reliability.limits.B.x={max: 9}")
     (axes,) = found["bands"].axes
@@ -158,6 +165,7 @@ def test_a_far_limit_does_not_squeeze_the_bands() -> None:
     assert axes.get_title(loc="right") == "limit +9 mm, outside"
 
 
+@pytest.mark.slow
 def test_velocities_have_panels_and_limits_of_their_own() -> None:
     found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]", "reliability.rates={crank: 60}",
                      "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
@@ -174,6 +182,7 @@ def steps(axes):
     return [patch.get_data()[:2] for patch in axes.patches if isinstance(patch, StepPatch)]
 
 
+@pytest.mark.slow
 def test_histogram_shows_every_sample_its_failures_and_the_limits() -> None:
     found, result = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
     for axes in found["histogram"].axes:
@@ -190,6 +199,7 @@ def test_histogram_shows_every_sample_its_failures_and_the_limits() -> None:
     assert "2,000 samples" in texts(found["histogram"])
 
 
+@pytest.mark.slow
 def test_pictures_of_samples_show_the_pose_that_fails_most_and_say_so() -> None:
     found, result = drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", "reliability.methods=[monte_carlo]")
     failure = result.tables["reliability"]["failure"]
@@ -199,6 +209,7 @@ def test_pictures_of_samples_show_the_pose_that_fails_most_and_say_so() -> None:
         assert set(result.tables[name]["crank"]) == {10}
 
 
+@pytest.mark.slow
 def test_a_study_may_choose_the_pose_whose_samples_are_shown() -> None:
     found, result = drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", "reliability.methods=[monte_carlo]",
                           "reliability.shown=1")  # fmt: skip
@@ -216,6 +227,7 @@ def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None
         drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", *overrides)
 
 
+@pytest.mark.slow
 def test_a_far_limit_is_told_in_words() -> None:
     found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
     axes = found["histogram"].axes[0]
@@ -223,6 +235,7 @@ def test_a_far_limit_is_told_in_words() -> None:
     assert max(abs(x) for x in axes.get_xlim()) < 2
 
 
+@pytest.mark.slow
 def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
     found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]")
     axes = found["histogram"].axes
@@ -235,6 +248,7 @@ def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
     assert failed.any()
 
 
+@pytest.mark.slow
 def test_estimate_stands_beside_the_other_methods() -> None:
     found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
     (axes,) = found["estimate"].axes
@@ -258,6 +272,7 @@ def limit_of(axes):
     return found
 
 
+@pytest.mark.slow
 def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
     axes, figure, _ = contours("reliability.methods=[auto]")
     assert limit_of(axes).get_radius() == 0.25
@@ -268,6 +283,7 @@ def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
     assert "auto: holds 90 %" in legend(figure)
 
 
+@pytest.mark.slow
 def test_ellipses_hold_their_shares() -> None:
     axes, _, result = contours("reliability.methods=[analytic, monte_carlo]")
     samples = result.drawn["samples"]
@@ -295,6 +311,7 @@ def test_smoothed_regions_hold_their_shares_and_end_where_samples_end() -> None:
     assert smoothed(errors[:, :50]) is None
 
 
+@pytest.mark.slow
 def test_samples_that_fail_are_marked() -> None:
     axes, figure, result = contours("reliability.methods=[monte_carlo]")
     (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
@@ -304,6 +321,7 @@ def test_samples_that_fail_are_marked() -> None:
     assert f"2,000 samples, {failures} of them fail" in texts(figure)
 
 
+@pytest.mark.slow
 def test_open_and_far_limits_of_a_density() -> None:
     axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits={P.x: {max: 0.2}, P.y: 9}")
     (left, low), (right, high) = limit_of(axes).get_bbox().get_points()
@@ -314,12 +332,14 @@ def test_open_and_far_limits_of_a_density() -> None:
     assert "limits outside: -9 mm of P.y, +9 mm of P.y" in texts(figure)
 
 
+@pytest.mark.slow
 def test_a_far_circle_of_a_density_is_told() -> None:
     axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits.P.radius=9")
     assert texts(figure).endswith("limit: 9 mm from no error, outside")
     assert not axes.patches
 
 
+@pytest.mark.nightly
 def test_density_of_velocities_has_their_limits() -> None:
     axes, _, _ = contours("reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
                           "reliability.limits={P.x_velocity: 0.3, P.y_velocity: {min: -0.2, max: 0.3}}")  # fmt: skip
@@ -327,6 +347,7 @@ def test_density_of_velocities_has_their_limits() -> None:
     assert axes.get_xlabel() == "P.x velocity error [mm/s]"
 
 
+@pytest.mark.nightly
 def test_density_of_an_output_and_its_velocity() -> None:
     axes, _, result = contours("reliability.methods=[monte_carlo]", "reliability.rates={q1: 60, q2: 30}",
                                "reliability.limits={P.x: 0.2, P.x_velocity: 0.3}")  # fmt: skip
@@ -337,6 +358,7 @@ def test_density_of_an_output_and_its_velocity() -> None:
     assert axes.get_aspect() == "auto"
 
 
+@pytest.mark.slow
 def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
     axes, _, result = contours("reliability.methods=[monte_carlo]",
                                "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip
@@ -352,6 +374,7 @@ def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
     assert left < -0.25 < table["P.x_error"].max() < right
 
 
+@pytest.mark.slow
 def test_workspace_has_maps() -> None:
     found, _ = drawn(ARM, "reliability.poses=workspace", "reliability.methods=[analytic]")
     assert set(found) == {"deviation_map", "failure_map", "contributions"}
@@ -364,6 +387,7 @@ def test_workspace_has_maps() -> None:
     assert np.hypot(*lines[0].get_xydata().T) == pytest.approx(np.full(len(lines[0].get_xdata()), 20.0), abs=0.1)
 
 
+@pytest.mark.slow
 def test_grid_of_drives_has_maps_over_them() -> None:
     found, _ = drawn(ARM, "reliability.sweep={q1: {from: 0, to: 60, step: 20}, q2: {from: 80, to: 140, step: 15}}",
                      "reliability.methods=[analytic]")  # fmt: skip
@@ -398,6 +422,7 @@ def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
     assert len(z) > 300
 
 
+@pytest.mark.slow
 def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [80, 100], [70, 90], [60, 100]]}"
     found, _ = drawn(ARM, path, "reliability.methods=[analytic]")
@@ -411,6 +436,7 @@ def test_a_sweep_of_a_single_pose_is_drawn_as_one_that_is_listed() -> None:
     assert place.get_text() == "crank = 30 deg"
 
 
+@pytest.mark.nightly
 def test_poses_out_of_reach_leave_gaps() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [300, 100], [70, 90], [60, 100]]}"
     found, _ = drawn(ARM, path, "reliability.methods=[analytic, monte_carlo]")

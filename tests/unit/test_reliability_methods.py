@@ -76,6 +76,7 @@ def test_form_without_a_design_point_says_so_and_gives_no_probability() -> None:
     assert "theta = 30 deg and at 2 more poses" in said
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("limits", LIMITS.values(), ids=LIMITS)
 def test_all_methods_agree_about_limits_of_rates_and_of_several_outputs(limits: str) -> None:
     """The whole ladder against each other: their intervals overlap, and what claims none is near."""
@@ -107,6 +108,7 @@ def a_few_nodes(study: Study) -> Poses:
     return Poses((PoseGroup(group.names, values, np.arange(len(rows))),), len(rows), False, (len(rows) // 2, 2))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", METHODS)
 def test_nodes_of_a_workspace(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     study = study_of(POLAR_ARM, f"reliability.methods=[{method}]")
@@ -123,6 +125,7 @@ def test_nodes_of_a_workspace(method: str, monkeypatch: pytest.MonkeyPatch) -> N
     assert table["failure"][np.argmax(reach)] > 2 * table["failure"][np.argmin(reach)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["monte_carlo", "quasi_monte_carlo", "form", "importance_sampling", "auto"])
 def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
     """Ctrl-C at the third report of progress; what had begun before is answered, the rest is nan."""

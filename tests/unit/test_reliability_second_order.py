@@ -123,6 +123,7 @@ def test_correlated_normal_dimensions_of_a_quadratic_error() -> None:
     assert moment(result, "second_order", "sigma") == pytest.approx(np.sqrt(variance), rel=1e-7)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("correlation", ["null", "[[crank.length, rod.length, 0.6]]"])
 def test_cumulants_are_those_of_what_is_drawn(correlation: str) -> None:
     """Moments of random quadratic functions of all that varies against a million draws."""

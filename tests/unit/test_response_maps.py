@@ -40,6 +40,7 @@ def contours(figure: Figure) -> list[Floats]:
     return [each.get_paths()[0].vertices for each in sets if np.array_equal(each.levels, [0.0])]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("design", [{}, {"method": "sobol", "samples": 128}])
 def test_limits_are_contours_where_the_closed_form_has_them(design):
     vary = {R: "30:46", L: "90:130"} if design else {R: "30:46:2", L: "90:130:4"}
@@ -85,6 +86,7 @@ def test_over_other_entries_a_map_has_what_is_best_of_the_cases_that_count():
     np.testing.assert_allclose(plane.field(10 * x + z, z > 5, REDUCTIONS[-1][0]), fine + 4)
 
 
+@pytest.mark.slow
 def test_titles_say_what_is_shown_of_other_entries():
     vary = {R: "30:46:8", L: "90:130:20", "mechanism.branch": ["side", "follow"]}
     figure = answer_of(vary, best={"maximize": ANGLE}).figure("response")
@@ -120,6 +122,7 @@ def test_triangles_between_scattered_cases_follow_a_plane_and_leave_out_what_fai
     assert np.isfinite(plane.field(values, every, REDUCTIONS[0][0])).sum() < known.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("vary", [{R: "30:46:2"}, {R: "30:46:2", "mechanism.branch": ["side", "follow"]}])
 def test_there_is_no_map_of_one_number_that_varies(vary):
     assert "response" not in answer_of(vary).figures
@@ -129,6 +132,7 @@ def test_cases_on_a_line_span_no_map():
     assert Plane.of(axis("x", [0, 1, 2]), axis("y", [5, 6, 7]), others=False) is None
 
 
+@pytest.mark.slow
 def test_of_many_cases_a_sample_is_drawn_with_the_best_and_the_front(monkeypatch: pytest.MonkeyPatch):
     count = 40_000
     rank = np.where(np.arange(count) == 12_345, 1.0, 2.0)

@@ -76,11 +76,13 @@ def least(function, dimensions, margins=None, seed=0):
     return known.known.u[row], known.known.values[row, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_minimum_of_branin(seed):
     assert least(branin, 2, seed=seed)[1] == pytest.approx(0.39788735773, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_the_lowest_of_many_minima(seed):
     at, value = least(rastrigin, 2, seed=seed)
@@ -88,6 +90,7 @@ def test_the_lowest_of_many_minima(seed):
     assert value < 1e-4
 
 
+@pytest.mark.slow
 def test_a_condition_that_holds_the_minimum():
     at, value = least(lambda u: u.sum(axis=1), 2, lambda u: (u[:, 0] * u[:, 1] - 0.25)[:, None])
     assert value == pytest.approx(1, abs=1e-5)
@@ -95,6 +98,7 @@ def test_a_condition_that_holds_the_minimum():
     assert at[0] * at[1] >= 0.25
 
 
+@pytest.mark.slow
 def test_points_without_a_value_are_avoided():
     """The minimum lies at the edge of where there is a value."""
 
@@ -105,6 +109,7 @@ def test_points_without_a_value_are_avoided():
     assert at[0] == pytest.approx(0.3, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_noise_of_a_millionth_does_not_mislead():
     """As integrals to a tolerance have it: the same each time, but rough."""
 
@@ -131,6 +136,7 @@ def worst_of(rows, dimensions, margins=None):
     return known.known.u[row], known.known.values[row, 0]
 
 
+@pytest.mark.slow
 def test_the_worst_of_many_rows():
     """Of x^3 the nearest quadratic on [-1, 1] is 3/4 x, 1/4 away at four places: it lacks a Chebyshev polynomial."""
     x = np.linspace(-1, 1, 81)
@@ -139,6 +145,7 @@ def test_the_worst_of_many_rows():
     assert 4 * at - 2 == pytest.approx([0, 0.75, 0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_along_a_narrow_valley_of_two_rows():
     """The rows of Rosenbrock's function, whose worst has an edge along a parabola."""
 
@@ -151,6 +158,7 @@ def test_along_a_narrow_valley_of_two_rows():
     assert at == pytest.approx([0.75, 0.5], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     """|x - 1/2| and |y - 1/2|, and both x and y at most 0.4: the nearest corner."""
 
@@ -197,6 +205,7 @@ def test_no_point_is_evaluated_twice_nor_more_than_allowed():
         known(np.random.default_rng(9).random((61, 2)))
 
 
+@pytest.mark.slow
 def test_extremes_and_weighted_sum_of_two_goals():
     """Of (x, 1 - x^2), normalised, the equal-weight best is where 1 = 2 x."""
     known = explorer(lambda u: np.column_stack([u[:, 0], 1 - u[:, 0] ** 2]), 1)
@@ -215,6 +224,7 @@ def test_bounds_that_depend_on_variables_above():
     assert designs["l_a"] == pytest.approx([1, 3, 1.25])
 
 
+@pytest.mark.nightly
 def test_bounds_that_leave_no_value():
     study = study_of(ARM, "optimize.variables.r2={from: 4, to: r1}", "optimize.subject_to=[]")
     assert from_cube(study, np.array([[0.0, 0.5], [0.5, 0.5]]))[1].tolist() == [False, True]
@@ -224,6 +234,7 @@ def test_bounds_that_leave_no_value():
         mechdesign.optimize(study_of(ARM, "optimize.variables.r2={from: 40, to: r1}"))
 
 
+@pytest.mark.slow
 def test_optimum_at_a_bound_and_a_condition():
     """Turned less to the x axis, the forearm is as long as may be; the upper arm makes up what the height lacks."""
     result = mechdesign.optimize(study_of(ARM))
@@ -246,6 +257,7 @@ def test_a_search_that_was_cut_short_says_so():
     assert "the search ended with its 30 evaluations" in result.warnings[0]
 
 
+@pytest.mark.slow
 def test_sensitivity_is_the_change_of_the_score_a_step():
     changes = ("optimize.subject_to=[]", "optimize.variables.r1.step=0.5", "optimize.variables.r2={from: 2, to: 4}")
     result = mechdesign.optimize(study_of(ARM, *changes))
@@ -258,6 +270,7 @@ def test_sensitivity_is_the_change_of_the_score_a_step():
     assert result.main["active"][0] == "r1 from, r2 from"
 
 
+@pytest.mark.slow
 def test_best_designs_are_apart():
     best = mechdesign.optimize(study_of(ARM)).tables["best"]
     assert best["rank"].tolist() == list(range(1, 11))
@@ -268,6 +281,7 @@ def test_best_designs_are_apart():
             assert apart > 0.05 * 9
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits_whatever_the_jobs():
     study = mechdesign.load(CONFIGS / "two_rrr.yaml", ["optimize.method=search", "optimize.evaluations=60"])
     one, two = (mechdesign.optimize(study, jobs=jobs).tables["designs"] for jobs in (1, 2))
@@ -289,6 +303,7 @@ def test_no_feasible_design_says_which_requirement_kills_most():
     assert "P.y at least 1000 (4 designs); not kinematics.P.x at most 4 (2 designs)" in str(told.value)
 
 
+@pytest.mark.nightly
 def test_nothing_feasible_leaves_the_nearest_miss_as_a_study(tmp_path):
     """Long arms reach highest, 11 sin 30 + 11 sin 60, which is too low; what else is asked they keep."""
     (tmp_path / "arm.yaml").write_text(ARM.replace("at_least: 12}", "at_least: 20}, {result: r1, at_least: 2}"))
@@ -309,6 +324,7 @@ def test_nothing_feasible_leaves_the_nearest_miss_as_a_study(tmp_path):
     assert (out / "nearest.csv").read_text().count("\n") == 3
 
 
+@pytest.mark.slow
 def test_nothing_assembles_leaves_the_design_that_lacks_least():
     """Poses lie 30 from the base; arms of at most 22 that reach farthest lack least."""
     text = ARM.replace("{theta1: 30, theta2: 60}", "{P.x: 30, P.y: 0}").replace("P.y, at_least: 12", "P.y, at_least: 0")
@@ -383,6 +399,7 @@ def test_residuals_are_what_a_root_mean_square_is_of():
     assert found.table[:, 0] == pytest.approx(exact, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_errors_over_part_of_a_motion_are_no_optimum():
     """Few poses may be near their target where the others do not assemble."""
     problem = held_height("kinematics.targets.C.y.rms", 0, 360, 10)
@@ -393,6 +410,7 @@ def test_errors_over_part_of_a_motion_are_no_optimum():
     assert 0 < designs["feasible"].sum() < len(designs)
 
 
+@pytest.mark.nightly
 def test_searches_use_their_evaluations_and_tell_where_starts_disagree():
     problem = held_height("kinematics.C.y_error", 40, 140, 20)
     result = mechdesign.optimize(study_of(problem.study, "optimize.evaluations=6000"))

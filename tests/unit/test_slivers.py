@@ -13,6 +13,7 @@ THIN = (0.4, 0.25, (-14.5, -13.3), (37.9, 39.3))
 LONG = (0.52, 0.43, (-58.8, -49.6), (110.6, 305.7))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.37, 0.57]", "[-1.9, -2.2]"])
 @pytest.mark.parametrize("arm", [THIN, LONG], ids=["thin", "long"])
 def test_an_arm_with_narrow_limits(
@@ -41,6 +42,7 @@ workspace: {{point: P, assembly: any, indices: [], scan: {{about: {about}}}}}
     assert found["SUI_error"][0] <= 0.02
 
 
+@pytest.mark.slow
 def test_three_links_over_a_range_of_orientations() -> None:
     """Reached where some orientation of the hand lets all three joints be within their limits, by a raster."""
     study = study_of("""

@@ -64,6 +64,7 @@ def test_ishigami() -> None:
     assert found.samples == 16 * 4096
 
 
+@pytest.mark.slow
 def test_the_intervals_hold_the_true_indices_in_997_of_1000_seeds() -> None:
     seeds = 200
     first, total = exact_of_ishigami()

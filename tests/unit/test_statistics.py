@@ -100,6 +100,7 @@ def test_every_word_is_that_of_a_dense_table(column: str) -> None:
     close(found, {f"{column}.{word}": expected[word] for word in WORDS}, 2e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(181.3, 300), (300, 61.7), (-40, 20)])
 def test_a_part_of_a_turn_has_the_ends_that_are_given(begin: float, end: float) -> None:
     """Not the poses nearest to them; a range that ends before it begins goes past a whole turn."""
@@ -111,6 +112,7 @@ def test_a_part_of_a_turn_has_the_ends_that_are_given(begin: float, end: float) 
         close(found, {f"{column}.{word}": expected[word] for word in WORDS}, 2e-7)
 
 
+@pytest.mark.slow
 def test_the_stance_of_a_foot() -> None:
     """Where the point is below a height; its ends are roots between the poses."""
     dense = tabulated(2_000_001)
@@ -140,6 +142,7 @@ def test_a_part_between_two_poses_and_one_that_is_nowhere() -> None:
     assert worst.place == "theta 42"
 
 
+@pytest.mark.slow
 def test_several_ranges_hold_at_once() -> None:
     where = "{theta: {from: 20, to: 200}, C.y: {at_least: 70, at_most: 90}}"
     found = numbers(FOUR_BAR, where, "C.x.min", "C.x.max", "C.x.mean")
@@ -231,6 +234,7 @@ def test_sums_of_numbers_of_one_unit() -> None:
     assert total.requirement == f"{text} at most 20 cm"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("requirement", "message"),
     [
@@ -295,6 +299,7 @@ GOALS = [
 ]
 
 
+@pytest.mark.slow
 def test_goals_of_many_designs_are_those_of_each_alone() -> None:
     study = study_of(FOUR_BAR + OPTIMIZE % ", ".join(GOALS))
     assert study.optimize is not None
@@ -321,6 +326,7 @@ def test_goals_of_many_designs_are_those_of_each_alone() -> None:
         assert found.table[2, k] == pytest.approx(goal.judge(result).values[0], rel=1e-10), goal.name
 
 
+@pytest.mark.slow
 def test_a_search_by_words_of_the_field() -> None:
     """The crank whose coupler point moves evenly: its part below a height is not there in every design."""
     section = """

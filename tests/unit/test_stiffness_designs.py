@@ -130,6 +130,7 @@ def designs_of(text: str, *names: str, count: int = COUNT, width: float = 0.05) 
     return Designs(study, {name: value * (1 + width * rng.uniform(-1, 1, count)) for name, value in nominal.items()})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "names"),
     [
@@ -153,6 +154,7 @@ def test_every_design_is_answered_as_if_it_were_asked_alone(text: str, names: Se
     assert len(np.unique([np.nansum(np.where(np.isfinite(values), values, 0.0)) for values in columns])) == COUNT
 
 
+@pytest.mark.slow
 def test_designs_that_fail_are_loose_or_nearly_so_say_it_in_their_own_words() -> None:
     """Legs that become parallel, or nearly; a five-bar that does not reach some of its poses, or any."""
     t = np.array([0.1, 0.25, 0.25 - 2e-5, 0.25, 0.2])
@@ -285,6 +287,7 @@ stiffness:
         assert matrix(answer, "C")[1, 1] == pytest.approx(soft, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "names", "column"),
     [

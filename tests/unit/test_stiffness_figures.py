@@ -31,6 +31,7 @@ def sweep(text: str) -> str:
     return f"stiffness.sweep={text}"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("overrides", "names"),
     [
@@ -167,6 +168,7 @@ def test_joint_forces_of_a_slider_crank_are_those_of_its_triangle() -> None:
     assert way == pytest.approx(-10 * (1 - 1j * np.tan(phi)), rel=1e-9, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_forces_that_grow_without_bounds_end_at_the_axis() -> None:
     """Driven by its slider, the crank jams at its dead centres."""
     study = study_of(CRANK, "mechanism.drives={s: {slide: guide}}", "stiffness.link=crank", "stiffness.at=A",

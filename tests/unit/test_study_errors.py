@@ -109,6 +109,7 @@ MECHANISM = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("old", "new", "message"), MECHANISM)
 def test_wrong_mechanisms(tmp_path, monkeypatch, old, new, message):
     assert old in STUDY
@@ -286,6 +287,7 @@ QUESTIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("section", "message"), QUESTIONS)
 def test_wrong_questions(tmp_path, monkeypatch, section, message):
     found = problems(tmp_path, monkeypatch, STUDY + section + "\n")
@@ -355,6 +357,7 @@ def test_a_missing_section_is_told_with_its_file_and_line(tmp_path, question, sa
     assert str(caught.value).startswith(f"{path}:1:1: {said}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["{}", "kinematics:\n  {}"])
 def test_thousands_of_mistakes_are_reported_in_proportion(part: str) -> None:
     def seconds(number: int) -> float:
@@ -390,6 +393,7 @@ def test_what_is_echoed_is_short_and_printable() -> None:
     assert r"\x1b[2J\u202e\n\x00x" in told[0]
 
 
+@pytest.mark.slow
 def test_a_mechanism_has_a_bounded_number_of_links() -> None:
     links = "".join(f"    a{index}: [O, P{index}, 1]\n" for index in range(20_000))
     with pytest.raises(StudyError, match=r"mechanism\.links: 20001 links are too many"):

@@ -20,6 +20,7 @@ def validator():
     return jsonschema.Draft202012Validator(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", templates())
 def test_templates_are_studies(name, validator):
     study = mechdesign.load(template_path(name))

@@ -99,6 +99,7 @@ def test_a_unit_over_another(above, below, ratio):
     assert Units.ratio(above, below) == ratio
 
 
+@pytest.mark.slow
 def test_pint_is_imported_only_for_an_uncommon_unit(tmp_path):
     study = tmp_path / "study.yaml"
     study.write_text("mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 2]}, drives: [arm], sketch: {P: [1, 1]}}\n")

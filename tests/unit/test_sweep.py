@@ -184,6 +184,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: 
         np.testing.assert_array_equal(again[column.name], column.values)
 
 
+@pytest.mark.slow
 def test_pictures_show_means_ranges_limits_and_cases_that_miss_them():
     result = mechdesign.sweep(study_of({"vary": {R: [25, 35, 45], L: [100, 120]}}))
     swing = np.degrees(np.arcsin([[r / length for length in (100, 120)] for r in (25, 35, 45)]))

@@ -49,6 +49,7 @@ def test_a_function_of_the_drive_and_parameters() -> None:
     assert table["rocker.angle_error"] == pytest.approx(table["rocker.angle"] - wanted, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_angle_errors_are_wrapped() -> None:
     table = motion('{crank.angle: "theta + 200"}', "kinematics.sweep.theta.to=1080")
     assert table["crank.angle_error"] == pytest.approx(160)
@@ -168,6 +169,7 @@ def test_errors_count_up_to_a_limit() -> None:
     assert table["max_abs"][0] == pytest.approx(30 * np.sin(np.radians(85)), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_extremes_of_errors_lie_between_the_poses() -> None:
     targets = '{B.x: "70 + 5*sin(theta)", C: [[0, 50], [20, 60], [60, 50]], gap: 90}'
     coarse, fine = (

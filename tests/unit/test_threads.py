@@ -23,6 +23,7 @@ def texts(command, study, changes, **options):
     return {name: to_csv(table) for name, table in result.tables.items()} | dict(result.files)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("command", "name", "changes", "jobs"),
     [("workspace", "two_rpr", [], 1), ("optimize", "gallery/path_synthesis", ["optimize.evaluations=500"], 2)],
@@ -36,6 +37,7 @@ def test_tables_do_not_depend_on_threads(command, name, changes, jobs):
     assert found[0] == found[1]
 
 
+@pytest.mark.nightly
 def test_files_do_not_depend_on_threads(tmp_path):
     study = CONFIGS / "two_rpr.yaml"
     code = "from mechdesign.cli.app import main; main()"

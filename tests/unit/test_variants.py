@@ -96,6 +96,7 @@ def alike(study: Study, other: Study, commands: tuple[str, ...] = ("kinematics",
                     assert (column.values == same).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "override"),
     [
@@ -144,6 +145,7 @@ def test_several_at_once_and_a_variant_of_a_variant() -> None:
     assert places_in(variant(both, {"l": 200.0}))["rod.length"] == 118
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [1.2, 1.8])
 def test_a_telescopic_leg_and_its_limits(value: float) -> None:
     alike(variant(study_of(LEG), {"limits.0.min": value}), study_of(LEG, f"mechanism.limits.0.min={value}"))
@@ -170,6 +172,7 @@ def test_a_measured_point_that_is_set() -> None:
     alike(found, _from_data(found))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["planar_3rpr", "five_bar", "planar_rp_rr", "two_rrr"])
 def test_configurations_with_every_length_changed(name: str) -> None:
     """Every point and length by a little: all forms of solution, workspaces included."""
@@ -187,6 +190,7 @@ def _from_data(study: Study) -> Study:
     return study_of(yaml.safe_dump(study.resolved, sort_keys=False))
 
 
+@pytest.mark.slow
 def test_groups_without_a_closed_form() -> None:
     study = mechdesign.load(CONFIGS / "gallery" / "rrr_platform.yaml")
     changed = {place: 1.02 * value for place, value in study.mechanism.nominal.items() if place.endswith(".length")}

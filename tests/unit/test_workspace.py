@@ -55,6 +55,7 @@ def test_annulus_of_a_two_link_arm() -> None:
     assert result.main["GRI"][0] == pytest.approx(2 * np.pi**2 / area, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_region_seen_from_elsewhere_has_several_intervals_a_ray() -> None:
     """From a point of the ring, rays cross the hole: the same area, box and mean as about the middle."""
     about = mechdesign.workspace(study_of(ARM, "workspace.scan.about=[1.5, 0.2]")).main
@@ -63,11 +64,13 @@ def test_a_region_seen_from_elsewhere_has_several_intervals_a_ray() -> None:
     assert about["GRI"][0] == pytest.approx(2 * np.pi**2 / about["area"][0], rel=2e-5)
 
 
+@pytest.mark.slow
 def test_from_outside_the_region_too() -> None:
     about = mechdesign.workspace(study_of(ARM, "workspace.scan.about=[4, 0.3]")).main
     assert about["area"][0] == pytest.approx(np.pi * (2.5**2 - 0.5**2), rel=1e-7)
 
 
+@pytest.mark.slow
 def test_the_assembly_of_the_sketch_ends_at_a_singularity() -> None:
     """All round, two legs reach above and below their base; only one half is the sketch's assembly."""
     half = mechdesign.workspace(study_of(LEGS))
@@ -77,6 +80,7 @@ def test_the_assembly_of_the_sketch_ends_at_a_singularity() -> None:
     assert half.tables["local"]["y"].min() > -1e-9
 
 
+@pytest.mark.slow
 def test_a_margin_is_left_out_of_the_means_only() -> None:
     whole = mechdesign.workspace(study_of(LEGS, UPPER)).main
     cut = mechdesign.workspace(study_of(LEGS, UPPER, "workspace.margin=20")).main
@@ -108,6 +112,7 @@ def test_panels_end_where_the_active_limits_change() -> None:
     assert np.abs(panels.high - np.angle(corner)).min() < 1e-12
 
 
+@pytest.mark.slow
 def test_batch_of_designs_equals_one_by_one() -> None:
     study = study_of(LEGS, UPPER)
     question = questions(study)[0]
@@ -167,6 +172,7 @@ def test_mixed_units_need_a_length() -> None:
         mechdesign.workspace(mechdesign.load(path, [section]))
 
 
+@pytest.mark.nightly
 def test_platform_at_constant_orientation() -> None:
     """Three strokes: the common part of three rings about the base points moved by the platform's."""
     path = Path(__file__).parents[2] / "configs" / "planar_3rpr.yaml"
@@ -211,6 +217,7 @@ workspace: {point: P, at: {platform.angle: [0, -20]}, characteristic_length: 0.2
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("assembly", ["any", "same"])
 def test_every_pose_is_singular_where_platform_and_base_are_similar(assembly: str) -> None:
     """Not turned against the base, the platform's legs always meet in one point; its area is known all the same."""

@@ -42,6 +42,7 @@ workspace: {point: T, at: {hand.angle: [-90, 0, 60]}, scan: {rays: 30}, characte
 """
 
 
+@pytest.mark.slow
 def test_maps_have_equal_axes_named_levels_and_a_legend_of_what_ends_the_region() -> None:
     study = study_of(FIVE_BAR)
     result = mechdesign.workspace(study)
@@ -61,6 +62,7 @@ def test_maps_have_equal_axes_named_levels_and_a_legend_of_what_ends_the_region(
     assert axes.get_xlabel() == "x [m]"
 
 
+@pytest.mark.nightly
 def test_held_coordinates_are_shown_side_by_side_at_one_scale() -> None:
     study = study_of(ARM)
     with style.context():
@@ -71,6 +73,7 @@ def test_held_coordinates_are_shown_side_by_side_at_one_scale() -> None:
     assert len({(axes.get_xlim(), axes.get_ylim()) for axes in panels}) == 1
 
 
+@pytest.mark.nightly
 def test_every_value_of_a_held_coordinate_is_in_the_workspace_and_its_drives() -> None:
     study = study_of(ARM)
     with style.context():
@@ -94,6 +97,7 @@ def test_fates(kind: str, at: str, expected: str) -> None:
     assert fate(kind, at) == expected
 
 
+@pytest.mark.slow
 def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> None:
     study = study_of(FIVE_BAR)
     result = mechdesign.workspace(study)
@@ -105,6 +109,7 @@ def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> N
     assert page.axes[0].collections[0].extend == "max"
 
 
+@pytest.mark.slow
 def test_the_largest_shapes_are_drawn_where_the_table_has_them() -> None:
     study = study_of(FIVE_BAR)
     result = mechdesign.workspace(study)
@@ -183,6 +188,7 @@ workspace: {point: T, scan: {about: [0, 0], rays: 60}, characteristic_length: 10
 """
 
 
+@pytest.mark.slow
 def test_ellipses_of_a_boom_are_radial_and_tangential() -> None:
     """Along the boom T moves 1 for 1, across it r / 100 for an arc of 100 mm; forces are the inverse."""
     study = study_of(POLAR)

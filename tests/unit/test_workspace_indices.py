@@ -101,6 +101,7 @@ def test_two_link_arm_is_isotropic_at_135_degrees() -> None:
     assert found["resistivity"] == pytest.approx(1 / found["manipulability"], rel=1e-14)
 
 
+@pytest.mark.slow
 def test_statistics_over_the_ring_of_an_arm() -> None:
     """Against one integral over q2; largest and smallest value within the rest of the search's last grid."""
     row = mechdesign.workspace(study_of(ARM)).main
@@ -113,6 +114,7 @@ def test_statistics_over_the_ring_of_an_arm() -> None:
     assert row["resistivity_mean"][0] == row["GRI"][0]
 
 
+@pytest.mark.nightly
 def test_infinite_statistics_are_said_to_be() -> None:
     """1/|sin q2| has a mean over the ring, but no largest value, and its square no integral."""
     row = mechdesign.workspace(study_of(ARM)).main
@@ -131,6 +133,7 @@ def test_infinite_statistics_are_said_to_be() -> None:
         assert row["sigma_max_min"][0] == 0
 
 
+@pytest.mark.slow
 def test_five_bar() -> None:
     """Links 0.25 and 0.40, motors at (+-0.15, 0): the part that two rings share, and J at a point, elbows out."""
     row = mechdesign.workspace(study_of(FIVE_BAR)).main
@@ -141,6 +144,7 @@ def test_five_bar() -> None:
     assert abs(at["det_J"][0]) == pytest.approx(0.062996, abs=5e-7)
 
 
+@pytest.mark.nightly
 def test_the_same_assembly_is_never_averaged_across_a_singularity() -> None:
     """det J has one sign where the assembly is the sketch's; `any` goes over both."""
     signs = {}
@@ -151,6 +155,7 @@ def test_the_same_assembly_is_never_averaged_across_a_singularity() -> None:
     assert signs["any"] == {-1.0, 1.0}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("angle", [0.0, 10.0, 30.0])
 def test_platform_in_one_assembly(angle: float) -> None:
     """3-RPR: closed-form inverse problem, forward singularities where the legs' lines meet in a point."""
@@ -172,6 +177,7 @@ def test_platform_in_one_assembly(angle: float) -> None:
     assert table["sigma_min"][k] == pytest.approx(homogeneous[-1], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_platform_on_three_cranks_at_several_orientations() -> None:
     """3-RRR: the forward problem is Newton's, the inverse closed form; rings of three legs, moved by the platform."""
     section = "workspace={point: P, at: {platform.angle: [0, 15]}, characteristic_length: 60, assembly: any}"
@@ -185,6 +191,7 @@ def test_platform_on_three_cranks_at_several_orientations() -> None:
         assert row["area"][k] == pytest.approx((reach <= 240).all(axis=-1).sum() * 0.2**2, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_only_the_indices_asked_for() -> None:
     result = mechdesign.workspace(study_of(FIVE_BAR, "workspace.indices=sigma_min"))
     statistics = [name for name in result.main.names if name.startswith(("sigma", "mani", "inverse", "resis"))]
@@ -195,6 +202,7 @@ def test_only_the_indices_asked_for() -> None:
     assert result.tables["local"].names[:5] == ("x", "y", "inverse_condition", "resistivity", "det_J")
 
 
+@pytest.mark.nightly
 def test_stiffness_and_position_errors_are_indices() -> None:
     """The same numbers as the questions themselves give at the nodes of the workspace."""
     names = ["k_min", "k_direction", "deflection", "sigma_position", "reliability"]
@@ -270,6 +278,7 @@ def test_reliability_as_an_index_needs_limits() -> None:
         mechdesign.workspace(study)
 
 
+@pytest.mark.slow
 def test_order_of_the_quadrature() -> None:
     """The true error falls with the tolerance, in proportion over four decades, and stays below the estimate."""
     exact = arm_statistics()
@@ -314,6 +323,7 @@ workspace: {point: P, at: {plate.angle: [-20, 20, -10]}, characteristic_length: 
 """
 
 
+@pytest.mark.slow
 def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     result = mechdesign.workspace(study_of(PLATFORM))
     indices, totals = result.tables["indices"], result.tables["totals"]
