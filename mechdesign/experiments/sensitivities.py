@@ -46,9 +46,9 @@ class Changing:
     unit: str
 
     def cases(self) -> Iterator[Case]:
-        """The study with less of it by each step, and with more."""
+        """Cases with the number reduced by each step, then with it increased by each step."""
         for sign in (-1, 1):
-            yield from (Case.of({self.name: self.value + sign * each}) for each in (self.step * STEPS).tolist())
+            yield from (Case.of({self.name: self.value + sign * step}) for step in (self.step * STEPS).tolist())
 
 
 def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:

@@ -117,7 +117,7 @@ def narrow() -> bool:
 
 
 class Picture(Figure):
-    """A figure that notebooks show; of others they show those alone that pyplot manages."""
+    """A figure that a notebook shows as a PNG; Matplotlib's own it shows only if pyplot manages them."""
 
     def _repr_png_(self) -> bytes:
         with context():

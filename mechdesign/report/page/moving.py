@@ -155,9 +155,9 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
 def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | None:
     """Time from each pose to the next, where the rates lead from one to the other; negative where they lead back."""
     along, square, length = (np.zeros(len(sweep.rows) - 1) for _ in range(3))
-    told = [name for name in table.names if f"{name}_velocity" in table or name in rates]
-    # What is given moves evenly more often than what follows from it.
-    for name in [name for name in told if name in sweep.poses.values] or told:
+    rated = [name for name in table.names if f"{name}_velocity" in table or name in rates]
+    # The drives, where their rates are known: they move at even rates more often than what they drive.
+    for name in [name for name in rated if name in sweep.poses.values] or rated:
         if f"{name}_velocity" in table:
             rate = table[f"{name}_velocity"][sweep.rows]
         else:

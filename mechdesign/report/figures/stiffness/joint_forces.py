@@ -86,27 +86,27 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
         called = f"{name} ({by[k]})" if names.count(name) > 1 else name
         forces.append(Joint(called, words, x[..., k] + 1j * y[..., k]))
         moments.append(Joint(called, words, turning[..., k]))
-    largest = max((each.peak for each in forces), default=0.0)
+    largest = max((force.peak for force in forces), default=0.0)
     return _loaded(forces, _NOTHING * largest), _loaded(moments, _NOTHING * max(largest * reach, _peak(moments)))
 
 
 def _peak(joints: Sequence[Joint]) -> float:
-    return max((each.peak for each in joints), default=0.0)
+    return max((joint.peak for joint in joints), default=0.0)
 
 
-def _loaded(every: Sequence[Joint], nothing: float) -> list[Joint]:
-    """Joints that bear more than rounding, without it; those that bear as much as another are joined to it."""
-    found: list[Joint] = []
-    for each in every:
-        gaps = [Joint("", "", np.abs(each.values) - np.abs(other.values)).peak for other in found]
-        if each.peak <= nothing:
+def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
+    """Joints whose peak exceeds rounding, largest first; joints with equal magnitudes everywhere share one curve."""
+    loaded: list[Joint] = []
+    for joint in joints:
+        if joint.peak <= rounding:
             continue
-        if gaps and min(gaps) <= nothing:
-            alike = gaps.index(min(gaps))
-            found[alike] = replace(found[alike], name=f"{found[alike].name}, {each.name}")
+        gaps = [Joint("", "", np.abs(joint.values) - np.abs(other.values)).peak for other in loaded]
+        if gaps and min(gaps) <= rounding:
+            equal = gaps.index(min(gaps))
+            loaded[equal] = replace(loaded[equal], name=f"{loaded[equal].name}, {joint.name}")
         else:
-            found.append(replace(each, values=np.where(np.abs(each.values) <= nothing, 0.0, each.values)))
-    return sorted(found, key=lambda each: -each.peak)
+            loaded.append(replace(joint, values=np.where(np.abs(joint.values) <= rounding, 0.0, joint.values)))
+    return sorted(loaded, key=lambda joint: -joint.peak)
 
 
 def joint_force_figures(study: Study, result: Result) -> dict[str, Figure]:
