@@ -75,6 +75,7 @@ def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms(), st.sampled_from([0.2, 1.0, 4.0]))
 def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
@@ -94,6 +95,7 @@ def test_links_stay_rigid_and_joints_closed(made: Made, reach: float) -> None:
         assert np.all(np.abs(wrap(off) if made.mechanism.quantity(drive) == "angle" else off) < bound), drive
 
 
+@pytest.mark.nightly
 @pytest.mark.nightly
 @settings(max_examples=50)
 @given(
@@ -168,6 +170,7 @@ def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.nightly
 @settings(max_examples=20)
 @given(mechanisms(most=2))
 def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:
@@ -192,6 +195,7 @@ def test_every_assembly_closes_and_only_the_first_is_drawn(made: Made) -> None:
     assert len(set(places)) == len(places)
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms(), st.sampled_from([0.3, 2.0]), st.integers(1, 12))
 def test_the_order_and_the_chunks_of_a_sweep_change_no_bit(made: Made, reach: float, chunk: int) -> None:
@@ -207,6 +211,7 @@ def test_the_order_and_the_chunks_of_a_sweep_change_no_bit(made: Made, reach: fl
     same(made.at(time[k : k + 1]), whole.take(np.array([k])))
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms(), st.floats(-0.05, 0.05))
 def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float) -> None:

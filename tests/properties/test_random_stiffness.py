@@ -47,6 +47,7 @@ def agree(found: np.ndarray, expected: np.ndarray, relative: float, rounding: np
     assert (np.abs(found - expected) <= tolerance).all(), (found, expected)
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(sprung())
 def test_compliance_is_that_of_finite_elements(case: Sprung) -> None:
@@ -72,6 +73,7 @@ def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) 
         assert complex(dx, dy) == pytest.approx(complex(*moved[3 * node : 3 * node + 2, 0]), abs=1e-6 * largest + 1e-12)
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung(), st.integers(0, 2**32 - 1))
 def test_ends_of_pins_and_turns_of_links_in_a_reliability_are_those_of_finite_elements(case: Sprung, seed: int) -> None:
@@ -169,6 +171,7 @@ def test_stiffness_is_symmetric_positive_and_the_inverse_of_compliance(case: Spr
         assert np.linalg.eigvalsh(soft)[0] <= 1e-11 * np.abs(soft).max()
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung(), st.randoms(use_true_random=False))
 def test_names_and_order_do_not_matter(case: Sprung, rng) -> None:
@@ -182,6 +185,7 @@ def test_names_and_order_do_not_matter(case: Sprung, rng) -> None:
     agree(matrix(other, "C"), matrix(plain, "C"), 1e-8)
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung(), st.floats(-3, 3), st.complex_numbers(max_magnitude=5, allow_nan=False))
 def test_a_rigid_motion_of_the_whole_turns_the_matrices(case: Sprung, angle: float, shift: complex) -> None:
@@ -199,6 +203,7 @@ def about(arm: complex) -> np.ndarray:
     return np.array([[1, 0, arm.imag], [0, 1, -arm.real], [0, 0, 1]])
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung())
 def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case: Sprung) -> None:
@@ -240,6 +245,7 @@ def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(see
         agree(other.stiffness[0], serial.stiffness[0], 1e-6)
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung(), st.integers(0, 2**32 - 1))
 def test_many_designs_at_once_are_those_one_by_one(case: Sprung, seed: int) -> None:

@@ -153,6 +153,7 @@ def test_where_the_model_is_careless_simulation_makes_it_tighter() -> None:
 UNIFORM = "{{a: {{tolerance: 0.1, distribution: uniform}}, b: {{tolerance: {b}, distribution: uniform}}}}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [0.9, 0.99, 0.999])
 @pytest.mark.parametrize("price", [1.0, 5.0])
 def test_two_uniform_tolerances_are_as_cheap_as_can_be(asked: float, price: float) -> None:
@@ -178,6 +179,7 @@ def test_one_uniform_tolerance_reaches_just_beyond_its_limit() -> None:
     assert allocated(result)["a"] == pytest.approx(0.3 / 0.98, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_what_is_held_and_cannot_break_the_limits_is_no_reason_to_refuse() -> None:
     """A pin on the rim of its hole leaves 0.01 of the limit; by normal errors of its variance it would break it."""
     text = LEVER.replace("P.x: 0.3", "P.x: 0.31") + (
@@ -202,6 +204,7 @@ def test_the_advice_where_it_cannot_be_reached_works() -> None:
     assert not ask(text, "reliability.allocate={reliability: 0.99, cost: {O: 1}}", radial).failed
 
 
+@pytest.mark.slow
 def test_every_pose_reaches_it() -> None:
     sweep = "reliability.sweep={theta: {from: 0, to: 90, step: 5}}"
     result = ask(LEVER + "  dimensions: {lever.length: 0.2, theta: 0.2}\n", "reliability.poses=", sweep)
@@ -309,6 +312,7 @@ def test_a_wildcard_is_written_out_unless_its_places_stay_alike(angle: str, name
     assert not result.failed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("written", "after"),
     [
@@ -390,6 +394,7 @@ def test_what_cannot_be_asked(overrides: list[str], message: str) -> None:
         study_of(CHAIN, *overrides)
 
 
+@pytest.mark.slow
 def test_an_optimisation_asks_for_no_tolerances_unless_their_cost_is_a_goal() -> None:
     """The variable changes no error: all designs have the cost, and the failures, of the study itself."""
     text = CHAIN + "optimize:\n  variables: {c: {from: 10, to: 30, number: 3}}\n  minimize: GOAL\n"

@@ -62,6 +62,7 @@ def chosen(result: Result) -> dict[str, str]:
     return dict(zip(table["source"].tolist(), table["grade"].tolist(), strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", ["reliability: 0.999", "cpk: 1.0", "cpk: 1.67"])
 @pytest.mark.parametrize("limit", [0.08, 0.12, 0.2])
 def test_a_sum_has_the_cheapest_of_all_choices(asked: str, limit: float) -> None:
@@ -87,6 +88,7 @@ def test_a_sum_has_the_cheapest_of_all_choices(asked: str, limit: float) -> None
     assert any("held as given, for grades are of lengths with a tolerance: travel" in note for note in result.warnings)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("asked", "limits"), [
     ("reliability: 0.9973", "P.x: 0.08, T.y: 0.1"),
     ("reliability: 0.9973", "T: {radius: 0.12}"),

@@ -135,6 +135,7 @@ def assert_same(one: Column, other: Column) -> None:
     np.testing.assert_allclose(one.values, other.values, rtol=0, atol=digits * max(1.0, finite.max(initial=0.0)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", STUDIES)
 def test_designs_together_are_those_alone(name: str) -> None:
     text, ranges = STUDIES[name]
@@ -158,6 +159,7 @@ def test_designs_together_are_those_alone(name: str) -> None:
                 assert_same(*pair)
 
 
+@pytest.mark.slow
 def test_the_worst_value_between_the_poses_is_that_of_the_design() -> None:
     study = study_of(FOUR_BAR)
     designs = {"crank.length": np.array([0.8, 1.0, 1.2])}
@@ -181,6 +183,7 @@ def worst(result: Result, name: str, sign: int, absolute: bool) -> tuple[float, 
     return float(value), course.shown(float(place))
 
 
+@pytest.mark.slow
 def test_the_designs_above_are_of_several_kinds() -> None:
     random, found = np.random.default_rng(5), {}
     for name in ("none at all", "some rockers", "listed poses"):

@@ -62,6 +62,7 @@ def test_working_modes_of_the_inverse_problem_are_listed_too() -> None:
     assert len(drives) == 4
 
 
+@pytest.mark.slow
 def test_every_assembly_of_a_group_without_a_closed_form_solves_its_loops() -> None:
     mechanism = mechdesign.load(CONFIGS / "planar_3rpr.yaml").mechanism
     found = assemblies(mechanism, mechanism.drives)

@@ -64,6 +64,7 @@ def reached(lead: float, crank: float = 0.4, rod: float = 0.3) -> float:
     return float(np.sum(0.5 * (height[1:] + height[:-1]) * np.diff(x)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("assembly", ["any", "same"])
 def test_a_measure_equal_to_the_angle_gives_the_same_workspace(assembly: str) -> None:
     exact, found = (
@@ -81,6 +82,7 @@ def test_a_measure_equal_to_the_angle_gives_the_same_workspace(assembly: str) ->
             assert end(ends[1][name], axis=0) == pytest.approx(end(places, axis=0), abs=1e-6)
 
 
+@pytest.mark.nightly
 def test_designs_of_other_sizes_have_their_own_poses() -> None:
     """Together as alone, and as their closed form has it: also regions much larger than that of the sketch."""
     text = PLATFORM.format(held=BY_MEASURE, assembly="any")
@@ -114,12 +116,14 @@ def test_fold_distance_is_linear_through_a_fold() -> None:
     assert np.isfinite(margins).all()
 
 
+@pytest.mark.slow
 def test_a_region_between_folds_has_its_area() -> None:
     (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), wanted=("area",))
     found = answer(question, {}, 1, BATCH)
     assert found.values["area"][0] == pytest.approx(reached(0.45), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_region_of_a_design_that_does_not_close_where_the_sketch_is_drawn() -> None:
     """With so short cranks the point cannot be where it is drawn; by the platform's angle there is a closed form."""
     far = (

@@ -57,6 +57,7 @@ def test_names_are_drawn_letter_by_letter():
     assert drawn.isascii() or "\u202e" not in drawn
 
 
+@pytest.mark.slow
 def test_curves_and_paths_before_are_dashed_under_those_now():
     now, then = (study_of(FOUR_BAR.format(rocker=rocker, motion=SWEEP)) for rocker in (60, 68))
     result, earlier = overlaid("kinematics", now, then)
@@ -81,6 +82,7 @@ def test_curves_and_paths_before_are_dashed_under_those_now():
         assert len(found[name].legends[-1].get_texts()) == 2
 
 
+@pytest.mark.slow
 def test_the_boundary_before_is_in_the_picture_of_the_workspace():
     now, then = (study_of(ARM.format(lower=lower)) for lower in (30, 40))
     result, _ = overlaid("workspace", now, then)
@@ -108,6 +110,7 @@ def test_motions_of_other_coordinates_are_not_drawn_over_each_other():
             laid_under(now, result, then, mechdesign.kinematics(then))
 
 
+@pytest.mark.nightly
 def test_the_command_line_records_the_study_before_and_names_it_in_errors(tmp_path):
     now, then = tmp_path / "now.yaml", tmp_path / "then.yaml"
     now.write_text(FOUR_BAR.format(rocker=60, motion=SWEEP))

@@ -45,6 +45,7 @@ def test_limits_of_the_value_hold_at_every_pose() -> None:
         assert (table["failure_high"][rows] > exact).all()
 
 
+@pytest.mark.slow
 def test_limits_of_the_value_are_those_of_the_error_about_the_nominal_value() -> None:
     methods = ("reliability.methods=[monte_carlo, quasi_monte_carlo]", "reliability.poses=[{theta: 60}]")
     value, error = (
@@ -175,6 +176,7 @@ def test_limits_that_make_no_sense_are_refused(limit: str, message: str) -> None
         study_of(LEVER, f"reliability.limits={{P.x: {limit}}}")
 
 
+@pytest.mark.slow
 def test_limits_of_the_value_over_a_workspace() -> None:
     """The index at each node is what the first order says there; P.x alone is limited, far from most of the nodes."""
     study = study_of("""

@@ -63,6 +63,7 @@ def test_stroke_and_swing_of_slider_cranks():
     assert "case 4 (r 45), crank 90" in broad.place or "case 4 (r 45), crank 270" in broad.place
 
 
+@pytest.mark.slow
 def test_numbers_and_limits_that_follow_are_those_of_each_case_alone():
     text = SLIDER_CRANK.replace("at_least: 70", "at_least: 2*r - 5").replace("at_most: 25", "at_least: 3, at_most: r")
     cases: list[dict[str, object]] = [{"mechanism.parameters.r": 20 + 0.5 * k} for k in range(20)]

@@ -82,6 +82,7 @@ def test_goals_of_designs_are_those_of_studies_with_these_entries() -> None:
         assert row["stiffness.k_min"] == pytest.approx(mechdesign.stiffness(alone).main["k_min"].min(), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["search", "pareto"])
 def test_search_and_front_find_the_optimum_of_the_grid_and_evaluate_each_design_once(method: str) -> None:
     asked = mechdesign.optimize(press("", f"optimize.method={method}", "optimize.weights=[[1, 1]]"))
@@ -92,6 +93,7 @@ def test_search_and_front_find_the_optimum_of_the_grid_and_evaluate_each_design_
         assert asked.tables["optimum"][name][-1:].tolist() == gridded.tables["optimum"][name].tolist()
 
 
+@pytest.mark.slow
 def test_a_front_names_the_choices() -> None:
     table = mechdesign.optimize(press("", "optimize.method=pareto")).tables["pareto"]
     values = np.array([(-row["stiffness.k_min"], row["l"]) for row in mechdesign.optimize(press()).tables["designs"]])
@@ -102,6 +104,7 @@ def test_a_front_names_the_choices() -> None:
     assert {(row["d"], row["l"], row["stiffness.elastic.rod"]) for row in table} == best
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_jobs() -> None:
     one, two = (mechdesign.optimize(press("", "optimize.method=search"), jobs=jobs) for jobs in (1, 2))
     assert designs_of(one) == designs_of(two)
@@ -155,6 +158,7 @@ def test_parameters_and_dimensions_may_be_named_as_entries() -> None:
     assert grid(study)["rod.length"].tolist() == [80, 90, 100, 100]
 
 
+@pytest.mark.slow
 def test_choices_of_structures_places_of_the_sketch_and_numbers_that_are_read_once() -> None:
     named = (
         "mechanism.sketch.B: {choices: [[140, 15], [-80, 15]]}, n: {choices: [3, 4]}, "
@@ -243,6 +247,7 @@ def test_wrong_variables_are_told_at_their_place(variables: str, message: str) -
     assert {problem.line for problem in raised.value.problems} == {23}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "variables",
     [

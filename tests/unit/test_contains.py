@@ -66,6 +66,7 @@ def ring_of_rectangle(width: float, height: float, inner: float, outer: float) -
     return float(brentq(lambda s: np.hypot(s * width / 2, inner + s * height) - outer, 0, 100))
 
 
+@pytest.mark.slow
 def test_largest_scale_of_a_free_circle_and_rectangle_in_a_ring() -> None:
     rng = np.random.default_rng(2)
     upper, fore = rng.uniform(60, 140, 12), rng.uniform(40, 100, 12)
@@ -78,6 +79,7 @@ def test_largest_scale_of_a_free_circle_and_rectangle_in_a_ring() -> None:
     assert scales(ARM, RECTANGLE, places=places) == pytest.approx(wanted, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "wanted"),
     [
@@ -93,6 +95,7 @@ def test_scale_about_a_given_centre(shape: Shape, wanted: float) -> None:
     assert scales(ARM, shape) == pytest.approx([wanted], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [0.3, 1.1, 2.57, 6.0])
 def test_a_side_that_just_touches_a_small_hole(apart: float) -> None:
     """Between two rays the side was 1e-4 of its distance beyond the hole, and places looked at fell beside it."""
@@ -102,6 +105,7 @@ def test_a_side_that_just_touches_a_small_hole(apart: float) -> None:
     assert found == pytest.approx((54.86 - apart) / 94.52, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("to", "centre", "wanted"),
     [(180, 100 + 20j, 2 / 3), (180, -100j, -1.0), (270, 100 + 20j, 2 / 3), (270, 100 - 20j, -2 / 3), (270, 100j, 2.0)],
@@ -111,6 +115,7 @@ def test_sides_of_a_scan_end_what_is_contained(to: float, centre: complex, wante
     assert found == pytest.approx(wanted) if wanted > -1 else found < wanted
 
 
+@pytest.mark.nightly
 def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
     study = study_of(RRR, "workspace.assembly=same")
     rng = np.random.default_rng(3)
@@ -126,6 +131,7 @@ def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
         assert not given.panels.designs.inside(centre + (1 + 1e-2) * outline, np.arange(3)).all(axis=0).any()
 
 
+@pytest.mark.slow
 def test_other_pieces_of_the_region_contain_nothing() -> None:
     """Two bands beside x from 0 to 0.5, the left one the sketch's."""
     text = """
@@ -147,6 +153,7 @@ def test_other_pieces_of_the_region_contain_nothing() -> None:
     assert scales(text, Shape(0.4, 0.4, True, 0.25 + 1j)) == pytest.approx([-1.25])
 
 
+@pytest.mark.slow
 def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
     shapes = "[{contains: {rectangle: [180, 90], center: free}}, {contains: {circle: 20, center: [0, 80]}}]"
     study = study_of(ARM, f"optimize.subject_to={shapes}")
@@ -173,6 +180,7 @@ def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
     assert "not rectangle 180 x 90 contained" in designs["reason"].tolist()
 
 
+@pytest.mark.slow
 def test_search_ends_where_the_shape_just_fits() -> None:
     study = study_of(
         ARM, "optimize.variables={l1: {from: 60, to: 140}, l2: {from: 60, to: 61}}", "optimize.method=search",
@@ -202,6 +210,7 @@ def test_wrong_shapes_are_reported(condition: str, message: str) -> None:
     assert message in str(caught.value)
 
 
+@pytest.mark.nightly
 def test_shapes_follow_the_variables() -> None:
     """As formulas say, and as for studies of single designs: sizes and centres that are other for each design."""
     shapes = "[{contains: {circle: l2/3}}, {contains: {rectangle: [l1, l2/4], center: [0, 1.2*l1 - 10]}}]"
@@ -218,6 +227,7 @@ def test_shapes_follow_the_variables() -> None:
         assert table["scale of rectangle l1 x l2/4 at (0, 1.2*l1 - 10)"][k] == pytest.approx(alone, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_held_values_and_the_characteristic_length_follow_the_variables() -> None:
     """All designs at once, to the numbers of their own studies."""
     goals = "optimize={variables: {crank: {from: 150, to: 170, step: 10}}, maximize: [GII, SUI], minimize: [area]}"
@@ -232,6 +242,7 @@ def test_held_values_and_the_characteristic_length_follow_the_variables() -> Non
             assert table[name][k] == pytest.approx(found[name][0], rel=1e-12)
 
 
+@pytest.mark.nightly
 def test_worst_of_several_held_values_counts() -> None:
     goals = "optimize={variables: {crank: {from: 150, to: 170, step: 20}}, maximize: [GII], minimize: [area], "
     goals += "subject_to: [{contains: {circle: 60, center: [0, 0]}}, {contains: {rectangle: [120, 90]}}]}"
@@ -253,6 +264,7 @@ def test_held_values_that_leave_nothing_are_named() -> None:
     assert result.tables["designs"]["reason"][0] == "nothing of the workspace can be reached at platform.angle = 60"
 
 
+@pytest.mark.nightly
 def test_designs_over_a_range_of_a_held_coordinate() -> None:
     over = "workspace.at.platform.angle={from: -10, to: 10, all: true}"
     designs = mechdesign.optimize(study_of(RRR, over, "optimize.variables.crank.step=20")).tables["designs"]

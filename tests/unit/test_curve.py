@@ -263,6 +263,7 @@ kinematics: {sweep: {theta: {from: -100, to: 260, step: 20}}, outputs: [B.x]}
     assert not len(kinematics(study_of(text)).tables["limits"])
 
 
+@pytest.mark.nightly
 def test_a_rate_is_infinite_where_a_spline_crosses_the_reach() -> None:
     path = """\
 kinematics:

@@ -341,6 +341,7 @@ def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
         study_of(text, override)
 
 
+@pytest.mark.nightly
 def test_a_map_over_the_workspace_counts_the_deflection() -> None:
     """The indices of the workspace say what the question itself says at its nodes."""
     from mechdesign.analyses.workspace.index import prepare

@@ -63,6 +63,7 @@ def test_a_driven_link_is_not_the_one_to_leave_out() -> None:
     assert "link 'crank2' repeats" in told(CRANKS % 30, "[crank3]", RAISED)
 
 
+@pytest.mark.slow
 def test_a_third_crank_of_another_length_makes_it_rigid() -> None:
     message = told(CRANKS % 35, "[crank]", RAISED)
     assert "the mobility is 0 but 1 drive is given: it is rigid" in message
@@ -75,6 +76,7 @@ def test_a_motion_that_is_only_infinitesimal_is_none() -> None:
     assert "it is rigid" in message
 
 
+@pytest.mark.slow
 def test_a_stretched_part_beside_one_that_moves_stays_rigid() -> None:
     # a and b, measured from the sketch, lie on one line; the leg moves truly.
     message = told(
@@ -100,6 +102,7 @@ def test_a_second_guide_is_a_joint_too_many() -> None:
     assert "joint 'h' repeats" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drawn", ["[10, 28]", "[11, 27]", "[10, 28.284271247461902]"])
 def test_an_over_constrained_part_is_found_where_the_count_agrees(drawn: str) -> None:
     # The chain c1-c2-c3 is placed by its own drive, so that every link seems to be.

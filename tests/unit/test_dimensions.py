@@ -32,6 +32,7 @@ stiffness: {at: C, sections: {bar: {E: 70 GPa, diameter: 8}}, elastic: {rocker: 
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("look", ["screen", "paper"])
 def test_numbers_of_a_four_bar_are_its_lengths_and_stand_apart(look):
     with style.context(look):

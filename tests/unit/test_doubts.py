@@ -116,6 +116,7 @@ def test_per_cent_is_no_unit(old, new):
         doubts((old, new))
 
 
+@pytest.mark.slow
 def test_no_shipped_study_is_doubted():
     files = [*CONFIGS.glob("*.yaml"), *(CONFIGS / "gallery").glob("*.yaml")]
     assert files

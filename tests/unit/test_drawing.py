@@ -41,6 +41,7 @@ def drawn(study):
         return figure, style.encoded(figure)
 
 
+@pytest.mark.slow
 def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):
     figure, _ = drawn(study)
     assert [axes.get_title(loc="left")[:5] for axes in figure.axes] == ["sketc", "first"]
@@ -49,6 +50,7 @@ def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):
         assert names >= {"O", "A", "B", "P", "theta", "crank", "rod"}
 
 
+@pytest.mark.slow
 def test_names_do_not_overlap(study):
     figure, _ = drawn(study)
     for axes in figure.axes:
@@ -57,6 +59,7 @@ def test_names_do_not_overlap(study):
             assert not any(box.overlaps(other) for other in boxes[:k])
 
 
+@pytest.mark.slow
 def test_one_length_is_as_long_in_x_as_in_y(study):
     figure, _ = drawn(study)
     for axes in figure.axes:
@@ -64,6 +67,7 @@ def test_one_length_is_as_long_in_x_as_in_y(study):
         assert x1 - x0 == pytest.approx(y1 - y0)
 
 
+@pytest.mark.slow
 def test_the_picture_has_the_same_bytes_again_and_no_metadata(study):
     _, first = drawn(study)
     _, second = drawn(study)
@@ -95,6 +99,7 @@ def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
     assert pose(study.mechanism, configuration) is None
 
 
+@pytest.mark.slow
 def test_user_settings_do_not_reach_the_picture_and_come_back(study):
     import matplotlib
 
@@ -111,6 +116,7 @@ def test_hull_of_a_plate_and_of_a_bar():
     assert hull([1j, 1j]) == [1j]
 
 
+@pytest.mark.nightly
 def test_many_names_are_placed_in_time_that_grows_with_their_number():
     def seconds(count):
         with style.context():

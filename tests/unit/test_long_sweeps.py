@@ -76,6 +76,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "POSES_AT_ONCE", 50)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "all_modes"), [(FOUR_BAR, True), (ARM, False), (GRID, False)], ids=["four_bar", "arm", "grid"]
 )
@@ -132,6 +133,7 @@ def test_the_room_that_tables_need_is_told_before_they_are_written(
     assert len((tmp_path / "out" / "motion.csv").read_text().splitlines()) == 13 * 17 + 1
 
 
+@pytest.mark.nightly
 def test_a_pose_more_takes_a_few_bytes(tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
     study.write_text("""

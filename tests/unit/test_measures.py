@@ -121,6 +121,7 @@ def test_measures_place_what_is_stiff() -> None:
     assert table["k_x"][0] == pytest.approx(table["k_x"][1], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_measure_is_held_in_a_workspace() -> None:
     study = study_of(
         """
@@ -137,6 +138,7 @@ workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40
     assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_an_expression_is_held_at_a_value_far_from_the_sketchs() -> None:
     """At the point's place in the sketch the held value cannot be had at all."""
     study = study_of("""

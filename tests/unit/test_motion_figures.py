@@ -52,6 +52,7 @@ def boxes(axes):
     return [text.get_window_extent() for text in axes.texts if text.get_text()]
 
 
+@pytest.mark.slow
 def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
     figure = drawn(study_of(FOUR_BAR))["paths"]
     (axes,) = figure.axes
@@ -67,6 +68,7 @@ def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
         assert not any(box.overlaps(other) for other in names[:k])
 
 
+@pytest.mark.slow
 def test_names_are_nearest_to_their_own_pins_or_have_a_line():
     study = study_of(FOUR_BAR.replace("points: {C: [45, 40]}", "points: {C: [45, 6], E: [45, -6], F: [51, 0]}"))
     (axes,) = drawn(study)["paths"].axes
@@ -79,6 +81,7 @@ def test_names_are_nearest_to_their_own_pins_or_have_a_line():
         assert min(gaps, key=gaps.get) == text.get_text() or text.arrow_patch is not None
 
 
+@pytest.mark.slow
 def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
     figure = drawn(study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 1e-3}\n  sweep:")))["motion"]
     for axes in figure.axes:
@@ -86,6 +89,7 @@ def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
         assert all(not name.overlaps(tick.get_window_extent()) for tick in axes.get_yticklabels() if tick.get_text())
 
 
+@pytest.mark.slow
 def test_the_coupler_point_tells_most():
     assert ranks(study_of(FOUR_BAR)) == {"A": 0, "B": 0, "C": 2}
     assert ranks(study_of(FOUR_BAR.replace("sweep:", "outputs: [B.x]\n  sweep:")))["B"] == 2
@@ -114,6 +118,7 @@ def test_traces_of_few_poses_are_curves(poses):
     assert abs(trace[-1] - trace[0]) < 1e-9
 
 
+@pytest.mark.slow
 def test_curves_of_what_moves_only():
     study = study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 10}\n  sweep:"))
     figure = drawn(study)["motion"]
@@ -127,6 +132,7 @@ def test_curves_of_what_moves_only():
     assert figure.axes[-1].get_xlabel() == "theta [deg]"
 
 
+@pytest.mark.slow
 def test_what_stands_still_is_drawn_straight_and_only_where_it_is_asked_for():
     parallelogram = FOUR_BAR.replace("length: 90", "length: 100").replace("[D, B, 60]", "[D, B, 30]")
     study = study_of(
@@ -192,6 +198,7 @@ def test_listed_poses_are_drawn_one_by_one_and_have_no_curves():
     assert titles == ["theta = 0 deg", "theta = 30 deg"]
 
 
+@pytest.mark.slow
 def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
     study = study_of(FOUR_BAR, "kinematics.rates={theta: 1 rad/s}", "kinematics.outputs=[A, rocker.angle]")
     figure = drawn(study)["poses"]
@@ -224,6 +231,7 @@ def test_a_limit_of_motion_is_a_special_pose_without_rates():
     assert [each.place for each in poses.shown] == sorted(each.place for each in poses.shown)
 
 
+@pytest.mark.slow
 def test_a_stretched_arm_is_a_special_pose():
     arm = """
 mechanism:
@@ -248,6 +256,7 @@ def test_special_poses_of_one_configuration_are_shown_once():
     assert [each.place for each in poses.shown if each.what] == pytest.approx([0, 180])
 
 
+@pytest.mark.nightly
 def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
     (axes,) = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"))["paths"].axes
     (ticks,) = axes.collections
@@ -262,6 +271,7 @@ def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
     )
 
 
+@pytest.mark.slow
 def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
     study = study_of(FOUR_BAR)
     (axes,) = drawn(study)["transmission"].axes
@@ -277,6 +287,7 @@ def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
     assert worst.get_xdata() == [0]
 
 
+@pytest.mark.slow
 def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_place_is_marked():
     advantage = "kinematics.mechanical_advantage={rocker.angle: theta}"
     study = study_of(FOUR_BAR, advantage)
@@ -291,6 +302,7 @@ def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_pla
     assert len(figures(study, result)["motion"].axes) == len(drawn(study_of(FOUR_BAR))["motion"].axes)
 
 
+@pytest.mark.slow
 def test_every_assembly_has_a_panel_on_one_scale():
     figure = drawn(study_of(FOUR_BAR), all_modes=True)["modes"]
     titles = [axes.get_title(loc="left") for axes in figure.axes]
@@ -315,6 +327,7 @@ def test_a_rough_sketch_is_shown_beside_the_assembled_one(place, crosses):
         assert (marks[0].get_xdata()[0], marks[0].get_ydata()[0]) == (90, 75)
 
 
+@pytest.mark.slow
 def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
     wanted = [[10, 60], [30, 80], [50, 70]]
     study = study_of(FOUR_BAR.replace("  drives:", f"  targets: {{C: {wanted}}}\n  drives:"))

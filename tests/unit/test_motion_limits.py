@@ -161,6 +161,7 @@ kinematics: {sweep: {crank: {from: 0, to: 90, step: 4}}, outputs: [ram.length]}
     assert table["ram.length"] == pytest.approx([0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_leg_driven_to_zero_is_named() -> None:
     table = limits("""
 mechanism:
@@ -237,6 +238,7 @@ def test_a_crank_that_turns_fully_has_no_limits_and_nothing_to_warn_about() -> N
     assert warnings(text) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_no_limit_of_a_random_six_bar_is_missed_or_invented(seed: int) -> None:
     """Steps of 10 deg find the same ends as poses every hundredth of a degree."""

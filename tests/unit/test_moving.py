@@ -37,6 +37,7 @@ def shown(name, *overrides):
     return moving(study_named(name, *overrides), result), result
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["four_bar", "excavator", "rrr_platform", "jansen"])
 def test_points_are_where_the_table_of_motion_has_them_within_half_a_step(name):
     part, result = shown(name)
@@ -62,6 +63,7 @@ def corners(path):
     return [complex(*map(float, step.split())) for step in path.get("d").lstrip("M").rstrip("z").split("L")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "jansen", "oldham", "whitworth"])
 def test_a_rigid_part_stays_with_the_points_of_its_link(name):
     part, _ = shown(name)
@@ -137,6 +139,7 @@ def test_poses_that_cannot_be_assembled_are_said():
     assert part.data["gaps"] == [(bad[0], bad[-1], "cannot be assembled here")]
 
 
+@pytest.mark.slow
 def test_a_motion_of_361_poses_is_small_and_the_same_again():
     part, _ = shown("jansen", "kinematics.sweep.crank.step=1")
     again, _ = shown.__wrapped__("jansen", "kinematics.sweep.crank.step=1")
@@ -144,6 +147,7 @@ def test_a_motion_of_361_poses_is_small_and_the_same_again():
     assert len(part.drawing) + len(part.beside) + len(json.dumps(part.data)) < 200_000
 
 
+@pytest.mark.slow
 def test_in_a_workspace_every_pose_keeps_the_links_and_has_its_numbers_from_the_table():
     study = load(FOLDER.parent / "five_bar.yaml")
     result = workspace(study)

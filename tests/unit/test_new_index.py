@@ -41,6 +41,7 @@ def reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(indices, "__path__", [*indices.__path__, str(tmp_path)])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("reach")
 def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
     assert "'reach'" in str(schema())

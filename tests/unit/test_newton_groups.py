@@ -121,6 +121,7 @@ def test_a_pose_does_not_depend_on_its_batch_or_order() -> None:
         assert np.array_equal(part.point("P"), whole.point("P")[some], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_an_expression_can_be_given() -> None:
     text = """
 mechanism:

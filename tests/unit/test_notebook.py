@@ -152,6 +152,7 @@ def test_a_study_shows_its_mechanism_and_its_words_stay_text() -> None:
     assert study._repr_png_().startswith(PNG)
 
 
+@pytest.mark.slow
 def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in (0, 70)]
     study = mechdesign.load(DATA | {"name": HOSTILE, "requirements": asked})
@@ -171,6 +172,7 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert "1 of 2 requirements met" in repr(result)
 
 
+@pytest.mark.slow
 def test_of_many_requirements_those_that_are_not_met_are_shown() -> None:
     asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in [*range(60), 99]]
     page = Page(mechdesign.kinematics(mechdesign.load(DATA | {"requirements": asked}))._repr_html_())
@@ -178,6 +180,7 @@ def test_of_many_requirements_those_that_are_not_met_are_shown() -> None:
     assert "21 more requirements" in page.text
 
 
+@pytest.mark.slow
 def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*given):
         raise ValueError("no ink")
@@ -198,6 +201,7 @@ def test_rows_of_several_quantities_show_their_units() -> None:
     assert "4 more columns (worst_case, worst_low, worst_high, valid)" in page.text
 
 
+@pytest.mark.slow
 def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_shown() -> None:
     study = mechdesign.load(DATA | {"requirements": [{"result": "kinematics.nothing", "at_least": 0}]})
     result = mechdesign.kinematics(study)
@@ -207,6 +211,7 @@ def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_show
         result.save("nowhere")
 
 
+@pytest.mark.nightly
 def test_one_picture_by_its_name_whatever_the_settings() -> None:
     result = mechdesign.kinematics(mechdesign.load(DATA))
     assert result.figures == ("motion", "paths", "poses", "transmission", "mechanism")
@@ -225,6 +230,7 @@ def test_one_picture_by_its_name_whatever_the_settings() -> None:
         result.figure("path")
 
 
+@pytest.mark.nightly
 def test_what_is_saved_is_what_the_command_writes(tmp_path: Path) -> None:
     sweep = {"arm": {"from": 0, "to": 90, "number": 4}}
     vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 30}], "methods": ["monte_carlo"], "samples": 500}
@@ -298,6 +304,7 @@ def test_every_question_is_a_function_of_the_package() -> None:
     assert set(QUESTIONS) < set(mechdesign.__all__)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["", *mechdesign.__all__])
 def test_the_example_of_every_public_name_holds(name: str) -> None:
     told = getattr(mechdesign, name) if name else mechdesign
@@ -317,6 +324,7 @@ def hold(told: object, name: str) -> None:
     assert not doctest.DocTestRunner().run(test).failed
 
 
+@pytest.mark.nightly
 def test_the_readme_says_what_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = README.read_text(encoding="utf-8")

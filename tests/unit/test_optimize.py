@@ -83,6 +83,7 @@ def test_scores_are_weighted_sums_of_normalised_indices() -> None:
     assert optimum["l_b"] == pytest.approx(optimum["l_min"] + 2 - optimum["l_a"])
 
 
+@pytest.mark.slow
 def test_conditions_leave_designs_out_and_are_counted() -> None:
     result = rrr("optimize.subject_to=[{result: workspace.area, at_least: 9}]")
     designs = result.tables["designs"]
@@ -101,6 +102,7 @@ def test_no_feasible_design_says_why() -> None:
         rrr("optimize.subject_to=[{result: workspace.area, at_least: 1000}]")
 
 
+@pytest.mark.slow
 def test_a_design_without_workspace_is_infeasible() -> None:
     """Bases too far apart for the legs to meet."""
     changes = ("optimize.variables={R: {from: 1, to: 4, step: 1}}", "mechanism.parameters.l_max=3")
@@ -142,6 +144,7 @@ def test_a_goal_that_no_result_has() -> None:
         mechdesign.optimize(mechdesign.load(CONFIGS / "two_link_arm.yaml", [changes]))
 
 
+@pytest.mark.nightly
 def test_threads_do_not_change_a_bit() -> None:
     steps = ("optimize.variables.l_min.step=0.09", "optimize.variables.l_a.step=0.06")
     study = mechdesign.load(CONFIGS / "two_rrr.yaml", steps)
@@ -184,6 +187,7 @@ def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs()
     assert alone.tables["motion"]["P.y"] == pytest.approx(poses.tables["motion"]["P.y"])
 
 
+@pytest.mark.slow
 def test_design_without_closed_form_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
     drawn = mechdesign.load(CONFIGS / "gallery" / "rrr_orientations.yaml", PLATFORM)
     asked, short = {"P.x": 0.0, "P.y": 0.0, "platform.angle": 0.0}, {f"crank_{k}.length": 80.0 for k in (1, 2, 3)}

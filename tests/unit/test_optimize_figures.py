@@ -50,6 +50,7 @@ def table(**columns: object) -> Table:
     return Table("designs", tuple(Column(name, np.asarray(values), "mm") for name, values in columns.items()))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("names", "expected"), [
     ("a", {"CPI", "optimum"}), ("ab", {"CPI", "indices", "optimum"}), ("abc", {"CPI", "designs", "optimum"}),
 ])  # fmt: skip
@@ -58,6 +59,7 @@ def test_pictures_by_the_number_of_variables(names: str, expected: set[str]) -> 
     assert set(found) == expected
 
 
+@pytest.mark.slow
 def test_the_best_design_is_marked_and_drawn_with_its_own_dimensions() -> None:
     found, result = drawn("a", "b")
     a, b = (float(result.main[name][0]) for name in "ab")
@@ -131,6 +133,7 @@ def test_the_front_is_drawn_with_its_knee() -> None:
     assert "less is better" in axes.get_xlabel()
 
 
+@pytest.mark.nightly
 def test_ends_and_knee_of_a_front_stand_side_by_side_in_their_workspaces() -> None:
     study = study_of(
         ARM

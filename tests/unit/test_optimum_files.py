@@ -51,6 +51,7 @@ def written(study: mechdesign.study.Study, folder: Path) -> mechdesign.results.R
     return result
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["grid", "search"])
 def test_the_optimum_runs_alone_and_has_the_indices_of_the_table(tmp_path, method):
     changes = [
@@ -153,6 +154,7 @@ optimize:
     assert np.isfinite(result.main["kinematics.A.y"][0])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("height", [3.0, 5.0])
 def test_a_sketch_in_which_poses_of_the_workspace_would_assemble_otherwise_is_drawn_anew(tmp_path, height):
     """The base moves until the sketched elbow lies on the line to the point, or beyond it; the drives show neither."""

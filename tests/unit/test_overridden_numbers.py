@@ -37,6 +37,7 @@ def test_dimensions_with_which_the_sketch_does_not_close():
     assert mechdesign.load(text=FIVE_BAR, overrides=["mechanism.parameters.b=110"]).warnings == ()
 
 
+@pytest.mark.nightly
 def test_a_workspace_is_the_same_by_set_and_by_vary():
     text = FIVE_BAR + "workspace: {point: C}\n" + "matrix: {vary: {mechanism.parameters.b: [300]}, results: [area]}\n"
     (varied,) = mechdesign.sweep(mechdesign.load(text=text)).main["area"]

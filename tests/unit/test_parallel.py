@@ -256,6 +256,7 @@ CASES = [
 ]
 
 
+@pytest.mark.nightly
 def test_the_same_bytes_wherever_it_is_computed():
     asked = [(command, mechdesign.load(CONFIGS / f"{name}.yaml", changes)) for command, name, changes in CASES]
     expected = [texts(*each) for each in asked]
