@@ -17,6 +17,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
+from mechdesign.cautions import Caution
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
 from mechdesign.expressions import RESERVED, Expression
@@ -86,6 +87,7 @@ class Study:
     matrix: MatrixSection | None
     sensitivities: SensitivitiesSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
+    fail_on: tuple[str, ...]  #: kinds of warnings that no result may have
     targets: Mapping[str, Target]  # by the coordinate or point
     kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     fixed: frozenset[str]  # parameters in whole numbers, which are read once
@@ -97,6 +99,11 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What is likely a mistake, as warnings of its results."""
+        return tuple(Caution("suspect", f"{problem.key}: {problem.message}") for problem in self.warnings)
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -343,6 +350,7 @@ def load_document(
         matrix=parts.get("matrix"),
         sensitivities=parts.get("sensitivities"),
         requirements=parts["requirements"],
+        fail_on=parts["fail_on"],
         targets=parts["targets"],
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
