@@ -48,7 +48,7 @@ def of_error(error: Exception, message: str, study: Study | None = None) -> Sequ
 
 def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iterator[Problem]:
     """The requirements of a command that are not met, also those on warnings, with their places in the study."""
-    places = [("requirements", index) for index in judged_by(study, command)] + [("fail_on",)] * len(study.fail_on)
+    places = [("requirements", index) for index in judged_by(study, command)] + [("fail_on",)] * len(study.barred)
     for place, verdict in zip(places, verdicts, strict=True):
         if not verdict.met:
             yield study.problem(f"requirement: {verdict}", *place)

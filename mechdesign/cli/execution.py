@@ -16,7 +16,7 @@ from typing import Any
 import mechdesign
 from mechdesign import shards
 from mechdesign.analyses.look import LONG
-from mechdesign.cautions import ALL, Caution
+from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.options import Options
@@ -115,7 +115,7 @@ def load_source(source: Source, options: Options) -> Study:
         Every mistake of the study or the overrides.
     """
     study = load_bytes(source.text, source.path, options.overrides or (), options.seed, source.folder)
-    return dataclasses.replace(study, fail_on=(ALL,)) if options.strict else study
+    return dataclasses.replace(study, strict=True) if options.strict else study
 
 
 def load_study(path: Path | None, options: Options) -> Study:

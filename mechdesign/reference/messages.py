@@ -264,6 +264,8 @@ class _Reader(ast.NodeVisitor):
                 self._add(node.args, getattr(getattr(errors, name, None), "exit_code", 2))
         elif name == "doubt":
             self._add(node.args, None)
+        elif name == "Caution":
+            self._add(node.args[1:2], None)
         elif name in ("append", "extend") and (owner in _LISTS or self.texts):
             # What is kept as several values together is no text yet.
             given = [each for each in node.args if not isinstance(each, ast.Tuple)]

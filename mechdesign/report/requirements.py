@@ -51,7 +51,7 @@ def on_warnings(study: Study, warnings: Iterable[Caution]) -> tuple[Verdict, ...
     """Verdicts on the warnings of a study's file and of a result: a kind that the study's `fail_on` lists has none."""
     warnings = [*study.cautions, *warnings]
     verdicts = []
-    for kind in study.fail_on:
+    for kind in study.barred:
         same = [str(warning) for warning in warnings if fails(warning, [kind])]
         more = f"; and {len(same) - 1} more" if len(same) > 1 else ""
         note = f"{same[0]}{more}" if same else ""
@@ -61,7 +61,7 @@ def on_warnings(study: Study, warnings: Iterable[Caution]) -> tuple[Verdict, ...
 
 def judged_again(study: Study, verdicts: Sequence[Verdict], warnings: Iterable[Caution]) -> tuple[Verdict, ...]:
     """The verdicts on a result that has other warnings now, as of pictures; none where there were none."""
-    return (*verdicts[: len(verdicts) - len(study.fail_on)], *on_warnings(study, warnings)) if verdicts else ()
+    return (*verdicts[: len(verdicts) - len(study.barred)], *on_warnings(study, warnings)) if verdicts else ()
 
 
 def command_of(requirement: Requirement) -> str:
@@ -76,7 +76,7 @@ def judged_by(study: Study, command: str) -> list[int]:
 
 def number_of(study: Study, command: str) -> int:
     """Number of a command's verdicts: those on requirements, and on kinds of warnings."""
-    return len(judged_by(study, command)) + len(study.fail_on)
+    return len(judged_by(study, command)) + len(study.barred)
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:

@@ -243,7 +243,7 @@ def test_optimum_at_a_bound_and_a_condition():
 def test_a_search_that_was_cut_short_says_so():
     result = mechdesign.optimize(study_of(ARM, "optimize.evaluations=30"))
     assert result.counts["designs"] <= 30
-    assert "the search ended with its 30 evaluations" in result.warnings[0]
+    assert "the search ended with its 30 evaluations" in str(result.warnings[0])
 
 
 def test_sensitivity_is_the_change_of_the_score_a_step():

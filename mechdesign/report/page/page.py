@@ -178,7 +178,7 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     rows: list[tuple[bool, int, dict[str, Any]]] = []
     rules = [
         *map(_in_words, study.requirements),
-        *({"what": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.fail_on),
+        *({"what": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for each in answers:
