@@ -67,8 +67,8 @@ def _given(nodes: Iterable[ast.AST]) -> dict[str, list[ast.expr]]:
             pairs = [(node.func.value, node.args[0])]
         for target, value in pairs:
             targets = target.elts if isinstance(target, ast.Tuple) else [target]
-            apart = isinstance(value, ast.Tuple) and len(value.elts) == len(targets) > 1
-            for each, own in zip(targets, value.elts if apart else [value] * len(targets), strict=True):
+            apart = value.elts if isinstance(value, ast.Tuple) and len(value.elts) == len(targets) > 1 else None
+            for each, own in zip(targets, apart or [value] * len(targets), strict=True):
                 found.setdefault(_name(each), []).append(own)
     return found
 

@@ -357,6 +357,7 @@ def load_document(
         sensitivities=parts.get("sensitivities"),
         requirements=parts["requirements"],
         fail_on=parts["fail_on"],
+        strict=False,
         targets=parts["targets"],
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
