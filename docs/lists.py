@@ -13,6 +13,7 @@ from itertools import groupby
 
 import yaml
 
+from mechdesign.cautions import KINDS
 from mechdesign.reference import Entry, entries, tables
 from mechdesign.reference.messages import PART, messages
 from mechdesign.reference.tables import TableText
@@ -175,18 +176,21 @@ def table_page(command: str, found: Iterable[TableText]) -> str:
 def messages_page() -> str:
     """The page of errors and warnings."""
     parts = [
-        "Every error and warning, in the order in which one meets them; `<words>` stand for what differs. Behind an "
+        "Every error and warning, in the order in which one meets them; `…` stands for what differs. Behind an "
         "arrow stands what mends it, where the message does not say so itself. `mechdesign docs TEXT` finds those that "
         'contain a text, for example `mechdesign docs "singular position"`, or a whole message as it was printed.',
         "An error of a study begins with the file, the line, the column and the key. Exit codes are those of "
         "[](exit_codes.md): with 2 nothing was computed.",
     ]
+    kinds = (f"- {code(kind)}: {each.meaning}. See [](../../{each.page}.md)." for kind, each in KINDS.items())
+    parts += ["## Kinds of warnings", "What `fail_on` lists, and the page that tells more.", "\n".join(kinds)]
     for group, about in groupby(messages(), key=lambda message: message.group):
-        parts += [f"## {group.title}", group.about]
+        parts += [f"## {group.group}", group.about]
         told = list(about)
         for title, codes in MESSAGES.items():
             lines = [
-                f"- {code(each.text)}" + (f" \N{RIGHTWARDS ARROW} {each.mend}" if each.mend else "")
+                f"- {code(each.text)}" + f" ([{each.kind}](#kinds-of-warnings))" * bool(each.kind)
+                + f" \N{RIGHTWARDS ARROW} {each.mend}" * bool(each.mend)
                 for each in told if each.code in codes
             ]  # fmt: skip
             if lines:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.cautions import Caution
 from mechdesign.statistics import Asked, Course
 
 if TYPE_CHECKING:
@@ -256,7 +257,7 @@ class Result:
 
     command: str  #: its name in `mechdesign.commands.COMMANDS`
     tables: Mapping[str, Table]  #: named as their files; the first is the main table
-    warnings: Sequence[str] = ()  #: what the user must know, such as poses that failed
+    warnings: Sequence[Caution] = ()  #: what the user must know, such as poses that failed
     counts: Mapping[str, int] = field(default_factory=dict)  #: poses, samples, designs; how many of them were invalid
     failed: str = ""  #: why a pose that a person asked for could not be assembled (exit code 3); tables are whole
     files: Mapping[str, str] = field(default_factory=dict)  #: texts to be written with the tables, by their file names

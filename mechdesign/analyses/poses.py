@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.cautions import Caution
 from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
@@ -229,7 +230,9 @@ def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -
     ]
 
 
-def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8], begin: int = 0) -> tuple[list[str], str]:
+def judge_failures(
+    study: Study, poses: Poses, reason: NDArray[np.int8], begin: int = 0, table: str = ""
+) -> tuple[list[Caution], str]:  # fmt: skip
     """Warnings for poses of a design that failed, and the message where that is an error (exit code 3).
 
     Parameters
@@ -238,6 +241,8 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8], begin: 
         See `mechdesign.mechanism.Reason`.
     begin : int
         Row of its first pose.
+    table : str
+        The table whose rows are the poses of the design, if there is one.
 
     Raises
     ------
@@ -251,9 +256,10 @@ def judge_failures(study: Study, poses: Poses, reason: NDArray[np.int8], begin: 
     named = [f"{pose_in_words(study, poses, begin + int(row))}: {Reason(int(reason[row])).text}" for row in bad[:5]]
     if len(bad) == len(reason):
         raise AssemblyError(f"no pose is valid; {'; '.join(named)}" + ("; ..." if len(bad) > len(named) else ""))
+    place = (table, int(bad[0]) if table else None, pose_in_words(study, poses, begin + int(bad[0])))
     if poses.listed:
-        return [invalid], f"pose {'; pose '.join(named)}"
-    return [f"{invalid}; the first: {named[0]}"], ""
+        return [Caution("unassembled", invalid, *place)], f"pose {'; pose '.join(named)}"
+    return [Caution("unassembled", f"{invalid}; the first: {named[0]}", *place)], ""
 
 
 def invalid_in_words(reason: NDArray[np.int8]) -> str:

@@ -8,6 +8,7 @@ from typing import overload
 
 import numpy as np
 
+from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Ints
 from mechdesign.results import Column, Result, Scope, Table
 from mechdesign.statistics import Asked, Course
@@ -17,7 +18,7 @@ from mechdesign.statistics import Asked, Course
 class End:
     """How a design was answered: `missing` says which poses or parts of its motion are not valid."""
 
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Caution] = ()
     failed: str = ""
     missing: str = ""
     counts: Mapping[str, int] = field(default_factory=dict)

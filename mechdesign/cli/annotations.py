@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
+from mechdesign.cautions import Caution
 from mechdesign.cli import terminal
 from mechdesign.errors import MechdesignError, Problem, StudyError
 from mechdesign.report.requirements import Verdict, judged_by
@@ -46,15 +47,16 @@ def of_error(error: Exception, message: str, study: Study | None = None) -> Sequ
 
 
 def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iterator[Problem]:
-    """The requirements of a command that are not met, with their places in the study."""
-    for index, verdict in zip(judged_by(study, command), verdicts, strict=True):
+    """The requirements of a command that are not met, also those on warnings, with their places in the study."""
+    places = [("requirements", index) for index in judged_by(study, command)] + [("fail_on",)] * len(study.barred)
+    for place, verdict in zip(places, verdicts, strict=True):
         if not verdict.met:
-            yield study.problem(f"requirement: {verdict}", "requirements", index)
+            yield study.problem(f"requirement: {verdict}", *place)
 
 
-def of_warnings(study: Study, command: str, warnings: Sequence[str]) -> Iterator[Problem]:
+def of_warnings(study: Study, command: str, warnings: Sequence[Caution]) -> Iterator[Problem]:
     """Warnings of a command with their places; what the study's file is warned of stands there."""
     known = {str(problem): problem for problem in study.warnings}
     for warning in warnings:
         file = str(study.path) if study.path is not None else ""
-        yield known.get(warning) or Problem(f"{study.label}: {command}: {warning}", file=file)
+        yield known.get(str(warning)) or Problem(f"{study.label}: {command}: {warning}", file=file)

@@ -38,7 +38,7 @@ from mechdesign.files import check_marked, owned
 from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import command_of, judged_by
+from mechdesign.report.requirements import command_of, number_of
 from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
 
@@ -285,7 +285,7 @@ def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -
         study.label,
         [(given.command, given.word, given.exit_code) for given in told],
         met=sum(verdict.met for verdict in verdicts),
-        required=sum(len(judged_by(study, command)) for command, _ in task.questions),
+        required=sum(number_of(study, command) for command, _ in task.questions),
         warnings=len({warning for given in told for warning in given.warnings}),
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",

@@ -16,9 +16,9 @@ from mechdesign.cli.places import claim, extras, folder
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
-from mechdesign.mechanism.describe import describe
+from mechdesign.mechanism.describe import describe, sketch_doubts
 from mechdesign.parallel import one_thread
-from mechdesign.report.requirements import foresee
+from mechdesign.report.requirements import foresee, on_warnings
 from mechdesign.report.writer import write_sketch
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
@@ -38,9 +38,14 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
                 terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
+            doubts = sketch_doubts(study.mechanism)
             for warning in study.warnings:
-                terminal.say(f"{label}: warning: {warning}", quiet=options.quiet)
+                terminal.say(f"{label}: warning: {warning} [suspect]", quiet=options.quiet)
             annotate("warning", study.warnings)
+            for verdict in on_warnings(study, doubts):
+                if not verdict.met:
+                    terminal.say(f"{label}: requirement: {verdict}")
+                    worst = max(worst, 1)
             _foresee(study)
             if not options.no_plots:
                 claim(owners, study)

@@ -16,6 +16,7 @@ from typing import Any
 import mechdesign
 from mechdesign import shards
 from mechdesign.analyses.look import LONG
+from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
 from mechdesign.cli.options import Options
@@ -31,7 +32,7 @@ from mechdesign.report.before import laid_under
 from mechdesign.report.cases import best_of
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict, judged_by
+from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.shards import Shard
@@ -70,7 +71,7 @@ class Outcome:
     directory: Path
     exit_code: int
     rows: int
-    warnings: Sequence[str] = ()
+    warnings: Sequence[Caution] = ()
     failed: str = ""
     verdicts: Sequence[Verdict] = ()
     seconds: float = 0.0
@@ -106,14 +107,15 @@ def source(path: Path | None, options: Options) -> Source:
 
 
 def load_source(source: Source, options: Options) -> Study:
-    """Load a study with the options' overrides and seed.
+    """Load a study with the options' overrides and seed; where they are strict, every warning fails.
 
     Raises
     ------
     StudyError
         Every mistake of the study or the overrides.
     """
-    return load_bytes(source.text, source.path, options.overrides or (), options.seed, source.folder)
+    study = load_bytes(source.text, source.path, options.overrides or (), options.seed, source.folder)
+    return dataclasses.replace(study, strict=True) if options.strict else study
 
 
 def load_study(path: Path | None, options: Options) -> Study:
@@ -180,7 +182,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         journal.discard()
     shards.remove(directory)
-    warnings = [*map(str, study.warnings), *result.warnings, *undrawn]
+    warnings = [*(Caution("suspect", str(each)) for each in study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
@@ -233,17 +235,18 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
         return None
     numbers = {"worst": math.nan, "margin": math.nan}
     try:
-        verdicts = [
+        judged = [
             Verdict(**entry | {key: value for key, value in numbers.items() if entry.get(key) is None})
-            for entry in content["requirements"]
+            for entry in content["requirements"][: len(judged_by(study, command))]
         ]
         table = _main_table(directory, content)
-        warnings, failed = [*map(str, content["warnings"])], str(content["failed"])
+        warnings, failed = [Caution(**each) for each in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
         # Damaged: of another hand than ours.
         return None
-    if len(verdicts) != len(judged_by(study, command)):
+    if len(judged) != len(judged_by(study, command)):
         return None
+    verdicts = [*judged, *on_warnings(study, warnings[len(study.warnings) :])]
     settle(directory)
     code = _exit_code(failed, verdicts, table)
     return Outcome(
@@ -276,7 +279,7 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 def _judged_and_written(
     directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress
-) -> tuple[Sequence[Verdict], Sequence[str]]:
+) -> tuple[Sequence[Verdict], Sequence[Caution]]:
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
         verdicts = requirements.requirements(study, result)
@@ -285,7 +288,8 @@ def _judged_and_written(
             # What took long is not lost to a requirement that names a row it has not.
             writer.write(directory, study, result, (), asked)
         raise
-    return verdicts, writer.write(directory, study, result, verdicts, asked, jobs, progress)
+    undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress)
+    return judged_again(study, verdicts, (*result.warnings, *undrawn)), undrawn
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
@@ -301,7 +305,7 @@ def tell(given: Outcome, study: Study, options: Options) -> None:
     """Say on stderr, and to GitHub, what came out; what is not met or failed is said even where quiet is wanted."""
     who = f"{given.study}: {given.command}:"
     for warning in given.warnings:
-        terminal.say(f"{who} warning: {warning}", quiet=options.quiet)
+        terminal.say(f"{who} warning: {warning} [{warning.kind}]", quiet=options.quiet)
     for verdict in given.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
     if given.command == SWEEP.name and given.table is not None and (best := best_of(given.table)) is not None:

@@ -152,6 +152,7 @@ BEFORE = _text(
 )
 JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
 FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
+STRICT = _flag("strict", "--strict", "Every warning fails, as with fail_on: all in the study: exit code 1.")
 RESUME = _flag(
     "resume",
     "--resume",
@@ -266,7 +267,7 @@ OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default:
 # Of the cases of a sweep.
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
 # What every question takes, and what only some of them do.
-COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
+COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, STRICT, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {
     "kinematics": (ANIMATE, ALL_MODES, BEFORE),
     "workspace": (BEFORE,),
@@ -304,6 +305,7 @@ class Options:
     before: Path | None = None
     junit: Path | None = None
     fail_fast: bool = False
+    strict: bool = False
     resume: bool = False
     verify: Path | None = None
     allow_files: bool = False

@@ -78,7 +78,7 @@ def junit(answers: Sequence[Outcome]) -> str:
             if given.left:
                 case.result = [Skipped("the run ended before it")]
             if given.warnings:
-                case.system_out = "\n".join(f"warning: {printable(warning)}" for warning in given.warnings)
+                case.system_out = "\n".join(f"warning: {printable(str(warning))}" for warning in given.warnings)
             suite.add_testcase(case)
             for verdict in given.verdicts:
                 case = TestCase(f"{given.command}: {printable(verdict.requirement)}", classname=name, time=0)

@@ -54,8 +54,7 @@ def study_html(study: Study, picture: bytes | None) -> str:
         "questions": list(study.questions),
         "changed": list(study.overrides),
     }
-    warnings = [f"{warning.key}: {warning.message}" for warning in study.warnings]
-    return _render("study.html.j2", name=study.name, facts=facts, warnings=warnings, picture=_inline(picture))
+    return _render("study.html.j2", name=study.name, facts=facts, warnings=study.cautions, picture=_inline(picture))
 
 
 def answer_html(

@@ -79,7 +79,7 @@ class Answer(Result):
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
-        """What became of those requirements of the study that concern this result; none where it was interrupted.
+        """Verdicts on the requirements that concern this result and on its warnings; none where it was interrupted.
 
         Raises
         ------
@@ -153,7 +153,7 @@ class Answer(Result):
         with owned(folder):
             undrawn = writer.write(folder, self.study, self, self.verdicts, asked)
         for warning in undrawn:
-            warnings.warn(warning, stacklevel=2)
+            warnings.warn(str(warning), stacklevel=2)
         return folder
 
     def __repr__(self) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechdesign.analyses.together import Group
+from mechdesign.cautions import fails
 from mechdesign.errors import explain
 from mechdesign.experiments.wanted import Wanted, judged
 from mechdesign.numerics.arrays import Floats, Ints
@@ -19,6 +20,8 @@ from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.schema.optimize import Requirement
 
+# Exit code of a case of which a requirement is not met, or that has a warning that must not be.
+NOT_MET = 1
 # Exit code of a case that the mechanism, or what the case says of it, makes impossible.
 IMPOSSIBLE = 3
 
@@ -31,6 +34,15 @@ class Worst:
     verdict: Verdict
     unmet: int = 0
     first: int = 0  #: of those that do not meet it
+
+
+@dataclass
+class Warned:
+    """The first case with warnings of a kind, the first of these with its command, and how many cases have some."""
+
+    case: int
+    message: str
+    cases: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +59,8 @@ class Answered:
         Why cases, or parts of them, could not be answered; empty where they were.
     units : tuple of str
         Of what was wanted and of each requirement; empty where none was found.
-    warned : tuple, optional
-        The first case with warnings, the first of these, and how many it has.
+    warned : mapping of str to Warned
+        By the kind of warning, in the order of their first cases.
     worst : tuple of Worst
         Of each requirement.
     """
@@ -56,7 +68,7 @@ class Answered:
     table: Floats
     reasons: tuple[str, ...]
     units: tuple[str, ...]
-    warned: tuple[int, str, int] | None
+    warned: Mapping[str, Warned]
     worst: tuple[Worst, ...]
 
 
@@ -65,13 +77,15 @@ class Sheet:
 
     def __init__(self, study: Study, wanted: Sequence[Wanted], count: int) -> None:
         self._required, self._wanted, self._mobility = study.requirements, wanted, study.mechanism.mobility
+        self._fail_on = study.fail_on
         self._numbers = np.full((count, len(wanted)), np.nan)
         self._worst, self._margins = np.full((2, count, len(self._required)), np.nan)
         self._met = np.zeros((count, len(self._required)), dtype=bool)
         self._units = [""] * (len(wanted) + len(self._required))
         self._reasons: list[dict[str, int]] = [{} for _ in range(count)]
         self._warnings = np.zeros(count, dtype=np.intp)
-        self._first: dict[int, str] = {}
+        # Of each kind, by the row: the first warning, and how many there are.
+        self._warned: dict[str, dict[int, tuple[str, int]]] = {}
         # Of each requirement the row of the worst case so far, and the verdict on it.
         self._verdicts: dict[int, tuple[int, Verdict]] = {}
 
@@ -89,9 +103,14 @@ class Sheet:
                 self.failed(row, command, end.error)
             if end.failed:
                 self._reasons[row][f"{command}: {end.failed}"] = IMPOSSIBLE
-            if end.warnings:
-                self._warnings[row] += len(end.warnings)
-                self._first.setdefault(row, f"{command}: {end.warnings[0]}")
+            self._warnings[row] += len(end.warnings)
+            for warning in end.warnings:
+                told = f"{command}: {warning}"
+                rows_of_kind = self._warned.setdefault(warning.kind, {})
+                first, number = rows_of_kind.get(row, (told, 0))
+                rows_of_kind[row] = first, number + 1
+                if fails(warning, self._fail_on):
+                    self._reasons[row].setdefault(told, NOT_MET)
         self._read(rows, designs, group)
 
     def _read(self, rows: Ints, designs: Designs, group: Group) -> None:
@@ -144,12 +163,16 @@ class Sheet:
         number = [reasons.setdefault("; ".join(each), len(reasons)) for each in self._reasons]
         judged = np.stack([self._worst, self._met], axis=2).reshape(len(codes), -1)
         table = np.column_stack([codes, self._warnings, number, self._numbers, judged])
-        warned = min(self._first, default=None)
         return Answered(
-            table, tuple(reasons), tuple(self._units),
-            None if warned is None else (warned, self._first[warned], int(self._warnings[warned])),
+            table, tuple(reasons), tuple(self._units), dict(sorted(self._kinds(), key=lambda item: item[1].case)),
             tuple(self._worst_of(k) for k in range(len(self._required))),
         )  # fmt: skip
+
+    def _kinds(self) -> Iterator[tuple[str, Warned]]:
+        for kind, rows in self._warned.items():
+            row = min(rows)
+            message, number = rows[row]
+            yield kind, Warned(row, f"{message} (and {number - 1} more)" if number > 1 else message, len(rows))
 
     def _worst_of(self, k: int) -> Worst:
         row = int(_ordered(self._margins[:, k]).argmin())

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic_core import PydanticCustomError
 
+from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments.cases import Case, answers, foresee, seeded
@@ -113,7 +114,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     study = seeded(study, seed)
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
-    plain = replace(study, requirements=(), resolved=judged_by_none)
+    plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
     cases = [Case(()), *(case for each in numbers for case in each.cases())]
     progress.start(len(cases), "cases")
     tally = Tally(cases, len(wanted), 0)
@@ -124,10 +125,14 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     table = _table(rows, [tally.result(k)[1] for k in range(len(wanted))], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
     failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
-    told = [f"{row.result} by {row.parameter}: {row.doubt}" for row in rows if row.doubt]
-    if tally.warned is not None:
-        warned = int((tally.table[:, 1] > 0).sum())
-        told.append(f"{warned} of {counted(len(tally), 'case')} have warnings; the first: {tally.warned[1]}")
+    told = [
+        Caution("unconverged", f"{row.result} by {row.parameter}: {row.doubt}", table.name, k)
+        for k, row in enumerate(rows)
+        if row.doubt
+    ]
+    for kind, warned in tally.warned.items():
+        words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first: {warned.message}"
+        told.append(Caution(kind, words))
     return Result(SENSITIVITIES.name, {table.name: table}, told, counts, failed)
 
 

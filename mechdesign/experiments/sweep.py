@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError, counted
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
 from mechdesign.experiments.design import Design, Listed, cases_of
@@ -162,28 +163,31 @@ def requirement_names(study: Study) -> list[str]:
     ]  # fmt: skip
 
 
-def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[str]:
+def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caution]:
     matrix, cases = study.matrix, tally.cases
     assert matrix is not None
     samples = len(cases)
     if matrix.method == "sobol" and matrix.vary is not None and samples & (samples - 1):
         near = 1 << samples.bit_length()
-        yield f"{samples} samples of a Sobol' sequence are less even than a power of two: {near // 2} or {near}"
+        words = f"{samples} samples of a Sobol' sequence are less even than a power of two: {near // 2} or {near}"
+        yield Caution("suspect", words)
     if isinstance(cases, Listed):
         first: dict[str, int] = {}
         twice = [(k, seen) for k, row in enumerate(cases.rows) if (seen := first.setdefault(json.dumps(row), k)) != k]
         if twice:
             k, seen = twice[0]
-            yield f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {seen + 1} once more"
-    if tally.warned is not None:
-        k, warning, number = tally.warned
-        more = f" (and {number - 1} more)" if number > 1 else ""
-        warned = int((tally.table[:, 1] > 0).sum())
-        yield f"{warned} of {counted(len(tally), 'case')} have warnings; the first, {tally.named(k)}: {warning}{more}"
+            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {seen + 1} once more"
+            yield Caution("suspect", words, "sweep", pose=tally.named(k))
+    for kind, warned in tally.warned.items():
+        case = tally.named(warned.case)
+        words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first, {case}: {warned.message}"
+        yield Caution(kind, words, "sweep", pose=case)
     met = tally.table[:, 0] == 0
     if ranked is not None and len(without := np.flatnonzero(met & ~ranked)):
         answered = counted(int(met.sum()), "case")
-        yield (f"{len(without)} of {answered} that meet every requirement have no rank: a goal is no finite number, or "
-               f"part of the motion is missing; the first is {tally.named(int(without[0]))}")  # fmt: skip
+        case = tally.named(int(without[0]))
+        words = (f"{len(without)} of {answered} that meet every requirement have no rank: a goal is no finite number, "
+                 f"or part of the motion is missing; the first is {case}")  # fmt: skip
+        yield Caution("undefined", words, "sweep", pose=case)
     elif ranked is not None and not met.any():
-        yield "no case is ranked: none was answered and meets every requirement"
+        yield Caution("infeasible", "no case is ranked: none was answered and meets every requirement", "sweep")

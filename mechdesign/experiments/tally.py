@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Worst
+from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Warned, Worst
 from mechdesign.experiments.cases import Case
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Floats
@@ -41,7 +41,7 @@ class Tally:
         self.reasons: dict[str, int] = {"": 0}
         self._units = [""] * (results + requirements)
         self.worst: list[Worst] = []
-        self.warned: tuple[int, str, int] | None = None  # the first case with warnings, the first of these, how many
+        self.warned: dict[str, Warned] = {}  # by the kind of warning
         self._sizes: list[int] = []  # of the blocks that the journal has
         self._noted = time.monotonic()
 
@@ -55,9 +55,9 @@ class Tally:
         table[:, 2] = np.array(numbers)[table[:, 2].astype(np.intp)]
         self._rows.frombytes(table.tobytes())
         self._units = [known or unit for known, unit in zip(self._units, answered.units, strict=True)]
-        if self.warned is None and answered.warned is not None:
-            row, warning, number = answered.warned
-            self.warned = begin + row, warning, number
+        for kind, warned in answered.warned.items():
+            before = self.warned.setdefault(kind, replace(warned, case=begin + warned.case, cases=0))
+            before.cases += warned.cases
         new = [replace(each, case=begin + each.case, first=begin + each.first) for each in answered.worst]
         for worst, each in zip(self.worst, new, strict=bool(self.worst)):
             if _margin(each.verdict) < _margin(worst.verdict):
@@ -131,12 +131,14 @@ class Tally:
             self._sizes.append(len(block))
             journal.add(key, block, journal.words)
         self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
-        self._units, self.warned = state["units"], tuple(state["warned"]) if state["warned"] else None
+        self._units = state["units"]
+        self.warned = {kind: Warned(**each) for kind, each in state["warned"].items()}
         self.worst = [Worst(**each | {"verdict": Verdict(**each["verdict"])}) for each in state["worst"]]
 
     def _state(self) -> Mapping[str, Any]:
         return {
-            "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units, "warned": self.warned,
+            "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units,
+            "warned": {kind: asdict(each) for kind, each in self.warned.items()},
             "worst": [asdict(each) for each in self.worst],
         }  # fmt: skip
 

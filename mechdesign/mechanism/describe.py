@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.mechanism.derivatives import regularity
@@ -59,6 +60,11 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
     return lines
 
 
+def sketch_doubts(mechanism: Mechanism) -> list[Caution]:
+    """A warning where the sketch is at a singular position."""
+    return near_singular(float(regularity(mechanism.linearize(mechanism.sketch_configuration))))
+
+
 def describe(mechanism: Mechanism) -> str:
     """Links, joints, mobility, the order of solution, assembly modes, measures, limits, and a warning if singular."""
     description, graph = mechanism.description, mechanism.graph
@@ -77,8 +83,7 @@ def describe(mechanism: Mechanism) -> str:
     lines.append(f"branch: {description.branch}")
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
-    singular = near_singular(float(regularity(mechanism.linearize(mechanism.sketch_configuration))))
-    return "\n".join([*lines, *([singular] if singular else [])])
+    return "\n".join([*lines, *(f"warning: {doubt}" for doubt in sketch_doubts(mechanism))])
 
 
 def links_in_words(description: Description) -> list[LinkWords]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED
@@ -52,14 +53,15 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
     return found
 
 
-def near_singular(regularity: float) -> str | None:
+def near_singular(regularity: float) -> list[Caution]:
     """A warning where a sketch has so small a regularity."""
     if regularity >= STALLED:
-        return None
-    return (
-        f"warning: the sketch is at a singular position (regularity {regularity:.1g} of 1): its drives hold the links "
-        "hardly or not at all there, and rates there mean nothing"
-    )
+        return []
+    return [Caution(
+        "singular",
+        f"the sketch is at a singular position (regularity {regularity:.1g} of 1): its drives hold the links "
+        "hardly or not at all there, and rates there mean nothing",
+    )]  # fmt: skip
 
 
 def wrong_count(

@@ -72,6 +72,14 @@ class _Study(BaseModel):
     resolved: dict[str, Any]
 
 
+class _Warning(BaseModel):
+    kind: str
+    message: str
+    table: str = ""
+    row: int | None = Field(None, ge=0)
+    pose: str = ""
+
+
 class _Verdict(BaseModel):
     requirement: str
     met: bool
@@ -99,7 +107,7 @@ class _Manifest(BaseModel):
     style: str
     before: dict[str, Any] | None
     counts: dict[str, Any]
-    warnings: list[str]
+    warnings: list[_Warning]
     failed: str
     interrupted: str = ""
     requirements: list[_Verdict]
@@ -196,7 +204,7 @@ def compose(
         | asdict(asked)
         | {
             "counts": plain(dict(result.counts)),
-            "warnings": [*(f"{warning.key}: {warning.message}" for warning in study.warnings), *result.warnings],
+            "warnings": [warning.as_data() for warning in (*study.cautions, *result.warnings)],
             "failed": result.failed,
             **({"interrupted": result.interrupted} if result.interrupted else {}),
             "requirements": [plain(asdict(verdict)) for verdict in verdicts],

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
 from mechdesign.results import POSES_ONLY, Result, Table
@@ -41,6 +42,28 @@ class Verdict:
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}{note}"
 
 
+def named(kind: str) -> str:
+    """The warnings that an entry of `fail_on` is about, in words."""
+    return "warnings" if kind == ALL else f"warnings of kind {kind}"
+
+
+def on_warnings(study: Study, warnings: Iterable[Caution]) -> tuple[Verdict, ...]:
+    """Verdicts on the warnings of a study's file and of a result: a kind that the study's `fail_on` lists has none."""
+    warnings = [*study.cautions, *warnings]
+    verdicts = []
+    for kind in study.barred:
+        same = [str(warning) for warning in warnings if fails(warning, [kind])]
+        more = f"; and {len(same) - 1} more" if len(same) > 1 else ""
+        note = f"{same[0]}{more}" if same else ""
+        verdicts.append(Verdict(f"{named(kind)} at most 0", not same, len(same), margin=0.0 - len(same), note=note))
+    return tuple(verdicts)
+
+
+def judged_again(study: Study, verdicts: Sequence[Verdict], warnings: Iterable[Caution]) -> tuple[Verdict, ...]:
+    """The verdicts on a result that has other warnings now, as of pictures; none where there were none."""
+    return (*verdicts[: len(verdicts) - len(study.barred)], *on_warnings(study, warnings)) if verdicts else ()
+
+
 def command_of(requirement: Requirement) -> str:
     """The command whose result a requirement judges."""
     return command_named(requirement.result)
@@ -49,6 +72,11 @@ def command_of(requirement: Requirement) -> str:
 def judged_by(study: Study, command: str) -> list[int]:
     """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
     return [k for k, each in enumerate(study.requirements) if command in (command_of(each), SWEEP.name)]
+
+
+def number_of(study: Study, command: str) -> int:
+    """Number of a command's verdicts: those on requirements, and on kinds of warnings."""
+    return len(judged_by(study, command)) + len(study.barred)
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
@@ -96,11 +124,12 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
 
 @few_comparisons()
 def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[Verdict, ...]:
-    """Verdicts on those requirements of a study that concern a result, in the order of the study.
+    """Verdicts on those requirements of a study that concern a result, in the order of the study; then on its warnings.
 
     The worst row counts: the smallest value for `at_least`, the largest for `at_most`; along a motion the worst place
     between the rows, too. nan is not met, nor is a requirement on a motion that is not valid at every pose and between
-    them (unless it says ``unassembled: allowed``), nor one that no row answers.
+    them (unless it says ``unassembled: allowed``), nor one that no row answers. Of a kind of warning that `fail_on`
+    lists there may be none.
 
     Parameters
     ----------
@@ -130,7 +159,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30 (of the asked poses only)
     """
     if "cases" in result.drawn:
-        return tuple(result.drawn["cases"].verdicts)
+        return (*result.drawn["cases"].verdicts, *on_warnings(study, result.warnings))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -142,7 +171,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
             problems.append(study.problem(str(error), "requirements", index))
     if problems:
         raise StudyError(problems)
-    return tuple(verdicts)
+    return (*verdicts, *on_warnings(study, result.warnings))
 
 
 def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: bool = True) -> Verdict:

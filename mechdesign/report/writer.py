@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import Transaction, check_marked, check_writable, flowing, replace
 from mechdesign.progress import NULL, Progress
@@ -17,7 +18,7 @@ from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.names import ANIMATION, MECHANISM
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import Verdict
+from mechdesign.report.requirements import Verdict, judged_again
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
@@ -31,7 +32,7 @@ DIMENSIONS = "dimensions"  # of `check`
 CREATOR = "mechdesign"  # by which a drawing is known that no manifest lists
 FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
-_UNDRAWN = "the run ended before its pictures were written"
+_UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")
 # Ends the names under which pictures stand as HTML.
 INLINE = ".html"
 
@@ -44,7 +45,7 @@ def write(
     asked: Extras,
     jobs: int | None = None,
     progress: Progress = NULL,
-) -> tuple[str, ...]:
+) -> tuple[Caution, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
@@ -62,7 +63,7 @@ def write(
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     own, more = manifest.own(directory), (asked.plots or asked.report) and not result.interrupted
     pages.remove(directory / pages.REPORT)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Caution, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         _check_room(directory, result)
@@ -85,6 +86,7 @@ def write(
             drawn[pages.SECTION] = section.encoded(part)
         if drawn or more:
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+            verdicts = judged_again(study, verdicts, told.warnings)
             own = {*digests, manifest.NAME}
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
@@ -195,7 +197,7 @@ def figures(study: Study, result: Result) -> Gallery:
 
 def pictures(
     study: Study, result: Result, asked: Extras, jobs: int | None = None
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
+) -> tuple[dict[str, bytes], tuple[Caution, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
     For a report there is of each also the HTML by which it stands in a page, under its name and `INLINE`.
@@ -231,7 +233,7 @@ def pictures(
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":
         del drawn[ANIMATION]
-        warnings.append("no animation: it needs a sweep of one coordinate or a path")
+        warnings.append(Caution("undrawn", "no animation: it needs a sweep of one coordinate or a path"))
     return drawn, tuple(warnings)
 
 
@@ -239,5 +241,5 @@ def _inline(drawn: Iterable[str]) -> list[str]:
     return [name.removesuffix(INLINE) for name in drawn if name.endswith(INLINE)]
 
 
-def _undrawn(name: str, why: str) -> str:
-    return f"picture {name} could not be drawn: {why}"
+def _undrawn(name: str, why: str) -> Caution:
+    return Caution("undrawn", f"picture {name} could not be drawn: {why}")

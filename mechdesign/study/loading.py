@@ -17,6 +17,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
+from mechdesign.cautions import ALL, Caution
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
 from mechdesign.expressions import RESERVED, Expression
@@ -86,17 +87,29 @@ class Study:
     matrix: MatrixSection | None
     sensitivities: SensitivitiesSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
+    fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
     targets: Mapping[str, Target]  # by the coordinate or point
     kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
     fixed: frozenset[str]  # parameters in whole numbers, which are read once
     folder: Folder  #: where the files lie that it names, and what they held when it was loaded
     drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
+    strict: bool = False  #: whether every kind of warning fails, not only those of `fail_on`
     warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+
+    @property
+    def barred(self) -> tuple[str, ...]:
+        """Kinds of warnings that fail a run."""
+        return (ALL,) if self.strict else self.fail_on
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What is likely a mistake, as warnings of its results."""
+        return tuple(Caution("suspect", f"{problem.key}: {problem.message}") for problem in self.warnings)
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -343,6 +356,8 @@ def load_document(
         matrix=parts.get("matrix"),
         sensitivities=parts.get("sensitivities"),
         requirements=parts["requirements"],
+        fail_on=parts["fail_on"],
+        strict=False,
         targets=parts["targets"],
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
@@ -397,7 +412,7 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
 
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
     """Validate part by part, so that a mistake in one does not hide those in another; wrong parts are left out."""
-    parts: dict[str, Any] = {"seed": 0, "requirements": ()}
+    parts: dict[str, Any] = {"seed": 0, "requirements": (), "fail_on": ()}
     fields = StudyFile.model_fields
     for key in data:
         if key not in fields:

@@ -247,4 +247,4 @@ reliability:
 """
     study = mechdesign.load(text=text)
     found = benchmark.pedantic(lambda: mechdesign.reliability(study), rounds=3, warmup_rounds=1)
-    assert not any("not all choices" in note for note in found.warnings)
+    assert not any("not all choices" in note for note in map(str, found.warnings))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
 from mechdesign.results import Column, Result, Table
 
@@ -28,6 +29,8 @@ mechanism:
 kinematics:
   sweep: {theta: {from: 0, to: 90, step: 45}}
 """
+
+GAP = Caution("suspect", "mind the gap")
 
 
 def answer(command="kinematics", **changes):

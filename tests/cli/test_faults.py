@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 
 import mechdesign
+from mechdesign.cautions import Caution
 from mechdesign.errors import OutputError, StudyError, explain
 from mechdesign.files import Transaction, owned
 from mechdesign.report.writer import write_file
@@ -447,7 +448,7 @@ def test_folders_and_patterns(here, invoke):
 
 def test_failures_are_told_at_the_end_and_to_github(here, analysis, invoke, monkeypatch):
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
-    analysis(lambda study, **options: answer(warnings=["50 % play, mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[Caution("suspect", "50 % play, mind the gap")]))
     gate = "requirements:\n  - {result: kinematics.theta, at_least: 0}\n  - {result: kinematics.theta, at_most: 80}\n"
     (here / "gate.yaml").write_text(SLIDER + gate)
     (here / "wrong.yaml").write_text(SLIDER.replace("crank: [O, A, r]", "crank: [O, A, q]"))

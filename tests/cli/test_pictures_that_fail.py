@@ -33,7 +33,7 @@ def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, 
     done = invoke("kinematics", STUDY, "--animate")
     assert done.exit_code == 0, done.output
     (told,) = [line for line in done.stderr.splitlines() if "could not be drawn" in line]
-    who, _, told = told.partition(" warning: ")
+    who, _, told = told.removesuffix(" [undrawn]").partition(" warning: ")
     assert who == "slider: kinematics:"
     assert told.startswith(f"picture {name} could not be drawn: internal error: RuntimeError: no such font")
     assert "no animation" not in done.stderr
@@ -42,7 +42,7 @@ def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, 
     assert files >= TABLES
     assert files & PICTURES == PICTURES - set(lost.split())
     manifest = json.loads((out / "manifest.json").read_text())
-    assert manifest["warnings"] == [told]
+    assert manifest["warnings"] == [{"kind": "undrawn", "message": told}]
     assert manifest["files"] == {each: hashlib.sha256((out / each).read_bytes()).hexdigest() for each in files}
 
 

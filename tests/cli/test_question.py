@@ -15,7 +15,7 @@ from mechdesign.cli.app import app
 from mechdesign.errors import AssemblyError, MechdesignError
 from mechdesign.study import template_path
 
-from .conftest import SLIDER, answer
+from .conftest import GAP, SLIDER, answer
 
 REQUIREMENT = "requirements:\n  - {{result: kinematics.B.x, where: {{theta: 90}}, at_least: {}}}\n"
 
@@ -34,7 +34,7 @@ def test_json_is_one_array_and_nothing_else(folder, analysis, invoke):
 
 
 def test_quiet_leaves_only_data(folder, analysis, invoke):
-    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[GAP]))
     loud = invoke("kinematics", "slider.yaml", "--no-plots")
     assert "slider: kinematics: warning: mind the gap" in loud.stderr
     quiet = invoke("kinematics", "slider.yaml", "--no-plots", "--quiet")
@@ -70,7 +70,7 @@ def test_options_reach_the_study_and_the_analysis(folder, analysis, invoke):
 
 
 def test_the_manifest_tells_what_was_computed_from_what(folder, analysis, invoke):
-    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[GAP]))
     assert invoke("kinematics", "slider.yaml").exit_code == 0
     out = folder / "results/slider/kinematics"
     content = json.loads((out / "manifest.json").read_text())
@@ -79,7 +79,7 @@ def test_the_manifest_tells_what_was_computed_from_what(folder, analysis, invoke
     assert content["command"] == "kinematics"
     assert content["seed"] == 0
     assert content["counts"] == {"poses": 3, "invalid": 1}
-    assert content["warnings"] == ["mind the gap"]
+    assert content["warnings"] == [{"kind": "suspect", "message": "mind the gap"}]
     assert {"python", "numpy", "scipy", "matplotlib"} <= content["libraries"].keys()
     assert content["tables"]["motion.csv"]["columns"][1] == {"name": "B.x", "unit": "mm", "meaning": "position"}
     assert content["files"].keys() == {"motion.csv", "mechanism.png"}

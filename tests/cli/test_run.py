@@ -8,9 +8,10 @@ from xml.etree import ElementTree
 import pytest
 from junitparser import JUnitXml
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 
-from .conftest import SLIDER, answer
+from .conftest import GAP, SLIDER, answer
 
 STIFF = """\
 stiffness:
@@ -152,7 +153,7 @@ def test_junit_has_a_case_for_each_question_and_requirement(studies, invoke):
 
 
 def test_names_cannot_spoil_junit_or_summary(studies, analysis, invoke):
-    analysis(lambda study, **options: answer(warnings=["\x1b[2J\x00"]))
+    analysis(lambda study, **options: answer(warnings=[Caution("suspect", "\x1b[2J\x00")]))
     names = ["=1+1\n\x1b]0;x\x07.yaml", "\u202e<b>&.yaml"]
     for name in names:
         (studies / name).write_text(SLIDER)
@@ -168,7 +169,7 @@ def test_names_cannot_spoil_junit_or_summary(studies, analysis, invoke):
 def test_names_cannot_spoil_json_pages_or_annotations(studies, analysis, invoke, monkeypatch):
     """Readers of JSON get the name as it is; none of it turns or hides the letters beside it, or begins a line."""
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
-    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[GAP]))
     hostile = "a\u202eb\x1b[31m\x07\u2028\u200f</script>\U000e0041"
     file = "x\n::error::\u202ey.yaml"
     gate = "requirements: [{result: kinematics.theta, at_most: 80}]\n"
@@ -196,7 +197,7 @@ def test_names_cannot_spoil_json_pages_or_annotations(studies, analysis, invoke,
 
 def test_junit_has_what_the_schema_of_jenkins_allows(studies, analysis, invoke):
     """The attributes of junit-10.xsd of its xunit plugin, which refuses a file with others."""
-    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[GAP]))
     invoke("run", "slider.yaml", "wrong.yaml", "--no-plots", "--junit", "report.xml")
     allowed = {
         "testsuites": {"name", "time", "tests", "failures", "errors"},
@@ -213,10 +214,10 @@ def test_junit_has_what_the_schema_of_jenkins_allows(studies, analysis, invoke):
 
 
 def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, invoke):
-    analysis(lambda study, **options: answer(warnings=["mind the gap"]))
+    analysis(lambda study, **options: answer(warnings=[GAP]))
     done = invoke("run", "slider.yaml", "both.yaml", "--no-plots", "--junit", "report.xml")
     assert [line.partition(": ")[0] for line in done.stderr.splitlines()] == ["slider"] * 2 + ["both"] * 3
-    assert "slider: kinematics: warning: mind the gap" in done.stderr.splitlines()
+    assert "slider: kinematics: warning: mind the gap [suspect]" in done.stderr.splitlines()
     outputs = [case.system_out for suite in JUnitXml.fromfile("report.xml") for case in suite]
     assert outputs == ["warning: mind the gap", "warning: mind the gap", None]
 

@@ -296,8 +296,9 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
             if reason:
                 continue
             assert tally.table[k, 1] == len(result.warnings), seed
-            if tally.warned is not None and tally.warned[0] == k:
-                assert tally.warned[1] == f"{command}: {result.warnings[0]}", seed
+            for kind in [kind for kind, warned in tally.warned.items() if warned.case == k]:
+                first = next(warning for warning in result.warnings if warning.kind == kind)
+                assert tally.warned[kind].message.startswith(f"{command}: {first}"), seed
             for j, each in enumerate(wanted):
                 (expected,) = each.find(Group.alone(result)).values.tolist()
                 assert same(tally.result(j)[0][k], expected), (seed, each.name, tally.result(j)[0][k])

@@ -107,4 +107,4 @@ requirements:
     assert limits["kind"].tolist() == ["singularity"]
     assert sorted(limits["joint"][0].split()) == ["A", "B", "C"]
     assert np.isinf(result.tables["extremes"]["max"]).any()
-    assert any(words.startswith("the motion passes a singularity at ") for words in result.warnings)
+    assert any(words.startswith("the motion passes a singularity at ") for words in map(str, result.warnings))

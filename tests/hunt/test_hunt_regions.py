@@ -535,4 +535,4 @@ def test_over_a_range_only_the_sketchs_piece_counts() -> None:
     assert set(edge["piece"]) == set(pieces["piece"])
     x, y = (edge[axis][edge["piece"] == 1] for axis in "xy")
     assert result.main["box_area"][0] == pytest.approx(np.ptp(x) * np.ptp(y), rel=1e-3)
-    assert any("do not hang together" in warning for warning in result.warnings)
+    assert any("do not hang together" in warning for warning in map(str, result.warnings))

@@ -95,7 +95,7 @@ def test_ends_of_pins_and_turns_of_links_in_a_reliability_are_those_of_finite_el
     }  # fmt: skip
     result = mechdesign.reliability(study_of(text + yaml.dump({"reliability": section}, Dumper=DUMPER)))
     table, structure = result.tables["contributions"], Structure(*posed(text))
-    unknown = "".join(warning for warning in result.warnings if "not known" in warning)
+    unknown = "".join(warning for warning in map(str, result.warnings) if "not known" in warning)
     moved = structure.frame.respond(structure.asked, np.eye(3)[:, :2])[0]
     places = moved[0::3] + 1j * moved[1::3]
 

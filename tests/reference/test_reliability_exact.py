@@ -109,7 +109,7 @@ def test_form_is_off_by_a_factor_that_grows_with_rarity(limit: float) -> None:
 
 
 def test_methods_that_disagree_are_told() -> None:
-    warnings = arm(0.10, "analytic, form, auto").warnings
+    warnings = [*map(str, arm(0.10, "analytic, form, auto").warnings)]
     assert any(text.startswith("analytic and form disagree") for text in warnings)
     assert any(text.startswith("form and importance_sampling disagree") for text in warnings)
     assert not any("monte_carlo" in text for text in warnings)
@@ -150,14 +150,14 @@ def test_four_bars_that_cannot_turn_fully(method: str, half: float) -> None:
     assert covers(table, exact).all()
     # What cannot be assembled is all that fails, and it is named.
     assert table["invalid"][0] > 0
-    assert any("cannot be assembled; they count as failures" in text for text in result.warnings)
+    assert any("cannot be assembled; they count as failures" in text for text in map(str, result.warnings))
     if half == 0.8:
         assert exact == pytest.approx(0.02975, abs=2e-4)
 
 
 def test_auto_that_ends_before_its_precision_says_so() -> None:
     result = arm(0.05, "auto", "reliability.precision=0.002", "reliability.samples=20000")
-    (text,) = [text for text in result.warnings if text.startswith("auto: the coefficient of variation")]
+    (text,) = [text for text in map(str, result.warnings) if text.startswith("auto: the coefficient of variation")]
     table = result.tables["reliability"]
     reached = 50 / 2.97 * (table["failure_high"] - table["failure_low"])[0] / table["failure"][0]
     assert f"is {reached:.3g} % at theta1 = 30 deg, theta2 = 60 deg, not the 0.2 % asked" in text

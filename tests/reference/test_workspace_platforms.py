@@ -183,7 +183,7 @@ def test_a_held_value_that_cannot_be_reached_is_an_empty_row(measures: str) -> N
     area = result.tables["indices"]["area"]
     assert area[0] > 0
     assert area[1] == 0
-    (warning,) = (warning for warning in result.warnings if "nothing is reachable" in warning)
+    (warning,) = (warning for warning in map(str, result.warnings) if "nothing is reachable" in warning)
     assert f"{name} = 175" in warning
     with pytest.raises(AssemblyError, match="reaches nothing"):
         mechdesign.workspace(study_of(RPR, changes[0], f"workspace.at={{{name}: [175]}}"))

@@ -63,7 +63,7 @@ def test_both_modes_of_a_four_bar() -> None:
 def test_modes_that_fail_are_told_one_by_one() -> None:
     result = kinematics(study_of(SIX_BAR), all_modes=True)
     assert result.counts["modes"] == 4
-    told = {w.split(":")[0]: w for w in result.warnings if w.startswith("mode ")}
+    told = {w.split(":")[0]: w for w in map(str, result.warnings) if w.startswith("mode ")}
     modes = result.tables["modes"]
     for label in dict.fromkeys(modes["mode"]):
         bad = np.count_nonzero(~modes["valid"][modes["mode"] == label])

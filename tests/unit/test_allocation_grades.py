@@ -85,7 +85,10 @@ def test_a_sum_has_the_cheapest_of_all_choices(asked: str, limit: float) -> None
         [HALVES[size][k] for size, k in zip((40, 60, 100), best, strict=True)]
     )
     assert result.tables["confirmation"]["met"].all()
-    assert any("held as given, for grades are of lengths with a tolerance: travel" in note for note in result.warnings)
+    assert any(
+        "held as given, for grades are of lengths with a tolerance: travel" in note
+        for note in map(str, result.warnings)
+    )
 
 
 @pytest.mark.nightly
@@ -142,7 +145,7 @@ def test_eight_lengths_in_eight_grades_are_the_cheapest_of_all() -> None:
                 row[step:] = best[: most + 1 - step] + price / half
         best = options.min(axis=0)
     assert np.sum(result.tables["allocation"]["cost_allocated"]) == pytest.approx(best[-1])
-    assert not any("not all choices" in note for note in result.warnings)
+    assert not any("not all choices" in note for note in map(str, result.warnings))
 
 
 def test_the_study_that_is_written_has_the_classes(tmp_path: Path) -> None:

@@ -73,7 +73,7 @@ def test_limits_of_an_angle_are_at_the_nearest_turn() -> None:
 
 def test_a_nominal_value_outside_its_limits_is_told_with_its_pose() -> None:
     result = mechdesign.reliability(study_of(LEVER, "reliability.limits={P.x: {lsl: 49.95}}"))
-    assert list(result.warnings) == [
+    assert [*map(str, result.warnings)] == [
         "P.x: the nominal value 49.9244 at theta = 60.05 deg lies outside its limits, at least 49.95 mm"
     ]
     assert result.tables["reliability"]["reliability"][0] == pytest.approx(ndtr(1.0), rel=1e-9)

@@ -151,5 +151,5 @@ def test_where_no_failure_is_within_reach_there_is_a_value_of_0_and_a_bound() ->
     for found in estimates(result).values():
         assert found.failure == found.low == 0.0
         assert found.high == pytest.approx(1 - 0.0015 ** (1 / 30_000), rel=1e-9)
-    assert sum("no failure in 30000 samples" in text for text in result.warnings) == 2
+    assert sum("no failure in 30000 samples" in text for text in map(str, result.warnings)) == 2
     assert np.isfinite(result.tables["reliability"]["failure"]).all()

@@ -80,7 +80,7 @@ def test_links_that_translate_have_their_centre_at_infinity_and_it_is_told():
     assert np.isnan(table["slider.ground.x"][dead]).all()
     # With the crank upright the rod translates: B moves as A does.
     assert list(table["rod.ground.motion"][[9, 27]]) == ["translation"] * 2
-    told = [warning for warning in result.warnings if "at infinity" in warning]
+    told = [warning for warning in map(str, result.warnings) if "at infinity" in warning]
     assert [warning.split(":")[1].split(" poses")[0] for warning in told] == [" in 34 of 37", " in 2 of 37"]
     # The crank and a slider along x have theirs on the normal of the guide through the crank's pivot.
     angle = np.radians(table["crank"])

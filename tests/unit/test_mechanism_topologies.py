@@ -175,12 +175,12 @@ def test_rates_are_those_of_drives() -> None:
 
 def test_change_points_are_warned_about_between_poses_and_on_them() -> None:
     def between(text: str) -> list[str]:
-        return [warning for warning in kinematics(study_of(text)).warnings if "change point at" in warning]
+        return [warning for warning in map(str, kinematics(study_of(text)).warnings) if "change point at" in warning]
 
     assert len(between(PARALLELOGRAM)) == 1
     assert "crank = 180 deg (joints" in between(PARALLELOGRAM)[0]
     assert not between(PARALLELOGRAM.replace("[D, B, 1]", "[D, B, 1.1]").replace("rod: [A, B, 4]", "rod: [A, B, 3.95]"))
-    on = kinematics(study_of(PARALLELOGRAM, "kinematics.sweep.crank.step=10")).warnings
+    on = [*map(str, kinematics(study_of(PARALLELOGRAM, "kinematics.sweep.crank.step=10")).warnings)]
     assert any("mean nothing there; the first: crank = 180 deg" in warning for warning in on)
 
 

@@ -17,7 +17,7 @@ def limits(text: str, *overrides: str) -> Table:
 
 
 def warnings(text: str, *overrides: str) -> list[str]:
-    return list(kinematics(study_of(text, *overrides)).warnings)
+    return [*map(str, kinematics(study_of(text, *overrides)).warnings)]
 
 
 def four_bar(a: float, b: float, c: float, d: float, sketch: str) -> str:

@@ -91,7 +91,7 @@ def test_conditions_leave_designs_out_and_are_counted() -> None:
     assert (designs["feasible"] == (area >= 9)).all()
     assert result.counts["infeasible"] == (area < 9).sum() > 0
     assert set(designs["reason"][area < 9]) == {"not workspace.area at least 9"}
-    assert any("not workspace.area at least 9" in warning for warning in result.warnings)
+    assert any("not workspace.area at least 9" in warning for warning in map(str, result.warnings))
     # Normalised over the feasible designs only.
     assert np.nanmax(designs["CPI"]) <= 3
     assert np.isnan(designs["CPI"][area < 9]).all()

@@ -158,7 +158,7 @@ optimize:
 """
     for evaluations, grows in ((300, True), (6000, False)):
         result = mechdesign.optimize(study_of(text, f"optimize.evaluations={evaluations}"))
-        assert any("the front still grows" in words for words in result.warnings) is grows
+        assert any("the front still grows" in words for words in map(str, result.warnings)) is grows
         values = np.column_stack([result.tables["pareto"][name] for name in ("x1", "f2")])
         x, y = values[np.argsort(values[:, 0])].T
         # Between the front f2 = 1 - sqrt(f1) and the corner (1, 1) lies an area of 2/3.

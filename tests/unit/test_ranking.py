@@ -105,7 +105,7 @@ def test_where_no_case_meets_every_requirement_none_is_ranked():
     result = swept({"maximize": STROKE}, {R: [-1, 20]})
     assert np.isnan(result.main["rank"]).all()
     assert not result.main["front"].any()
-    assert result.warnings[-1] == "no case is ranked: none was answered and meets every requirement"
+    assert str(result.warnings[-1]) == "no case is ranked: none was answered and meets every requirement"
     assert best_of(result.main) is None
     assert headlines(result) == []
 
@@ -118,8 +118,8 @@ def test_a_case_that_does_not_turn_has_no_rank_and_is_told_unless_it_may_be_so()
     assert result.main["exit_code"].tolist() == [0, 0, 0]
     np.testing.assert_array_equal(result.main["rank"], [np.nan, 1, 1])
     assert np.isnan(result.main[STROKE]).tolist() == [True, False, False]
-    assert "1 of 3 cases that meet every requirement have no rank" in result.warnings[-1]
-    assert result.warnings[-1].endswith("the first is case 1 (l 20)")
+    assert "1 of 3 cases that meet every requirement have no rank" in str(result.warnings[-1])
+    assert str(result.warnings[-1]).endswith("the first is case 1 (l 20)")
     required = {"result": STROKE, "at_least": 10, "unassembled": "allowed"}
     allowed = mechdesign.load(text=text, overrides={"matrix": matrix, "requirements": [required]})
     assert np.isfinite(mechdesign.sweep(allowed).main["rank"]).all()

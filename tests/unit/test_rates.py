@@ -202,9 +202,9 @@ def test_rates_that_lead_away_from_the_motion_are_told() -> None:
     told = "1 of 2 steps of the motion do not go where the rates of P.x, P.y lead"
     assert any(
         told in warning
-        for warning in kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [9, 9]]}")).warnings
+        for warning in map(str, kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [9, 9]]}")).warnings)
     )
-    along = kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [1, 12.5]]}")).warnings
+    along = [*map(str, kinematics(study_of(ARM, "kinematics.path={P: [[3, 12], [5, 11.5], [1, 12.5]]}")).warnings)]
     assert not any("lead" in warning for warning in along)
 
 
@@ -245,7 +245,9 @@ def test_where_the_drives_cannot_give_the_rates_they_are_nan() -> None:
     assert np.isnan(table["t1_velocity"]).tolist() == [True, False]
     assert np.isnan(table["E.x_acceleration"]).tolist() == [True, False]
     assert table["conditioning"] == pytest.approx(1)  # of the drives, which stand well
-    assert any("1 pose lies where no drive rates give what is asked" in warning for warning in result.warnings)
+    assert any(
+        "1 pose lies where no drive rates give what is asked" in warning for warning in map(str, result.warnings)
+    )
 
 
 def test_the_table_of_the_jacobian() -> None:
@@ -300,7 +302,7 @@ def test_numbers_at_a_singularity_are_nan_and_told() -> None:
     assert np.isnan(result.tables["jacobian"]["B.y_by_crank"]).tolist() == singular.tolist()
     assert np.isfinite(table["B.y"]).all()
     assert table["valid"].all()
-    assert any("3 poses lie at a dead centre or change point" in warning for warning in result.warnings)
+    assert any("3 poses lie at a dead centre or change point" in warning for warning in map(str, result.warnings))
 
 
 def test_conditioning_stands_in_every_motion() -> None:

@@ -225,7 +225,7 @@ def test_a_limit_on_half_an_angle(low: float) -> None:
     guess, doubt = by_chance(legs & (low <= half) & (half <= 60), 1.4**2)
     assert abs(result.main["area"][0] - guess) < doubt
     found = np.isfinite(result.main["circle_radius"][0])
-    assert found or any("jumps" in warning for warning in result.warnings)
+    assert found or any("jumps" in warning for warning in map(str, result.warnings))
 
 
 @pytest.mark.nightly

@@ -64,7 +64,9 @@ def test_share_of_four_bars_that_cannot_turn_fully() -> None:
     assert found["invalid"] == round(found["failure"] * 200_000)
     assert found["failure"] == pytest.approx(0.02975, abs=4 * np.sqrt(0.02975 / 200_000))
     assert found["failure_low"] < 0.02975 < found["failure_high"]
-    assert f"{found['invalid']} of 200000 made mechanisms cannot be assembled at some pose" in " ".join(result.warnings)
+    assert f"{found['invalid']} of 200000 made mechanisms cannot be assembled at some pose" in " ".join(
+        map(str, result.warnings)
+    )
     assert result.counts["cycles"] == 200_000
 
 
@@ -164,7 +166,9 @@ def test_auto_tells_that_its_precision_was_not_reached() -> None:
     changes = ["reliability.methods=[auto]", "reliability.precision=0.01", "reliability.samples=20000"]
     result = ask(FOUR_BAR, *changes)
     assert row(result, "auto")["samples"] == 20_000
-    assert any(note.startswith("auto: half the interval of the whole cycle is 0.00") for note in result.warnings)
+    assert any(
+        note.startswith("auto: half the interval of the whole cycle is 0.00") for note in map(str, result.warnings)
+    )
 
 
 def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bound() -> None:
@@ -177,8 +181,8 @@ def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bou
     bound = -np.log(0.0015) / 40_000
     assert plain["failure_high"] == pytest.approx(bound, rel=1e-3)
     told = f"the probability of failure is below {bound:.2g}"
-    assert f"monte_carlo: no failure in 40000 samples at 7 poses: {told}" in result.warnings
-    assert f"monte_carlo: no failure in 40000 made mechanisms over the whole cycle: {told}" in result.warnings
+    assert f"monte_carlo: no failure in 40000 samples at 7 poses: {told}" in map(str, result.warnings)
+    assert f"monte_carlo: no failure in 40000 made mechanisms over the whole cycle: {told}" in map(str, result.warnings)
 
 
 @pytest.mark.slow

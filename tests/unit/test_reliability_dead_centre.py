@@ -108,7 +108,7 @@ def test_what_cannot_be_assembled_fails_and_is_told(text: str, distance: float) 
     result = mechdesign.reliability(study_of(text))
     exact = float(ndtr(-distance))
     assert failures(result) == pytest.approx({"analytic": exact, "second_order": exact}, rel=1e-6)
-    (told,) = [warning for warning in result.warnings if "by the first order of the margin" in warning]
+    (told,) = [warning for warning in map(str, result.warnings) if "by the first order of the margin" in warning]
     assert told.startswith(f"analytic, second_order: {100 * exact:.2g} % of the made mechanisms cannot be assembled")
 
 

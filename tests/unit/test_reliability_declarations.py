@@ -77,6 +77,6 @@ def test_a_declared_method_is_in_schema_tables_and_pictures() -> None:
     assert "cautious first order" in [text.get_text() for text in found["reliability"].legends[0].get_texts()]
     # Among the steps of auto it says a half, whatever the others say.
     alone = mechdesign.reliability(study_of(LEVER, "reliability.methods=auto", "reliability.precision=0.02"))
-    assert any(warning.startswith("form and cautious disagree") for warning in alone.warnings)
+    assert any(warning.startswith("form and cautious disagree") for warning in map(str, alone.warnings))
     with pytest.raises(StudyError, match="did you mean 'cautious'"):
         study_of(LEVER, "reliability.methods=[cautios]")

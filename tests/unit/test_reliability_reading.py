@@ -33,7 +33,7 @@ def share(*changes: str) -> tuple[float, list[str], set[str]]:
     result = mechdesign.reliability(study_of(SLIDER_CRANK, *changes))
     table = result.tables["contributions"]
     own = table["output"] == "A.x"
-    return float(table["share"][own & (table["source"] == "A")][0]), result.warnings, set(table["on"][own])
+    return float(table["share"][own & (table["source"] == "A")][0]), [*map(str, result.warnings)], set(table["on"][own])
 
 
 def test_an_output_at_a_pin_with_clearance_is_of_a_link_that_is_said() -> None:
@@ -97,7 +97,7 @@ reliability:
 def test_a_place_and_the_parameter_that_sets_it_are_told_to_count_both() -> None:
     change = "reliability.dimensions={r: {sigma: 0.1}, '*.length': {sigma: 0.1}}"
     result = mechdesign.reliability(study_of(SLIDER_CRANK, change))
-    assert [text for text in result.warnings if "both count" in text] == [
+    assert [text for text in map(str, result.warnings) if "both count" in text] == [
         "'crank.length' varies by its own tolerance, and with parameter 'r': both count, as independent errors that "
         "add up; leave one of them out if they are the same error"
     ]

@@ -254,7 +254,7 @@ def test_optimum_at_a_bound_and_a_condition():
 def test_a_search_that_was_cut_short_says_so():
     result = mechdesign.optimize(study_of(ARM, "optimize.evaluations=30"))
     assert result.counts["designs"] <= 30
-    assert "the search ended with its 30 evaluations" in result.warnings[0]
+    assert "the search ended with its 30 evaluations" in str(result.warnings[0])
 
 
 @pytest.mark.slow
@@ -418,7 +418,7 @@ def test_searches_use_their_evaluations_and_tell_where_starts_disagree():
     ends = search(explorer(rastrigin, 4, budget=5000), [True], [[1.0]], 0).ends[0]
     assert len(ends) > 2
     assert np.ptp(ends) > 0.5
-    told = list(_doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])], [0.0], [0.4]), 5000, ["P_error"]))
+    told = [*map(str, _doubts(Ending(True, [np.array([2.0, 1.0, np.nan, 1.001])], [0.0], [0.4]), 5000, ["P_error"]))]
     assert told == ["the 4 starts of the search ended with P_error between 1 and 2, 2 of them within 1 % of the best, "
                     "1 found no feasible design, and the last steps from the best led to 0.4; allow "
                     "more, e.g. optimize.evaluations: 20000"]  # fmt: skip

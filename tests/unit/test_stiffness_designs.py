@@ -160,7 +160,7 @@ def test_designs_that_fail_are_loose_or_nearly_so_say_it_in_their_own_words() ->
     t = np.array([0.1, 0.25, 0.25 - 2e-5, 0.25, 0.2])
     designs = Designs(study_of(PLATFORM), {"t": t, "k": np.linspace(4e7, 6e7, 5), "h": np.linspace(0.03, 0.05, 5)})
     found = assert_as_alone(designs, answers, stiffness)
-    said = ["; ".join(answer.warnings) for answer in found if isinstance(answer, Result)]
+    said = ["; ".join(map(str, answer.warnings)) for answer in found if isinstance(answer, Result)]
     assert ["nearly" in text for text in said] == [False, False, True, False, False]
     assert ["1 of 2 poses are under-constrained" in text for text in said] == [False, True, False, True, False]
     designs = Designs(study_of(FIVE_BAR), {"b": np.array([0.4, 0.35, 0.1, 0.4]), "k": np.linspace(900, 1200, 4)})

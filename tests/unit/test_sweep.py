@@ -107,7 +107,7 @@ def test_cases_of_a_file(tmp_path: Path):
     result = mechdesign.sweep(mechdesign.load(tmp_path / "study.yaml"))
     np.testing.assert_allclose(result.main[STROKE], [80, 50, 80], rtol=1e-9)
     assert result.main["mechanism.branch"].tolist() == ["side", "follow", "side"]
-    assert result.warnings[0] == "1 of 3 cases are repeated; case 3 (r 40, branch side) is case 1 once more"
+    assert str(result.warnings[0]) == "1 of 3 cases are repeated; case 3 (r 40, branch side) is case 1 once more"
 
 
 @pytest.mark.parametrize(

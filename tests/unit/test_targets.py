@@ -110,7 +110,9 @@ def test_a_table_over_one_turn_serves_all_turns_and_nothing_outside_it() -> None
     table = result.tables["motion"]
     wanted = np.array([70, 79, 70, np.nan, 70])
     assert table["B.x_error"] == pytest.approx(table["B.x"] - wanted, nan_ok=True)
-    assert any("1 of 5 poses" in w and "B.x_error is nan; the first: theta = -90 deg" in w for w in result.warnings)
+    assert any(
+        "1 of 5 poses" in w and "B.x_error is nan; the first: theta = -90 deg" in w for w in map(str, result.warnings)
+    )
     assert np.isfinite(result.tables["targets"]["rms"]).all()
 
 

@@ -225,5 +225,5 @@ def test_every_pose_is_singular_where_platform_and_base_are_similar(assembly: st
     main = result.main
     assert np.isnan(main["GII"]).tolist() == [True, False]
     assert (main["area"] > 0).all()
-    (warning,) = (text for text in result.warnings if "every pose" in text)
+    (warning,) = (text for text in map(str, result.warnings) if "every pose" in text)
     assert "platform.angle = 0 is a forward singularity" in warning

@@ -342,4 +342,6 @@ def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     chosen = choose(result, "totals.area.smallest", {})
     assert chosen.values[chosen.counts].tolist() == [0.0]
     # The assembly that is not the sketch's has all of it.
-    assert any("at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in result.warnings)
+    assert any(
+        "at plate.angle = 20" in warning and "and 0 mm^2 here" in warning for warning in map(str, result.warnings)
+    )

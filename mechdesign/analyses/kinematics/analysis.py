@@ -15,6 +15,7 @@ from mechdesign.analyses.kinematics.remarks import marks_of
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE
 from mechdesign.analyses.poses import Shown
 from mechdesign.analyses.together import Answers
+from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.parallel import one_thread
@@ -70,7 +71,7 @@ def answers(study: Study, poses: Poses) -> Answers:
 
 def _modes(
     drawn: Passage, jobs: int | None
-) -> tuple[Table, list[str], int, dict[str, Shown]]:  # fmt: skip
+) -> tuple[Table, list[Caution], int, dict[str, Shown]]:  # fmt: skip
     """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
     study, poses = drawn.question.study, drawn.question.poses
     found = assemblies(study.mechanism, poses.groups[0].names)
@@ -87,11 +88,9 @@ def _modes(
         passages[assembly.label] = passage
         bad = int(np.count_nonzero(passage.reason))
         if bad:
-            warnings.append(
-                f"mode {assembly.label}: no pose is valid in this assembly"
-                if bad == poses.count
-                else f"mode {assembly.label}: {bad} of {poses.count} poses are not valid in this assembly"
-            )
+            none = f"mode {assembly.label}: no pose is valid in this assembly"
+            some = f"mode {assembly.label}: {bad} of {poses.count} poses are not valid in this assembly"
+            warnings.append(Caution("unassembled", none if bad == poses.count else some, "modes"))
     parts = [_mode(label, passage.motion) for label, passage in passages.items()]
     columns = [
         dataclasses.replace(same[0], values=np.concatenate([column.values for column in same]))

@@ -21,6 +21,7 @@ from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.analyses.poses import invalid_in_words, judge_failures
 from mechdesign.analyses.together import End, Group
+from mechdesign.cautions import Caution
 from mechdesign.curve.ends import Change
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
@@ -129,7 +130,7 @@ def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
 
 def _warnings(
     question: MotionQuestion, passage: Passage, found: _Found, k: int, valid: Flags
-) -> tuple[list[str], str]:  # fmt: skip
+) -> tuple[list[Caution], str]:  # fmt: skip
     """Warnings of design `k`, the poses of which are those of its own question; and the error where poses fail.
 
     Raises
@@ -139,7 +140,7 @@ def _warnings(
     """
     along, marks = found.along, passage.marks[k]
     reason = passage.reason.reshape(-1, len(valid))[k]
-    warnings, failed = judge_failures(question.study, question.poses, reason)
+    warnings, failed = judge_failures(question.study, question.poses, reason, table="motion")
     warnings += remarks(question, marks)
     if along is None:
         warnings += unfollowed(question.poses)
@@ -147,10 +148,12 @@ def _warnings(
         warnings += hidden(found.limits[k], along, valid) + passed(found.limits[k], along)
         warnings += change_points(found.changes[k], along)
         if along.functions.unresolved.any():
-            warnings.append(
+            warnings.append(Caution(
+                "unconverged",
                 "the motion between the poses is too long, or too rough, to be followed closely: its limits are known, "
-                "but extremes may lie between the places that were looked at; sweep less of it"
-            )
+                "but extremes may lie between the places that were looked at; sweep less of it",
+                "extremes",
+            ))  # fmt: skip
     return warnings + without_centre(question, marks), failed
 
 

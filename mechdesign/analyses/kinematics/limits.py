@@ -9,6 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.along import Along
 from mechdesign.analyses.poses import pose_in_words
+from mechdesign.cautions import Caution
 from mechdesign.curve.ends import Change, End
 from mechdesign.mechanism.margins import Cause
 from mechdesign.numerics.arrays import Flags
@@ -76,7 +77,7 @@ def place_in_words(along: Along, line: int, place: float) -> str:
     return f"row {place:.6g} ({pose_in_words(study, poses.along(lines, s), 0)})"
 
 
-def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[str]:
+def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[Caution]:
     """A warning where a motion ends between neighbouring poses that are both valid: the motion table hides it."""
     places = [
         place_in_words(along, limit.line, limit.place)
@@ -88,18 +89,21 @@ def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[str]:
     ]
     if not places:
         return []
-    return [f"the motion ends between poses that are both valid, at {_first(places)}: see the limits"]
+    words = f"the motion ends between poses that are both valid, at {_first(places)}: see the limits"
+    return [Caution("unassembled", words, "limits", pose=places[0])]
 
 
-def passed(limits: Sequence[Limit], along: Along) -> list[str]:
+def passed(limits: Sequence[Limit], along: Along) -> list[Caution]:
     """A warning where a motion passes a forward singularity."""
     places = [place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None]
     if not places:
         return []
-    return [
+    return [Caution(
+        "singular",
         f"the motion passes a singularity at {_first(places)}: the drives hold nothing there, and a made mechanism may "
-        "go on in another assembly; see the limits"
-    ]
+        "go on in another assembly; see the limits",
+        "limits", pose=places[0],
+    )]  # fmt: skip
 
 
 def _first(places: Sequence[str]) -> str:
@@ -108,7 +112,7 @@ def _first(places: Sequence[str]) -> str:
     return "; ".join(places[:MOST_NAMED]) + more
 
 
-def change_points(changes: Sequence[Change], along: Along) -> list[str]:
+def change_points(changes: Sequence[Change], along: Along) -> list[Caution]:
     """A warning for each place of a motion at which two assemblies meet, where the study keeps joints on their sides.
 
     `changes` are those of the motion.
@@ -122,7 +126,11 @@ def change_points(changes: Sequence[Change], along: Along) -> list[str]:
         words = place_in_words(along, line, round(place, 6))
         places.setdefault(words, {})[cause.joint] = None
     return [
-        f"change point at {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' keeps "
-        "each joint on its side of the line, where a made mechanism may cross it"
+        Caution(
+            "singular",
+            f"change point at {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' keeps "
+            "each joint on its side of the line, where a made mechanism may cross it",
+            pose=place,
+        )
         for place, joints in places.items()
     ]

@@ -11,6 +11,7 @@ from mechdesign.analyses.kinematics.instant_centres import REST, TRANSLATION
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
 from mechdesign.analyses.kinematics.passage import Mark
 from mechdesign.analyses.poses import POSES_AT_ONCE, pose_in_words
+from mechdesign.cautions import Caution
 from mechdesign.errors import counted
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
@@ -18,6 +19,7 @@ from mechdesign.study.poses import Poses
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
 SINGULAR = 1e-8
+_TABLE = "motion"  # whose rows are the poses
 # Poses that warnings are about.
 _STALLED = "stalled"
 _LOST = "without drive rates"
@@ -35,24 +37,25 @@ ASTRAY = 1e-3
 TURNED, BEFORE_CORNER = 1e-6, 1e-9
 
 
-def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """Warnings about the poses of one design, and about its rates."""
     found = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
     return found + _untargeted(question, marks)
 
 
-def unfollowed(poses: Poses) -> list[str]:
+def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
     what = f"the steps of {poses.swept} are" if poses.swept is not None else "the steps of the path are"
-    return [
+    return [Caution(
+        "incomplete",
         f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
-        "poses only, and limits of motion, singularities and links in line are not looked for; sweep fewer turns"
-    ]
+        "poses only, and limits of motion, singularities and links in line are not looked for; sweep fewer turns",
+    )]  # fmt: skip
 
 
-def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """What is to be known of poses in which two links have no instant centre within reach."""
     study, poses, warnings = question.study, question.poses, []
     for centre in question.centres:
@@ -61,21 +64,24 @@ def without_centre(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[
             if rows:
                 where = f"in {rows} of {poses.count} poses"
                 first = pose_in_words(study, poses, row)
-                warnings.append(f"{centre.one} and {centre.other}: {where} {text}; the first: {first}")
+                words = f"{centre.one} and {centre.other}: {where} {text}; the first: {first}"
+                warnings.append(Caution("undefined", words, _TABLE, row, first))
     return warnings
 
 
-def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+def _untargeted(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """A warning where a valid pose has no target."""
     study, poses, warnings = question.study, question.poses, []
     for mark, (count, row) in marks.items():
         output = mark.removesuffix(_WITHOUT_TARGET)
         if output != mark and count:
-            name = f"{output}_error"
-            warnings.append(
+            name, first = f"{output}_error", pose_in_words(study, poses, row)
+            warnings.append(Caution(
+                "undefined",
                 f"{count} of {poses.count} poses lie where the target of {output} has no value: their "
-                f"{name} is nan; the first: {pose_in_words(study, poses, row)}"
-            )
+                f"{name} is nan; the first: {first}",
+                _TABLE, row, first,
+            ))  # fmt: skip
     return warnings
 
 
@@ -110,20 +116,26 @@ def _near(motion: Motion) -> Flags:
     return np.asarray(still < SINGULAR)
 
 
-def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+def _conditioning(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     if _REGULAR not in marks:
         return []
     if marks[_REGULAR].number and question.mixed:
-        return ["J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"]
-    count = marks[_NEAR].number
+        mixed = "J mixes lengths and angles: inverse_condition is nan; give kinematics.characteristic_length"
+        return [Caution("undefined", mixed, _TABLE)]
+    count, row = marks[_NEAR]
+    if not count:
+        return []
     poses = "1 pose is" if count == 1 else f"{count} poses are"
+    place = _TABLE, row, pose_in_words(question.study, question.poses, row)
     if len(question.drives) == 1:
         (output,) = question.listed
-        return [f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"] if count else []
-    return [f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"] if count else []
+        still = f"{poses} at a dead centre: {output.name} stands still there, and det_J is 0"
+        return [Caution("singular", still, *place)]
+    near = f"{poses} at or near a singularity (inverse condition below {SINGULAR:g})"
+    return [Caution("singular", near, *place)]
 
 
-def _astray(question: MotionQuestion) -> list[str]:
+def _astray(question: MotionQuestion) -> list[Caution]:
     """A warning where rates that are the same for all poses lead away from the motion that the poses are."""
     study, section, poses = question.study, question.section, question.poses
     if not poses.motion or section.speed is not None or not set(section.rates) & set(poses.names):
@@ -142,14 +154,16 @@ def _astray(question: MotionQuestion) -> list[str]:
         off += int(np.count_nonzero(aside > ASTRAY * np.linalg.norm(way, axis=0)))
     if not off:
         return []
-    return [
+    return [Caution(
+        "suspect",
         f"{off} of {poses.count - 1} steps of the motion do not go where the rates of "
         f"{', '.join(poses.names)} lead: velocities and accelerations there are those of the rates, not of the motion "
-        "drawn; 'speed' gives those of a point along its path"
-    ]
+        "drawn; 'speed' gives those of a point along its path",
+        _TABLE,
+    )]  # fmt: skip
 
 
-def _corners(question: MotionQuestion) -> list[str]:
+def _corners(question: MotionQuestion) -> list[Caution]:
     """A warning where a path that is passed with a speed has corners: its rates there are those behind them."""
     poses = question.poses
     if question.section.speed is None or not poses.motion:
@@ -162,14 +176,18 @@ def _corners(question: MotionQuestion) -> list[str]:
     rows = rows[turned]
     if not len(rows):
         return []
-    return [
+    row = int(rows[0])
+    first = pose_in_words(question.study, poses, row)
+    return [Caution(
+        "incomplete",
         f"the path has corners at {counted(len(rows), 'pose')}, the first: "
-        f"{pose_in_words(question.study, poses, int(rows[0]))}; velocities there are those of the segment that begins, "
-        "and the acceleration that a corner takes is in no row; a spline has no corners"
-    ]
+        f"{first}; velocities there are those of the segment that begins, "
+        "and the acceleration that a corner takes is in no row; a spline has no corners",
+        _TABLE, row, first,
+    )]  # fmt: skip
 
 
-def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
+def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     texts = {
         _STALLED: "at a dead centre or change point, where the drives do not move the mechanism in one way "
         f"(conditioning below {STALLED:g}): velocities, accelerations, Jacobian and efforts are nan, as they mean "
@@ -182,5 +200,6 @@ def _stalled(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[str]:
         count, row = marks.get(name, Mark(0, 0))
         if count:
             lie = f"{count} poses lie" if count > 1 else "1 pose lies"
-            warnings.append(f"{lie} {text}; the first: {pose_in_words(question.study, question.poses, row)}")
+            first = pose_in_words(question.study, question.poses, row)
+            warnings.append(Caution("singular", f"{lie} {text}; the first: {first}", _TABLE, row, first))
     return warnings

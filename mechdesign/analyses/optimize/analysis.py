@@ -32,6 +32,7 @@ from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_meanings, workspace
 from mechdesign.analyses.workspace.contained import Shape, fitting_scale
 from mechdesign.analyses.workspace.question import answer, questions, split
+from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -108,7 +109,7 @@ def optimize(
 
 def _ask(
     study: Study, judge: Judge, evaluator: Evaluator, weights: Floats, budget: int, seed: int
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[Caution, ...]:  # fmt: skip
     """Evaluate the designs of the study's method; returns what is to be warned of."""
     assert study.optimize is not None
     section = study.optimize
@@ -133,11 +134,12 @@ def _ask(
     return ()
 
 
-def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[str]:
+def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[Caution]:
     """What speaks against the optima of a search; `objectives` are what each row of weights looks for."""
     more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
     if not ending.checked:
-        yield f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
+        early = f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
+        yield Caution("unconverged", early, "optimum")
     for row, (ends, rounding, best) in enumerate(zip(ending.ends, ending.rounding, ending.best, strict=True)):
         found = ends[np.isfinite(ends)]
         far = max(searching.AGREEMENT * np.abs(found).min(initial=np.inf), rounding)
@@ -151,8 +153,12 @@ def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) ->
             last = f", and the last steps from the best led to {abs(best):.6g}" * bool(
                 len(found) and best < found.min() - far
             )
-            yield (f"the {len(ends)} starts of the search{of} ended {spread}, {agree.sum()} of them within "
-                   f"{100 * searching.AGREEMENT:g} % of the best{lost}{last}; {more}")  # fmt: skip
+            yield Caution(
+                "unconverged",
+                f"the {len(ends)} starts of the search{of} ended {spread}, {agree.sum()} of them within "
+                f"{100 * searching.AGREEMENT:g} % of the best{lost}{last}; {more}",
+                "optimum", row,
+            )  # fmt: skip
 
 
 def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
@@ -204,31 +210,43 @@ def _none_feasible(designs: Designs) -> str:
 def _finished_part(designs: Designs) -> Result:
     table = designs_table(designs)
     told = f"interrupted after {len(designs)} designs; --resume goes on"
-    return Result("optimize", {table.name: table}, (told,), {"designs": len(designs)}, interrupted=told)
+    partly = Caution("incomplete", told, table.name)
+    return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=told)
 
 
-def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[str]:
+def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MAX_REASONS]:
         place = in_words(designs.design(first))
-        yield f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
+        words = f"{count} of {len(designs)} designs are infeasible: {reason} (first at {place})"
+        yield Caution("infeasible", words, "designs", first, place)
     if len(reasons) > MAX_REASONS:
-        yield f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
+        words = f"designs are infeasible for {len(reasons) - MAX_REASONS} more reasons; see designs.csv"
+        yield Caution("infeasible", words, "designs")
     for goal, values in zip(designs.goals, designs.values[designs.feasible].T, strict=True):
         if len(values) > 1 and np.ptp(values) <= TIE * max(1.0, np.abs(values).max()):
-            yield (f"all {len(values)} feasible designs tie: {goal.name} is {values[0]:.6g} in each of them; a goal of "
-                   "magnitudes says abs: true")  # fmt: skip
+            yield Caution(
+                "suspect",
+                f"all {len(values)} feasible designs tie: {goal.name} is {values[0]:.6g} in each of them; a goal of "
+                "magnitudes says abs: true",
+                "designs",
+            )
     for goal in [each for each in designs.goals if each.unassembled]:
         optimum = ask(study_of(evaluator.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
-            yield f"{goal.name} of the optimum is that of a part of the motion: {part}"
+            words = f"{goal.name} of the optimum is that of a part of the motion: {part}"
+            yield Caution("unassembled", words, "optimum")
     if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
     for each, error in designs.errors.items():
         loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[each]))
         if loose.any():
-            told = f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for"
-            yield f"{told}; see {each.name}_error"
+            yield Caution(
+                "unconverged",
+                f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
+                f"{each.name}_error",
+                "designs", int(loose.argmax()),
+            )  # fmt: skip
 
 
 def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:

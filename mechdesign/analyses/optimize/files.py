@@ -12,6 +12,7 @@ from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import in_words, parted
 from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.region.curves import workspace_nodes
+from mechdesign.cautions import Caution
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
@@ -28,7 +29,7 @@ BETWEEN = 100
 
 def design_files(
     study: Study, designs: Designs, wanted: Mapping[str, tuple[int, str]]
-) -> tuple[dict[str, str], list[str]]:
+) -> tuple[dict[str, str], list[Caution]]:
     """Texts by file name, and what is wrong with them.
 
     Parameters
@@ -45,20 +46,21 @@ def design_files(
         data = {**plain(study.resolved), **changed_data(form, numbers)}
         try:
             best = variant(form, numbers)
-            doubts += [f"{name}.yaml: {words}" for words in _parted(best, designs)]
+            doubts += [Caution("unassembled", f"{name}.yaml: {words}") for words in _parted(best, designs)]
             judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
             commands = tuple(dict.fromkeys(each.command for each in judged))
             drawings, given = _drawings(best, commands), _given(best, commands)
             while not _assembles_alike(study, best.mechanism, data, given):
                 pose = next(drawings, None)
                 if pose is None:
-                    doubts.append(f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it")
+                    words = f"{name}.yaml: its sketch chooses another assembly than the optimum's; mend it"
+                    doubts.append(Caution("incomplete", words))
                     break
                 sketch = data["mechanism"]["sketch"]
                 places = [np.asarray(pose.point(point)).item() for point in sketch]
                 sketch |= {point: [z.real, z.imag] for point, z in zip(sketch, places, strict=True)}
         except MechdesignError as error:
-            doubts.append(f"{name}.yaml: {str(error).splitlines()[0]}")
+            doubts.append(Caution("incomplete", f"{name}.yaml: {str(error).splitlines()[0]}"))
         text, beside = rewritten(form, data, heading)
         files |= {f"{name}.yaml": text, **beside}
     return files, doubts

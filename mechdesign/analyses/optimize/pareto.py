@@ -16,6 +16,7 @@ from mechdesign.analyses.optimize.descent import descend
 from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.search import sample, search
+from mechdesign.cautions import Caution
 from mechdesign.numerics import fronts
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table
@@ -368,12 +369,16 @@ def optima(designs: Designs, typed: Floats) -> Designs:
     return dataclasses.replace(designs, weights=rows, marks=names, chosen=chosen)
 
 
-def doubts(growth: Table, evaluations: int) -> Iterator[str]:
+def doubts(growth: Table, evaluations: int) -> Iterator[Caution]:
     """A warning of a front whose hypervolume still grows in the last tenth of its designs."""
     share = float(growth["growth"][-1])
     if share > STILL_GROWING:
-        yield (f"the front still grows: its hypervolume by {100 * share:.2g} % in the last tenth of its designs; "
-               f"allow more, e.g. optimize.evaluations: {4 * evaluations}")  # fmt: skip
+        yield Caution(
+            "unconverged",
+            f"the front still grows: its hypervolume by {100 * share:.2g} % in the last tenth of its designs; "
+            f"allow more, e.g. optimize.evaluations: {4 * evaluations}",
+            "hypervolume", len(growth) - 1,
+        )  # fmt: skip
 
 
 def growth_table(designs: Designs) -> Table:

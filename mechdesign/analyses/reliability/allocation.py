@@ -19,6 +19,7 @@ from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, Tolerance
 from mechdesign.analyses.reliability.grades import graded
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
+from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Column, Result, Table
 from mechdesign.study.schema.reliability import Precision, ReliabilitySection
@@ -130,19 +131,22 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
             f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}"
         )
     before = sum(found[k].price(found[k].given) for k in free.tolist())
-    notes = [
+    notes = [Caution(
+        "allocated",
         f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {asked}, and at "
-        f"{where}, the worst pose, it is {by_model} by the analytic model and {by_simulation} by {last.method}"
-    ]
+        f"{where}, the worst pose, it is {by_model} by the analytic model and {by_simulation} by {last.method}",
+        "confirmation", pose=where,
+    )]  # fmt: skip
     if len(rounds) > 1:
-        notes.append(
+        notes.append(Caution(
+            "allocated",
             "allocated: simulation and the analytic model differ; the target of the model was corrected "
-            f"{len(rounds) - 1} times"
-        )
+            f"{len(rounds) - 1} times",
+            "confirmation",
+        ))  # fmt: skip
     if last.bound < last.cost() * (1.0 - _SAME):
-        notes.append(
-            f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
-        )
+        cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
+        notes.append(Caution("unconverged", cheaper, "allocation"))
     text, others = rewritten(
         study, allocated_data(study, found, last.scales), f"Tolerances of {study.name}, the cheapest for a {asked}"
     )
@@ -285,7 +289,7 @@ def _confirmation(last: _Round) -> Table:
     return Table("confirmation", tuple(columns), "reliability, or Cpk, of the allocated tolerances")
 
 
-def _ends(last: _Round) -> list[str]:
+def _ends(last: _Round) -> list[Caution]:
     """Which tolerances end at what is allowed, and which have no grade."""
     model, notes = last.model, []
     idle, free = _idle(model, last.scales), model.free.tolist()
@@ -306,10 +310,11 @@ def _ends(last: _Round) -> list[str]:
         elif scale > most * 0.999:
             what = f"is {f'in the coarsest grade, {grade}' if grade else f'as wide as allowed, {wide}'}"
         if what:
-            notes.append(f"allocated: '{model.tolerances[k].name}' {what}")
+            notes.append(Caution("allocated", f"allocated: '{model.tolerances[k].name}' {what}", "allocation", k))
     held = [t.name for k, t in enumerate(model.tolerances) if model.steps and k not in free]
     if held:
-        notes.append(f"allocated: held as given, for grades are of lengths with a tolerance: {', '.join(held)}")
+        words = f"allocated: held as given, for grades are of lengths with a tolerance: {', '.join(held)}"
+        notes.append(Caution("allocated", words, "allocation"))
     return notes
 
 

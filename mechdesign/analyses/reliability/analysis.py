@@ -24,6 +24,7 @@ from mechdesign.analyses.reliability.simulation import Setting, forward_plan
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources, find_sources
 from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Partial, Task
+from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
 from mechdesign.parallel import Divided, apart, keep_freed_memory, one_thread
@@ -87,9 +88,8 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         counts["samples"] = sum(sums.samples for sums in done)
         counts["invalid"] = sum(sums.samples - sums.valid for sums in done)
         if counts["invalid"]:
-            failures.append(
-                f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
-            )
+            words = f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
+            failures.append(Caution("unassembled", words))
     cycles = [each.cycle.samples for each in found if each.cycle is not None and each.cycle.samples]
     if cycles:
         counts["cycles"] = cycles[0]
@@ -139,7 +139,7 @@ def first_order_tables(
     return {table.name: table for table in made}, task.reason
 
 
-def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[str]]:
+def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[Caution]]:
     """The nominal mechanism and its linear error model at every pose, nan where it is not assembled; what is doubtful.
 
     Poses that do not hold the study's load are marked.
@@ -233,17 +233,17 @@ def _followed(task: Task) -> int:
     return max(estimates, key=lambda pose: np.nan_to_num(estimates[pose].failure))
 
 
-def notes(found: Sequence[MethodResult], task: Task) -> list[str]:
-    """All of it, in sentences."""
+def notes(found: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """All that is to be known of what the methods found."""
     return [
         *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
         *_pointless(found, task), *_not_assembled(found, task), *_unassembled(found), *_of_cycles(found, task),
     ]  # fmt: skip
 
 
-def _outside(task: Task) -> list[str]:
+def _outside(task: Task) -> list[Caution]:
     """Where a nominal value lies outside its own limits: the farthest pose of each."""
-    sentences = []
+    found = []
     for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
         beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
         poses = np.flatnonzero(beyond > 0)
@@ -256,15 +256,17 @@ def _outside(task: Task) -> list[str]:
         if not np.isfinite(low) or not np.isfinite(high):
             between = f"at least {low:.6g}" if np.isfinite(low) else f"at most {high:.6g}"
         several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
-        sentences.append(
+        found.append(Caution(
+            "suspect",
             f"{task.question.channels[band.output].name}: the nominal value {value:.6g} at {task.where(pose)}{several} "
-            f"lies outside its limits, {between}{f' {unit}' if unit else ''}"
-        )
-    return sentences
+            f"lies outside its limits, {between}{f' {unit}' if unit else ''}",
+            pose=task.where(pose),
+        ))  # fmt: skip
+    return found
 
 
-def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
-    """One sentence for each two methods that are apart by more than a factor beyond their intervals: the worst pose."""
+def disagreements(found: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """One warning for each two methods that are apart by more than a factor beyond their intervals: the worst pose."""
     apart: dict[tuple[str, str], list[tuple[float, int, Estimate, Estimate]]] = {}
     for pose in range(task.poses.count):
         estimates: dict[str, Estimate] = {}
@@ -278,20 +280,22 @@ def disagreements(found: Sequence[MethodResult], task: Task) -> list[str]:
             times = disagree(one, other)
             if times > FACTOR:
                 apart.setdefault(pair, []).append((times, pose, one, other))
-    sentences = []
+    warnings = []
     for (name, second), cases in apart.items():
         factor, pose, one, other = max(cases, key=lambda case: case[0])
         times_apart = f"{factor:.3g} times" if factor < 1e6 else "many orders of magnitude"
         several = task.poses.count > 1
         others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
-        sentences.append(
+        warnings.append(Caution(
+            "disagree",
             f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is {one.failure:.3g} by "
-            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}"
-        )
-    return sentences
+            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}",
+            "reliability", pose=task.where(pose),
+        ))  # fmt: skip
+    return warnings
 
 
-def _unseen(found: Sequence[MethodResult], task: Task) -> list[str]:
+def _unseen(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Where counted failures are none: the upper end of the interval."""
     cases = []
     for each in found:
@@ -303,13 +307,17 @@ def _unseen(found: Sequence[MethodResult], task: Task) -> list[str]:
         if each.cycle is not None and each.cycle.samples and not each.cycle.failures:
             cases.append((each.method, each.cycle, "made mechanisms", "over the whole cycle"))
     return [
-        f"{method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
-        f"{estimate.high:.2g}"
+        Caution(
+            "unconverged",
+            f"{method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
+            f"{estimate.high:.2g}",
+            "reliability",
+        )
         for method, estimate, what, where in cases
     ]
 
 
-def _unreached(found: Sequence[MethodResult], task: Task) -> list[str]:
+def _unreached(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Where `auto` ended before the precision asked: the worst pose and what was reached there."""
     precision = task.precision
     short: dict[int, float] = {}
@@ -330,26 +338,30 @@ def _unreached(found: Sequence[MethodResult], task: Task) -> list[str]:
         asked, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
         what = "half the interval"
     others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
-    return [
+    return [Caution(
+        "unconverged",
         f"auto: {what} is {there} at {task.where(pose)}{others}, not the {asked} asked; it ends at {task.most} "
-        "samples, which reliability.samples sets"
-    ]
+        "samples, which reliability.samples sets",
+        "reliability", pose=task.where(pose),
+    )]  # fmt: skip
 
 
-def _pointless(found: Sequence[MethodResult], task: Task) -> list[str]:
+def _pointless(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Where `form` found no design point although limits are broken."""
     unknown = [pose for each in found if each.method == "form"
                for pose, estimate in each.estimates.items() if math.isnan(estimate.failure)]  # fmt: skip
     if not unknown:
         return []
     others = f" and at {len(unknown) - 1} more poses" if len(unknown) > 1 else ""
-    return [
+    return [Caution(
+        "unconverged",
         f"form: samples break a limit at {task.where(unknown[0])}{others}, but no design point was found: it has no "
-        "probability there"
-    ]
+        "probability there",
+        "reliability", pose=task.where(unknown[0]),
+    )]  # fmt: skip
 
 
-def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[str]:
+def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Where made mechanisms cannot be assembled by the first order, for methods that draw none: the worst pose."""
     names = ", ".join(each.method for each in found if each.normal is not None)
     distance = task.closing.distance().min(axis=0, initial=math.inf)
@@ -359,41 +371,50 @@ def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[str]:
     pose = int(np.argmin(distance))
     share = 50.0 * math.erfc(float(distance[pose]) / math.sqrt(2.0))
     several = f" (the worst of {len(poses)} poses)" if len(poses) > 1 else ""
-    return [
+    return [Caution(
+        "unassembled",
         f"{names}: {share:.2g} % of the made mechanisms cannot be assembled at {task.where(pose)}{several}, "
         "by the first order of the margin to a dead centre; they count as failures, and near a dead centre errors are "
-        "not normal: compare with form or monte_carlo"
-    ]
+        "not normal: compare with form or monte_carlo",
+        pose=task.where(pose),
+    )]  # fmt: skip
 
 
-def _unassembled(found: Sequence[MethodResult]) -> list[str]:
+def _unassembled(found: Sequence[MethodResult]) -> list[Caution]:
     """Where samples drawn about the limits meet what cannot be assembled."""
-    sentences = []
+    warnings = []
     for each in found:
         used = [(METHODS[each.used.get(pose, each.method)], estimate) for pose, estimate in each.estimates.items()]
         drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
-            sentences.append(
+            warnings.append(Caution(
+                "unassembled",
                 f"{each.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they count "
-                "as failures"
-            )
-    return sentences
+                "as failures",
+            ))  # fmt: skip
+    return warnings
 
 
-def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[str]:
+def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Of made mechanisms that cannot be assembled at some pose, and where `auto` ended too early."""
-    sentences = []
+    warnings = []
     simulated = {each.method: each.cycle for each in found if each.cycle is not None and each.cycle.samples}
     first = next(iter(simulated.values()), None)
     if first is not None and first.invalid:
-        sentences.append(
+        warnings.append(Caution(
+            "unassembled",
             f"{first.invalid} of {first.samples} made mechanisms cannot be assembled at some pose of the cycle; "
-            "they count as failures"
+            "they count as failures",
+        ))  # fmt: skip
+    return warnings + [
+        Caution(
+            "unconverged",
+            f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at "
+            f"{last.failure:.3g}, not as precise as asked; it ends at {last.samples} made mechanisms, which "
+            "reliability.samples sets",
+            "reliability",
         )
-    return sentences + [
-        f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at {last.failure:.3g}, "
-        f"not as precise as asked; it ends at {last.samples} made mechanisms, which reliability.samples sets"
         for method, last in simulated.items()
         if METHODS[method].precise and last.failures and not reached(task.precision, last.failure, last.low, last.high)
     ]

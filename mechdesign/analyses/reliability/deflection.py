@@ -16,6 +16,7 @@ import numpy as np
 from mechdesign.analyses.reliability.question import Channel
 from mechdesign.analyses.stiffness.analysis import Body
 from mechdesign.analyses.stiffness.elements import corners_of
+from mechdesign.cautions import Caution
 from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
@@ -150,7 +151,7 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
     return load if load.shape[1] == 1 else load[:, poses]
 
 
-def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[str]]:
+def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, None where nothing loads it, and what is doubtful; of designs at their poses."""
     section, stiffness = study.reliability, study.stiffness
     assert section is not None
@@ -161,10 +162,11 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     loads = own.loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:
-        notes.append(
+        notes.append(Caution(
+            "assumed",
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            f"for example reliability.load: [{', '.join(f'{part:g}' for part in stiffness.loads[0])}]"
-        )
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in stiffness.loads[0])}]",
+        ))  # fmt: skip
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
@@ -194,29 +196,32 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     return Elasticity(mechanism, asked, load, ends, pins, bodies, lines), notes
 
 
-def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[str]:
+def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
     """Warnings that name channels whose deflection is not known, and those that could be understood in two ways."""
     positions = [channel for channel in channels if channel.order == 0]
-    sentences = []
+    warnings = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]
     if lost:
-        sentences.append(
+        warnings.append(Caution(
+            "incomplete",
             f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
-            "mechanism"
-        )
+            "mechanism",
+        ))  # fmt: skip
     graph, section = loaded.mechanism.graph, loaded.asked.given
     for point, links in links_meant(study.reliability, section, graph).items():
         about = [channel.name for channel in positions if ("", graph.node(point)) in channel.coordinate.ends]
         if about and len(links) > 1 and point in section.bearings and point != section.at:
             ends = " and ".join(f"{link}.{point}" for link in links)
-            sentences.append(
+            warnings.append(Caution(
+                "assumed",
                 f"{', '.join(about)}: the pin {point} gives, and {point} is midway between its ends {ends}; name one "
-                "of them where that is meant"
-            )
+                "of them where that is meant",
+            ))  # fmt: skip
     for link in filter(section.elastic.__contains__, loaded.lines):
         angles = [(channel.name, angles_of([channel.coordinate]).values()) for channel in positions]
         about = [name for name, turns in angles if any(link in (turn.body, turn.reference) for turn in turns)]
         if about:
             ends = " to ".join(graph.nodes[node] for node in loaded.lines[link])
-            sentences.append(f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}")
-    return sentences
+            words = f"{', '.join(about)}: {link} bends, and its angle is that of the line from {ends}"
+            warnings.append(Caution("assumed", words))
+    return warnings

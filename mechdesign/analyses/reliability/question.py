@@ -12,6 +12,7 @@ import numpy as np
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
 from mechdesign.analyses.reliability.laws import taken
+from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import TURN
@@ -202,21 +203,22 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
     return split_order(name, known)
 
 
-def unsaid(study: Study, question: ReliabilityQuestion) -> list[str]:
-    """A sentence for each output whose pin has a clearance, where the study does not say which link's point it is."""
+def unsaid(study: Study, question: ReliabilityQuestion) -> list[Caution]:
+    """A warning for each output whose pin has a clearance, where the study does not say which link's point it is."""
     section: dict[str, Any] = study.resolved["reliability"]
     names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
-    sentences = []
+    warnings = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         plain = ("", study.mechanism.graph.node(point))
         about = [c.name for c in question.channels if not c.order and plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
-            sentences.append(
+            warnings.append(Caution(
+                "assumed",
                 f"{', '.join(about)}: {point} has a clearance and is that of {' and '.join(rest)}, not of {link}, "
-                f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'"
-            )
-    return sentences
+                f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'",
+            ))  # fmt: skip
+    return warnings
 
 
 def _named(name: str, point: str) -> bool:

@@ -22,6 +22,7 @@ from mechdesign.analyses.reliability.first_order import FirstOrder
 from mechdesign.analyses.reliability.simulation import Setting, errors_of, generator
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
+from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Floats
 from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
@@ -184,7 +185,7 @@ def uncorrelated(sources: Sources) -> set[str]:
     return {s.name for s, own in zip(sources.scalars, lonely, strict=True) if own} | {p.name for p in sources.pins}
 
 
-def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[str]:
+def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[Caution]:
     """Which sources have no indices, and where made mechanisms are left out of them."""
     if not found:
         return []
@@ -192,13 +193,16 @@ def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[str]:
     alone = uncorrelated(task.sources)
     bound = [s.name for s in task.sources.scalars if s.name not in alone]
     if bound:
-        notes.append(f"Sobol' indices are of what varies by itself: {', '.join(bound)} are correlated and have none")
+        words = f"Sobol' indices are of what varies by itself: {', '.join(bound)} are correlated and have none"
+        notes.append(Caution("incomplete", words, "contributions"))
     pose, worst = max(found.items(), key=lambda item: item[1].invalid)
     if worst.invalid:
-        notes.append(
+        notes.append(Caution(
+            "unassembled",
             f"Sobol' indices: {worst.invalid} of {worst.samples} points are left out at {task.where(pose)}, since a "
-            "mechanism there cannot be assembled"
-        )
+            "mechanism there cannot be assembled",
+            "contributions", pose=task.where(pose),
+        ))  # fmt: skip
     return notes
 
 

@@ -20,6 +20,7 @@ from mechdesign.analyses.reliability.laws import (
     marginal,
     taken,
 )
+from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism import Mechanism
@@ -267,7 +268,7 @@ class Sources:
         return Made(places, by_kind["drive"], by_kind["load"])
 
 
-def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[str]]:
+def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[Caution]]:
     """Sources of a study, and warnings about parameters that vary several places together.
 
     Where designs differ, at their `poses`: to the first order.
@@ -287,7 +288,7 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
     scalars = []
     slopes: Mapping[str, Number]
-    warnings: list[str] = []
+    warnings: list[Caution] = []
     together: list[str] = []
     for name, dimension in section.dimensions.items():
         nominal = sizes.get(name, 0.0)
@@ -297,7 +298,8 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
             moved = [place for place, slope in slopes.items() if np.any(slope)]
             dimensions = [place for place in moved if not place.startswith(MEASURED)]
             if not moved:
-                warnings.append(f"parameter '{name}' changes no dimension of the mechanism")
+                idle = f"parameter '{name}' changes no dimension of the mechanism"
+                warnings.append(Caution("ignored", idle))
             elif len(dimensions) > 1:
                 together.append(f"'{name}' {', '.join(dimensions)}")
         else:
@@ -311,7 +313,8 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
         scalars.append(Scalar(name, kind, _law(study, name, dimension, nominal, factor), moves, factor, unit))
     if together:
         parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
-        warnings.append(f"{parameters} several dimensions together: {'; '.join(together)}")
+        words = f"{parameters} several dimensions together: {'; '.join(together)}"
+        warnings.append(Caution("assumed", words))
     scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
     pins = tuple(_pin(study, name, clearance) for name, clearance in section.clearances.items())
     sources = Sources(study, tuple(scalars), pins, _correlation(section, scalars))
@@ -356,13 +359,16 @@ def _check_sizes(sources: Sources) -> None:
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 
 
-def _twice(study: Study, place: str, varying: Collection[str]) -> list[str]:
+def _twice(study: Study, place: str, varying: Collection[str]) -> list[Caution]:
     """What is to be known of a place that varies by itself and with a parameter that sets it."""
     both = [name for name in study.parameters.nominal
             if name in varying and study.parameters.derivatives(name).get(place)]  # fmt: skip
     return [
-        f"'{place}' varies by its own tolerance, and with parameter '{name}': both count, as independent errors that "
-        "add up; leave one of them out if they are the same error"
+        Caution(
+            "assumed",
+            f"'{place}' varies by its own tolerance, and with parameter '{name}': both count, as independent errors "
+            "that add up; leave one of them out if they are the same error",
+        )
         for name in both
     ]
 

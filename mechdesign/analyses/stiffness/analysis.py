@@ -40,6 +40,7 @@ from mechdesign.analyses.stiffness.tables import (
     stiffness_table,
 )
 from mechdesign.analyses.together import Answers, End, Group
+from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -147,7 +148,7 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
     for k, reason in enumerate(solved.reason.reshape(designs, each)):
         counts = {"poses": each, "invalid": int(np.count_nonzero(reason))}
         try:
-            warnings, failed = judge_failures(study, poses, reason, k * each)
+            warnings, failed = judge_failures(study, poses, reason, k * each, "stiffness")
         except AssemblyError as error:
             ends.append(End(counts=counts, error=error))
             continue
@@ -332,35 +333,49 @@ class _Cautions:
         self.near = known & (held.rank == body.size) & (held.margin < NEAR_SINGULAR)
         self.points, self.legs = _without_beam(study, body), _without_joint(body)
 
-    def of(self, rows: slice) -> list[str]:
+    def of(self, rows: slice) -> list[Caution]:
         """Warnings about the poses of one design."""
         study, poses, count, warnings = self.study, self.poses, rows.stop - rows.start, [*self.points]
         loose, near = (rows.start + np.flatnonzero(where[rows]) for where in (self.loose, self.near))
         if len(loose):
-            warnings.append(
+            first = pose_in_words(study, poses, int(loose[0]))
+            warnings.append(Caution(
+                "singular",
                 f"{len(loose)} of {count} poses are under-constrained: a twist is free (free_x, free_y, free_phi), "
-                f"and the compliance is nan; the first: {pose_in_words(study, poses, int(loose[0]))}"
-            )
+                f"and the compliance is nan; the first: {first}",
+                "stiffness", int(loose[0]) - rows.start, first,
+            ))  # fmt: skip
         if len(near):
-            warnings.append(
+            first = pose_in_words(study, poses, int(near[0]))
+            warnings.append(Caution(
+                "singular",
                 f"{len(near)} of {count} poses are nearly under-constrained (wrenches within "
-                f"{self.margin[near].min():.1e} of dependence); the first: {pose_in_words(study, poses, int(near[0]))}"
-            )
+                f"{self.margin[near].min():.1e} of dependence); the first: {first}",
+                "stiffness", int(near[0]) - rows.start, first,
+            ))  # fmt: skip
         return [*warnings, *self.legs]
 
 
-def _without_beam(study: Study, body: Body) -> list[str]:
+def _without_beam(study: Study, body: Body) -> list[Caution]:
     links = study.mechanism.description.links
     return [
-        f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two ends"
+        Caution(
+            "ignored",
+            f"link '{name}' has a single point, and so no beam: it is rigid, though 'elastic' names it; give it two "
+            "ends",
+        )
         for name in body.given.elastic
         if len(corners_of(links[name])) < 2
     ]
 
 
-def _without_joint(body: Body) -> list[str]:
+def _without_joint(body: Body) -> list[Caution]:
     return [
-        f"leg '{leg.name}' has no free joint: it holds three ways at once and has no equivalent springs"
+        Caution(
+            "incomplete",
+            f"leg '{leg.name}' has no free joint: it holds three ways at once and has no equivalent springs",
+            "springs",
+        )
         for leg in body.legs or ()
         if not any(isinstance(element, Hinge | Guide) and element.drive is None for element in leg.elements)
     ]

@@ -42,6 +42,7 @@ from mechdesign.analyses.workspace.tables import (
     totals,
     where,
 )
+from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.indices import REGIONAL, STATISTICS, index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
@@ -72,14 +73,15 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     regions: list[tuple[Study, Question, list[Patch]]] = []
     shapes: list[Floats] = []
     pieces: list[list[Column]] = []
-    warnings: list[str] = []
+    warnings: list[Caution] = []
     for question in asked:
         if singular_everywhere(question.field):
             question = replace(question, field=replace(question.field, same_assembly=False))
             given = answer(replace(question, indices=(), wanted=("SUI", "area", "box_area")), {}, 1, SINGLE)
             nothing = {name: np.full(1, np.nan) for name in question.wanted}
             given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
-            warnings.append(f"every pose{where(question)} is a forward singularity: indices have no value")
+            words = f"every pose{where(question)} is a forward singularity: indices have no value"
+            warnings.append(Caution("singular", words, "indices", len(answers)))
         else:
             given = answer(question, {}, 1, SINGLE)
             warnings += _doubts(question, given)
@@ -92,13 +94,15 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
             shapes.append(inscribed(question.field, question.about, question.scan, counted, others))
             regions.append((study, question, found))
             if not np.isfinite(shapes[-1]).all():
-                warnings.append(
+                warnings.append(Caution(
+                    "incomplete",
                     f"the largest circle or rectangle inside the region{where(question)} was not found: where a limit "
-                    "jumps (an angle's turn ends there) no slope leads along the boundary"
-                )
+                    "jumps (an angle's turn ends there) no slope leads along the boundary",
+                    "indices",
+                ))  # fmt: skip
         else:
             shapes.append(np.full(len(INSCRIBED), np.nan))
-            warnings += filter(None, [beyond(study, question, ())] if question.field.same_assembly else [])
+            warnings += beyond(study, question, ()) if question.field.same_assembly else []
             pieces.append(piece_columns(study, question, (), (), drawn=False))
         progress.update(1)
     if not regions:
@@ -121,7 +125,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 
 def _pieces(
-    study: Study, question: Question, given: Evaluation, warnings: list[str]
+    study: Study, question: Question, given: Evaluation, warnings: list[Caution]
 ) -> tuple[list[Patch], list[Column]]:
     """Patches and pieces of a region, and a warning where pieces, or more than the piece beyond it, are left out."""
     assert given.pieces is not None
@@ -130,7 +134,7 @@ def _pieces(
     if len(areas) > 1 and question.field.same_assembly:
         warnings.append(left_out(study, question, areas, drawn))
     if question.field.same_assembly and not isinstance(question.field, Ranged):
-        warnings += filter(None, [beyond(study, question, areas)])
+        warnings += beyond(study, question, areas)
     return found, piece_columns(study, question, found, areas, drawn)
 
 
@@ -160,22 +164,26 @@ def _unreachable(study: Study, asked: Sequence[Question]) -> str:
     )
 
 
-def _doubts(question: Question, given: Evaluation) -> Iterator[str]:
+def _doubts(question: Question, given: Evaluation) -> Iterator[Caution]:
     there = where(question)
     if not given.panels.closes[0]:
         assembly = " in the sketch's assembly" if question.field.same_assembly else ""
-        yield f"nothing is reachable{there}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
+        words = f"nothing is reachable{there}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
+        yield Caution("unassembled", words, "indices")
         return
     area, error = given.values["area"][0], given.errors["area"][0]
     if error > AREA_SURE * area:
-        yield (
+        yield Caution(
+            "unconverged",
             f"the area{there} is only known to {error:.2g}: a raster of places that are reached shows more than the "
-            "integral has found"
+            "integral has found",
+            "indices",
         )
     for name in ("GII", "GRI"):
         error, value = given.errors[name][0], given.values[name][0]
         if question.rule == "gauss" and not error <= 2 * question.tolerance * abs(value):
-            yield f"{name}{there} is only known to {error:.1g}, not to the tolerance asked for"
+            words = f"{name}{there} is only known to {error:.1g}, not to the tolerance asked for"
+            yield Caution("unconverged", words, "indices")
 
 
 def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluation]) -> Iterator[Column]:
@@ -253,7 +261,7 @@ def _reachable(study: Study, progress: Progress) -> Result:
     answers: list[Evaluation] = []
     boundaries: list[list[Column]] = []
     pieces: list[list[Column]] = []
-    warnings: list[str] = []
+    warnings: list[Caution] = []
     for question in asked:
         given = answer(question, {}, 1, OVER_RANGE)
         answers.append(given)
@@ -286,10 +294,12 @@ def _reachable(study: Study, progress: Progress) -> Result:
     late = (area > 0) & (error > FINEST_AREA * area)
     if late.any():
         known = (error[late] / area[late]).max()
-        warnings.append(
+        warnings.append(Caution(
+            "unconverged",
             f"the area is known to {known:.1g} of itself only (area_error): over the range of {name} the boundary "
-            "is too rough for more"
-        )
+            "is too rough for more",
+            "indices", int(late.argmax()),
+        ))  # fmt: skip
     counts = {"regions": len(asked), "empty": len(asked) - len(boundaries)}
     return Result("workspace", {table.name: table for table in tables}, tuple(warnings), counts)
 

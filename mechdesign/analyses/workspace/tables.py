@@ -16,6 +16,7 @@ from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.inscribed import INSCRIBED
 from mechdesign.analyses.workspace.question import Question, answer
 from mechdesign.analyses.workspace.singularities import around, causes, inside
+from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
@@ -38,40 +39,44 @@ def where(question: Question) -> str:
     return f" at {held}" if held else ""
 
 
-def left_out(study: Study, question: Question, areas: Sequence[float], drawn: bool) -> str:
+def left_out(study: Study, question: Question, areas: Sequence[float], drawn: bool) -> Caution:
     """That the indices are of one piece, and what is left out."""
     one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
     many, unit = len(areas) - 1, study.units.label("area")
     left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
-    return (
+    return Caution(
+        "incomplete",
         f"the region{where(question)} has {len(areas)} pieces that do not hang together: indices are {one}; "
-        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)"
+        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)",
+        "pieces",
     )
 
 
-def beyond(study: Study, question: Question, areas: Sequence[float]) -> str:
+def beyond(study: Study, question: Question, areas: Sequence[float]) -> list[Caution]:
     """That more lies in the other assembly than in the piece that is reported, with both areas; else nothing.
 
     It is looked for as loosely as of a design of many.
     """
     field = question.field
     if not any(name.startswith("assembly ") for _, name in field.labels):
-        return ""
+        return []
     both = replace(field, same_assembly=False)
     every = replace(question, field=both, indices=(), wanted=("area",), rule="gauss", tolerance=LOOSE)
     try:
         other = float(answer(every, {}, 1, BATCH).values["area"][0]) - sum(areas)
     except AssemblyError:
         # In the other assembly the region has no end.
-        return ""
+        return []
     if not other > max(areas, default=0.0):
-        return ""
+        return []
     unit = study.units.label("area")
     inside, beyond = (f"{area:.3g} {unit}".rstrip() for area in (sum(areas[:1]), other))
-    return (
+    return [Caution(
+        "incomplete",
         f"more of the region{where(question)} lies beyond a forward singularity, in the other assembly: about "
-        f"{beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch in the other assembly"
-    )
+        f"{beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch in the other assembly",
+        "indices",
+    )]  # fmt: skip
 
 
 def held_columns(study: Study, question: Question, rows: int) -> list[Column]:

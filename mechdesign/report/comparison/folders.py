@@ -66,7 +66,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     ]
     unfit = [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
     if unfit and not found.differences:
-        raise StudyError([*map(Problem, unfit)])
+        raise StudyError([Problem(each) for each in unfit])
     found.notes += unfit
     found.moved.sort(key=lambda each: -each.share)
     return found

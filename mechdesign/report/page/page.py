@@ -29,7 +29,7 @@ from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR, harmless
-from mechdesign.report.requirements import Verdict, judged_by
+from mechdesign.report.requirements import Verdict, judged_by, named
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.reliability import in_words
@@ -79,7 +79,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         Whether pictures are wanted.
     """
     sections = [each.section for each in answers if each.section is not None]
-    warnings = [(f"{problem.key}: {problem.message}", "") for problem in study.warnings]
+    warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, each["command"]) for each in sections for warning in each["warnings"]]
     moving = any(each["moving"] is not None for each in sections)
     drawing = next((each["mechanism"] for each in sections if each["mechanism"]), "")
@@ -173,13 +173,18 @@ def _hash(text: str) -> str:
 def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, Any]]:
     """The requirements of the questions that were asked, in the order of the study, each with its verdict.
 
-    Those of its cases, where they were asked, come last.
+    Those on warnings come after the others, and those of its cases, where they were asked, last.
     """
     rows: list[tuple[bool, int, dict[str, Any]]] = []
+    rules = [
+        *map(_in_words, study.requirements),
+        *({"what": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
+    ]
+    of_warnings = range(len(study.requirements), len(rules))
     for each in answers:
-        for k, verdict in zip_longest(judged_by(study, each.command), each.verdicts):
+        for k, verdict in zip_longest([*judged_by(study, each.command), *of_warnings], each.verdicts):
             about = {"command": each.command, "verdict": verdict, "met": verdict is not None and verdict.met}
-            rows.append((each.command == SWEEP.name, k, about | _in_words(study.requirements[k])))
+            rows.append((each.command == SWEEP.name, k, about | rules[k]))
     return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
 
 

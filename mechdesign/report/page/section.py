@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.cautions import Caution
 from mechdesign.errors import explain
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
@@ -28,8 +29,9 @@ _NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIG
 
 
 def section(
-    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[str], *, plots: bool
-) -> tuple[dict[str, Any], tuple[str, ...]]:
+    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[Caution], *,
+    plots: bool,
+) -> tuple[dict[str, Any], tuple[Caution, ...]]:  # fmt: skip
     """The part of a report that a result fills, and a warning if the mechanism cannot be shown moving.
 
     Parameters
@@ -46,7 +48,8 @@ def section(
         try:
             part = moving(study, result.seen)
         except Exception as error:
-            warnings = (*warnings, f"the mechanism cannot be shown moving: {explain(error)[1]}")
+            still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
+            warnings = (*warnings, Caution("undrawn", still))
     doubled = CURVES if part is not None and part.beside else ""
     shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
@@ -58,7 +61,7 @@ def section(
         "tables": [_table(table) for table in result.tables.values()],
         "files": list(result.files),
         "counts": plain(dict(result.counts)),
-        "warnings": [*result.warnings, *warnings],
+        "warnings": [*map(str, (*result.warnings, *warnings))],
         "interrupted": result.interrupted,
     }, warnings
 

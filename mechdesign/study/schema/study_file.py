@@ -6,6 +6,9 @@ import re
 from collections.abc import Sequence
 from typing import Annotated, Any
 
+from pydantic import BeforeValidator
+
+from mechdesign.cautions import ALL, KINDS
 from mechdesign.errors import Problem, StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.matrix import MatrixSection
@@ -19,6 +22,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
 from mechdesign.study.text.forms import Generator, name_forms
 from mechdesign.study.text.reporter import LIST_FORM, schema_fields
+
+_Warning = Annotated[str, fields.choice({**KINDS, ALL: "every kind"}, "kind of warning")]
 
 
 class StudyFile(fields.Model):
@@ -41,6 +46,10 @@ class StudyFile(fields.Model):
     """The gate: results that must keep bounds, or the exit code is 1. The worst row of each counts. Example: [{result:
     kinematics.mu, abs: true, at_least: 40}, {result: reliability.reliability, where: {method: monte_carlo}, at_least:
     0.99}]
+    """
+    fail_on: Annotated[tuple[_Warning, ...], BeforeValidator(fields.as_list), fields.OrShort()] = ()
+    """Kinds of warnings that a result may not have, or the exit code is 1; one alone needs no list. ``--strict`` is
+    all. Example: [unassembled, disagree]
     """
 
 

@@ -97,11 +97,11 @@ class Reporter:
             hint = suggestion(str(name), others)
             self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
         else:
-            self.warnings.append(self._placed(self.written(path), f"nothing uses {what} {name!r}", True))
+            self.doubt(path, f"nothing uses {what} {name!r}", at_key=True)
 
-    def doubt(self, path: Sequence[str | int], message: str) -> None:
+    def doubt(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Warn of what is likely a mistake at a path of the data."""
-        self.warnings.append(self._placed(self.written(path), message, False))
+        self.warnings.append(self._placed(self.written(path), message, at_key))
 
     def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
         known = found

@@ -1,0 +1,69 @@
+"""Warnings as values: of what kind, a sentence, and the place that it is about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of warning: what it is of, and the page of the documentation that tells more, without its suffix."""
+
+    meaning: str
+    page: str
+
+
+KINDS = {
+    "unassembled": Kind(
+        "poses, samples or designs that cannot be assembled, or that a limit of motion forbids", "theory/limits"
+    ),
+    "singular": Kind(
+        "the mechanism is at, near or passes a singularity, dead centre or change point", "theory/kinematics"
+    ),
+    "disagree": Kind("methods of reliability that disagree", "theory/reliability"),
+    "unconverged": Kind(
+        "a number is known less exactly than asked, or a search or simulation ended too early", "theory/limits"
+    ),
+    "undefined": Kind("numbers that have no value where they are asked", "theory/conventions"),
+    "incomplete": Kind("a part of what was asked is left out", "theory/limits"),
+    "infeasible": Kind("designs or cases that do not meet what is required of them", "theory/optimize"),
+    "ignored": Kind("the study gives what has no effect", "reference/study/index"),
+    "assumed": Kind("the study can be understood in several ways, and this one was taken", "reference/study/index"),
+    "suspect": Kind("what is asked is likely a mistake", "reference/study/index"),
+    "allocated": Kind("what an allocation of tolerances has chosen", "theory/reliability"),
+    "undrawn": Kind("pictures that could not be drawn", "howto/report"),
+}
+ALL = "all"  # in place of the kinds: each of them
+
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning of a result; ``str(warning)`` is its sentence.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm], limits: [{drive: arm, max: 45}]}
+    ... kinematics: {sweep: {arm: {from: 0, to: 60, step: 30}}}
+    ... ''')
+    >>> [(w.row, w.pose) for w in mechdesign.kinematics(study).warnings if w.kind == "unassembled"]
+    [(2, 'arm = 60 deg')]
+    """
+
+    kind: str  #: one of `KINDS`
+    message: str  #: the sentence
+    table: str = ""  #: the table of the result that it is about; empty where it is about no single one
+    row: int | None = None  #: the first of its rows, from 0
+    pose: str = ""  #: the first pose, or the case, in words
+
+    def __str__(self) -> str:
+        return self.message
+
+    def as_data(self) -> dict[str, str | int]:
+        """Plain data, as a manifest has it: the kind, the sentence, and of the place what is known."""
+        return {name: value for name, value in asdict(self).items() if value not in ("", None)}
+
+
+def fails(warning: Caution, kinds: Sequence[str]) -> bool:
+    """Whether a warning is of one of these kinds, as `fail_on` lists them."""
+    return ALL in kinds or warning.kind in kinds
