@@ -253,7 +253,17 @@ class _LongColumn(Column):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """Answer of one command."""
+    """Answer of one command.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... kinematics: {poses: [{arm: 0}, {arm: 60}], outputs: [P]}
+    ... ''')
+    >>> result = mechdesign.kinematics(study)
+    >>> list(result.tables), result.main["P.y"].round(4), list(result.warnings)
+    (['motion', 'extremes'], array([ 0.    , 86.6025]), [])
+    """
 
     command: str  #: its name in `mechdesign.commands.COMMANDS`
     tables: Mapping[str, Table]  #: named as their files; the first is the main table

@@ -33,6 +33,13 @@ TRIED_POSES = 512
 class Mechanism(Core):
     """A planar mechanism, compiled once; see `mechdesign.mechanism.model.Description` for what it is made from.
 
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm]}
+    ... ''')
+    >>> study.mechanism.mobility, study.mechanism.drives, study.mechanism.coordinates
+    (1, ('arm',), ('arm', 'O.x', 'O.y', 'P.x', 'P.y', 'arm.angle'))
+
     Raises
     ------
     MechanismError

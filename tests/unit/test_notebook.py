@@ -19,12 +19,13 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import mechdesign
+from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
 from mechdesign.commands import QUESTIONS
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Mechanism
-from mechdesign.results import Column, Table
+from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study, template, template_path
 from mechdesign.study import load as load_plain
 
@@ -313,7 +314,11 @@ def test_the_example_of_every_public_name_holds(name: str) -> None:
     hold(told, name or "mechdesign")
 
 
-@pytest.mark.parametrize("told", [Study, Mechanism.solve, Table, Column], ids=lambda told: told.__qualname__)
+@pytest.mark.parametrize(
+    "told",
+    [Study, Mechanism, Mechanism.solve, Result, Table, Column, Caution],
+    ids=lambda told: told.__qualname__,
+)
 def test_the_example_of_what_they_return_holds(told: object) -> None:
     hold(told, "returned")
 
