@@ -43,7 +43,8 @@ class Caution:
 
     >>> import mechdesign
     >>> study = mechdesign.load(text='''
-    ... mechanism: {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm], limits: [{drive: arm, max: 45}]}
+    ... mechanism:
+    ...   {links: {ground: {O: [0, 0]}, arm: [O, P, 100]}, drives: [arm], limits: [{drive: arm, min: -45, max: 45}]}
     ... kinematics: {sweep: {arm: {from: 0, to: 60, step: 30}}}
     ... ''')
     >>> [(w.row, w.pose) for w in mechdesign.kinematics(study).warnings if w.kind == "unassembled"]
