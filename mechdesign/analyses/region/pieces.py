@@ -118,7 +118,7 @@ class Pieces:
     def _ends(self, side: int) -> Floats:
         """Radii of the intervals of each panel beside its lower end (`side` -1) or its upper one (1).
 
-        Shape (2, 2, panels, largest count): inner and outer radii, at a distance from the end and at twice that distance.
+        Shape (2, 2, panels, largest count): inner and outer radii, at a distance from the end and at twice that.
         """
         panels = self.panels
         width = panels.high - panels.low
