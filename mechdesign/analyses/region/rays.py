@@ -221,8 +221,8 @@ def joined(rays: Sequence[Ints], parts: Sequence[Intervals]) -> Intervals:
     def column(name: str, order: Ints) -> NDArray[Any]:
         return np.concatenate([getattr(part, name) for part in parts])[order]
 
-    ends = (column(name, order) for name in ("inner", "outer", "enters", "leaves"))
-    return Intervals(ray[order], *ends, column("beyond", ray_order), column("cut", ray_order))
+    inner, outer, enters, leaves = (column(name, order) for name in ("inner", "outer", "enters", "leaves"))
+    return Intervals(ray[order], inner, outer, enters, leaves, column("beyond", ray_order), column("cut", ray_order))
 
 
 def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
