@@ -107,17 +107,17 @@ def all_breaks(
     spent = np.zeros(designs.count, dtype=np.intp)
     owners, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
     codes = signatures(intervals, len(field.labels))
-    left = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
-    design, low, high, refuted = design[left], angle[left], angle[left + 1], np.zeros(len(left), dtype=bool)
+    lower = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
+    design, low, high, refuted = design[lower], angle[lower], angle[lower + 1], np.zeros(len(lower), dtype=bool)
     while True:
         resolved = high - low <= field.accuracy
         owners.append(design[resolved])
         places.append(0.5 * (low + high)[resolved])
-        left, design, refuted = left[~resolved], design[~resolved], refuted[~resolved]
+        lower, design, refuted = lower[~resolved], design[~resolved], refuted[~resolved]
         low, high = low[~resolved], high[~resolved]
         if not design.size:
             return np.concatenate(owners), np.concatenate(places)
-        pair, angle = _solve(designs, _meetings(intervals, codes, left, field.singular), design, low, high, reach)
+        pair, angle = _solve(designs, _meetings(intervals, codes, lower, field.singular), design, low, high, reach)
         pair, angle = pair[~refuted[pair]], angle[~refuted[pair]]
         width, every = high - low, np.arange(len(design))
         step = np.minimum(np.maximum(BESIDE * width, APART), WITHIN * width)[pair]
@@ -149,25 +149,25 @@ def all_breaks(
             )
         intervals = trace(designs, ray_design, rays, reach[ray_design])
         codes = signatures(intervals, len(field.labels))
-        left = np.flatnonzero((codes[1:] != codes[:-1]) & (owner_pair[1:] == owner_pair[:-1]))
-        confirmed = np.isin(group, group_of[left])
+        lower = np.flatnonzero((codes[1:] != codes[:-1]) & (owner_pair[1:] == owner_pair[:-1]))
+        confirmed = np.isin(group, group_of[lower])
         owners.append(design[pair[confirmed]])
         places.append(angle[confirmed])
-        left = left[group_of[left] < 0]
-        refuted = np.isin(owner_pair[left], np.setdiff1d(np.setdiff1d(pair, idle), pair[confirmed]))
-        design, low, high = ray_design[left], rays[left], rays[left + 1]
+        lower = lower[group_of[lower] < 0]
+        refuted = np.isin(owner_pair[lower], np.setdiff1d(np.setdiff1d(pair, idle), pair[confirmed]))
+        design, low, high = ray_design[lower], rays[lower], rays[lower + 1]
 
 
-def _meetings(intervals: Intervals, codes: Ints, left: Ints, leading: Flags) -> Meetings:
-    """Ends that may meet between the rays `left` and the next ones, by the difference of their signatures `codes`.
+def _meetings(intervals: Intervals, codes: Ints, lower: Ints, leading: Flags) -> Meetings:
+    """Ends that may meet between the rays `lower` and the next ones, by the difference of their signatures `codes`.
 
     Of two margins the one that is `leading` is followed: the other may end where the leading one is zero.
     """
     meetings = [np.zeros(0, dtype=MEETING)]
-    kinds = np.unique(np.stack([codes[left], codes[left + 1]]), axis=1, return_inverse=True)[1].ravel()
+    kinds = np.unique(np.stack([codes[lower], codes[lower + 1]]), axis=1, return_inverse=True)[1].ravel()
     for kind in range(int(kinds.max(initial=-1)) + 1):
         pair = np.flatnonzero(kinds == kind)
-        meetings += _differences(pair, _ends(intervals, left[pair]), _ends(intervals, left[pair] + 1), leading)
+        meetings += _differences(pair, _ends(intervals, lower[pair]), _ends(intervals, lower[pair] + 1), leading)
     return np.concatenate(meetings)
 
 
@@ -319,7 +319,7 @@ def _residual(
 def parabola(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Coefficients of a + b x + c x^2 through three points (first axis)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        one, two = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
-        c = (two - one) / (x[2] - x[0])
-        b = one - c * (x[0] + x[1])
+        first_slope, second_slope = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
+        c = (second_slope - first_slope) / (x[2] - x[0])
+        b = first_slope - c * (x[0] + x[1])
         return y[0] - x[0] * (b + c * x[0]), b, c

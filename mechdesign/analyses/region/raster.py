@@ -253,9 +253,8 @@ def _sides(scan: tuple[float, float]) -> tuple[complex, complex]:
     begin, end = scan
     quarters = 0.5 * np.pi * np.arange(np.ceil(begin / (0.5 * np.pi)), np.floor(end / (0.5 * np.pi)) + 1)
     directions = np.round(np.exp(1j * np.array([begin, *quarters, end])), 9)
-    return complex(directions.real.min(initial=0), directions.imag.min(initial=0)), complex(
-        directions.real.max(initial=0), directions.imag.max(initial=0)
-    )
+    x, y = directions.real, directions.imag
+    return complex(x.min(initial=0), y.min(initial=0)), complex(x.max(initial=0), y.max(initial=0))
 
 
 def _spread(cells: Flags) -> Flags:

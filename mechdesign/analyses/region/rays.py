@@ -138,8 +138,24 @@ class Designs:
         return inside, margins
 
     def traced(self, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
-        """Intersect one block of rays with the region, as `trace` does."""
-        return _trace_block(self, design, theta, reach, slack)
+        """Intersect one block of rays with the region, as `trace` does.
+
+        First with the margins that are quadratic along the rays; then, in what is left, with the others. The intervals
+        of a ray do not depend on the other rays of the block.
+        """
+        places, centre, direction = self.of(design), self.starts(design), np.exp(1j * theta)
+        values = self.field.margins(centre + FIVE[:, None] * reach * direction, places, assembly=False)
+        quadratic, (a, b, c) = _parabolas(values)
+        if not quadratic.all():
+            # Margins that are not quadratic are replaced by 1, which has no root.
+            a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
+        margin, ray, turn, x, start = _quadratic_roots(a, b, c)
+        intervals = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
+        intervals = replace(intervals, cut=np.zeros(len(theta), dtype=bool))
+        if not (quadratic.all() and not self.field.same_assembly):
+            intervals = _cut_by_others(self, places, centre, direction, intervals, quadratic, slack, reach)
+        wide = intervals.outer - intervals.inner > NARROWEST * reach[intervals.ray]
+        return intervals if slack else intervals.kept(wide)
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,25 +241,6 @@ def joined(rays: Sequence[Ints], parts: Sequence[Intervals]) -> Intervals:
     return Intervals(ray[order], inner, outer, enters, leaves, column("beyond", ray_order), column("cut", ray_order))
 
 
-def _trace_block(designs: Designs, design: Ints, theta: Floats, reach: Floats, slack: float) -> Intervals:
-    """Intersect rays first with the margins that are quadratic along them, then, in what is left, with the others.
-
-    The intervals of a ray do not depend on the other rays of the block.
-    """
-    places, centre, direction = designs.of(design), designs.starts(design), np.exp(1j * theta)
-    values = designs.field.margins(centre + FIVE[:, None] * reach * direction, places, assembly=False)
-    quadratic, (a, b, c) = _parabolas(values)
-    if not quadratic.all():
-        # Margins that are not quadratic are replaced by 1, which has no root.
-        a, b, c = np.where(quadratic, a, 1.0), np.where(quadratic, b, 0.0), np.where(quadratic, c, 0.0)
-    margin, ray, turn, x, start = _quadratic_roots(a, b, c)
-    intervals = intervals_between(margin, ray, turn, x * reach[ray], start, reach, slack)
-    intervals = replace(intervals, cut=np.zeros(len(theta), dtype=bool))
-    if not (quadratic.all() and not designs.field.same_assembly):
-        intervals = _cut_by_others(designs, places, centre, direction, intervals, quadratic, slack, reach)
-    return intervals if slack else intervals.kept(intervals.outer - intervals.inner > NARROWEST * reach[intervals.ray])
-
-
 def _parabolas(values: Floats) -> tuple[Flags, tuple[Floats, Floats, Floats]]:
     """Which margins are quadratic on each ray, and coefficients of a + b x + c x^2 through x = 0, 1/2 and 1.
 
@@ -294,15 +291,16 @@ def _cut_by_others(
     radii = inner + fraction[:, None] * width
     rows = np.flatnonzero(~solved.all(axis=1))
 
-    def look(lane: Ints, radius: Floats) -> tuple[Floats, Floats]:
+    def places_at(lane: Ints, radius: Floats) -> tuple[Complexes, Places]:
         z = centre[owner[lane]] + radius * direction[owner[lane]]
-        values, turned = designs.field.sampled(z, {name: value[lane] for name, value in local.items()})
+        return z, {name: value[lane] for name, value in local.items()}
+
+    def look(lane: Ints, radius: Floats) -> tuple[Floats, Floats]:
+        values, turned = designs.field.sampled(*places_at(lane, radius))
         return without_solved(values[rows], lane), turned
 
     def margins_at(lane: Ints, radius: Floats) -> Floats:
-        z = centre[owner[lane]] + radius * direction[owner[lane]]
-        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
-        return without_solved(values[rows], lane)
+        return without_solved(designs.field.margins(*places_at(lane, radius))[rows], lane)
 
     def without_solved(values: Floats, lane: Ints) -> Floats:
         """Margins with those set to 1 whose roots bound the intervals already."""

@@ -57,12 +57,12 @@ class Held:
         """
         if self.compliance.shape[1] == 2 or not arm.any():
             return self
-        there, back = moved_to(arm), moved_to(-arm)
+        forth, back = moved_to(arm), moved_to(-arm)
         return replace(
             self,
             stiffness=back.swapaxes(1, 2) @ self.stiffness @ back,
-            compliance=there @ self.compliance @ there.swapaxes(1, 2),
-            free=(there @ self.free[:, :, None])[:, :, 0],
+            compliance=forth @ self.compliance @ forth.swapaxes(1, 2),
+            free=(forth @ self.free[:, :, None])[:, :, 0],
         )
 
 

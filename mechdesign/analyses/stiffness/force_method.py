@@ -105,12 +105,12 @@ class Loaded:
         """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
         twists, size = self.twists, self.stress.shape[2]
         scale = twists.scale
-        there, shift = moved_to(twists.arm) * scale[:, None], (self.shift * scale[:, None, :size]) @ self._loads
+        to_point, shift = moved_to(twists.arm) * scale[:, None], (self.shift * scale[:, None, :size]) @ self._loads
         twists_of_vertices = {}
         for vertex, path in twists.network.paths.items():
             signs = twists.network.signs(path) @ twists.within
             on = np.flatnonzero(signs.any(axis=0))
-            twists_of_vertices[vertex] = there @ ((signs[:, None, on] * twists.twist[:, :, on]) @ shift[:, on])
+            twists_of_vertices[vertex] = to_point @ ((signs[:, None, on] * twists.twist[:, :, on]) @ shift[:, on])
         return twists_of_vertices
 
     @property

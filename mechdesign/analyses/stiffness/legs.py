@@ -61,31 +61,31 @@ def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
 
 def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEdge]]:
     """Edges by the pieces into which the network falls without the ground and the asked body."""
-    left = list(edges)
-    while left:
-        piece, reached = [left.pop(0)], set[str]()
+    remaining = list(edges)
+    while remaining:
+        piece, reached = [remaining.pop(0)], set[str]()
         while True:
             reached |= {end for edge in piece for end in (edge.a, edge.b)} - {GROUND, asked}
-            touching = [edge for edge in left if edge.a in reached or edge.b in reached]
+            touching = [edge for edge in remaining if edge.a in reached or edge.b in reached]
             if not touching:
                 break
             piece += touching
-            left = [edge for edge in left if edge not in touching]
+            remaining = [edge for edge in remaining if edge not in touching]
         yield piece
 
 
 def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
     """Vertices from the ground to the asked body; None where they are no plain path. Sorts `piece` likewise."""
-    path, left = [GROUND], list(piece)
+    path, remaining = [GROUND], list(piece)
     piece.clear()
     while path[-1] != asked:
-        onward = [edge for edge in left if path[-1] in (edge.a, edge.b)]
+        onward = [edge for edge in remaining if path[-1] in (edge.a, edge.b)]
         if len(onward) != 1:
             return None
         piece += onward
-        left.remove(onward[0])
+        remaining.remove(onward[0])
         path.append(onward[0].b if onward[0].a == path[-1] else onward[0].a)
-    return None if left else path
+    return None if remaining else path
 
 
 def _elements(edges: Sequence[NetworkEdge], path: Sequence[str]) -> Iterator[Element]:

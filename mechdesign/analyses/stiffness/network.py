@@ -125,7 +125,7 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
             clamps.append((holder(link, at), ASKED, at))
     for a, b, point in clamps:
         builder.join(a, b, (), point, point)
-    pins = {point: _clusters(point, there, clamps) for point, there in holders.items()}
+    pins = {point: _clusters(point, bodies, clamps) for point, bodies in holders.items()}
     for point, clusters in pins.items():
         builder.hinges(point, clusters)
     for drive in description.drives.values():
@@ -246,10 +246,9 @@ class _Builder:
 
     def _drive_between(self, first: list[str], second: list[str]) -> str | None:
         """The drive of the angle between two clusters of bodies; None if there is none."""
-        one, two = (set(map(link_of, cluster)) for cluster in (first, second))
+        clusters = [set(map(link_of, cluster)) for cluster in (first, second)]
         for drive in self.mechanism.description.drives.values():
-            target, reference = drive.target, drive.reference
-            across = (target in one and reference in two) or (target in two and reference in one)
+            across = any(drive.target in a and drive.reference in b for a, b in (clusters, clusters[::-1]))
             if drive.kind == "angle" and across:
                 return drive.name
         return None
