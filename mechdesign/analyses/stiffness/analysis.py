@@ -76,7 +76,8 @@ class Body:
     size : int
         3 for a body's twist, 2 for the displacement of a pin.
     condensed : bool
-        Whether the pin is a point of a single link, which turns freely under forces at it.
+        Whether the pin is a point of one link, its only one or the one that ``at`` names: this link turns freely under
+        forces at the pin.
     extent : float
         Size of the mechanism.
     poses, rows : optional
