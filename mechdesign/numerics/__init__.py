@@ -1,1 +1,1 @@
-"""Mathematics that knows no mechanism: types of arrays, roots, minima."""
+"""Mathematics without mechanisms: array types, roots, minima, Chebyshev series, fronts, probabilities."""

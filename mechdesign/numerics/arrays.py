@@ -16,7 +16,7 @@ Flags = NDArray[np.bool_]
 
 
 def evenly(count: int, most: int) -> Ints:
-    """Indices of some of `count`, at most so many, spread evenly from the first to the last."""
+    """At most `most` indices below `count`, evenly spaced from the first to the last."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.intp))
 
 
@@ -25,10 +25,10 @@ class Lanes:
     """A record of arrays whose last axes are of the same length."""
 
     def take(self, index: Ints | Flags) -> Self:
-        """Some lanes of each."""
+        """The lanes at `index`, of every array."""
         return type(self)(*(values[..., index] for values in vars(self).values()))
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:
-        """All lanes of several, one after the other."""
-        return cls(*(np.concatenate(each, axis=-1) for each in zip(*(vars(p).values() for p in parts), strict=True)))
+        """The lanes of several records, one after the other."""
+        return cls(*(np.concatenate(group, axis=-1) for group in zip(*(vars(p).values() for p in parts), strict=True)))

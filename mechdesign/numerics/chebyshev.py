@@ -11,18 +11,20 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Nodes of an interval: the zeros of T_16, none of which is an end, where a function may be singular.
+# Number of nodes of an interval. They are the zeros of T_16, which omit both ends, where a function may be singular.
 COUNT = 16
 _ORDERS = np.arange(COUNT)
 _ANGLES = np.pi * (np.arange(COUNT)[::-1] + 0.5) / COUNT
 NODES = np.cos(_ANGLES)
 _TO_SERIES = np.cos(np.outer(_ANGLES, _ORDERS)) * np.where(_ORDERS == 0, 1.0, 2.0) / COUNT
-# Places at which series are looked at, both ends among them: near enough that each bend of a series shows.
+# Places, both ends included, at which series are evaluated: dense enough that no turning point falls between unseen.
 PLACES = -np.cos(np.linspace(0.0, np.pi, 3 * COUNT + 1))
 # Integrals of the polynomials through the nodes (Fejer's first rule), over [-1, 1].
 WEIGHTS = _TO_SERIES @ np.where(_ORDERS % 2 == 0, 2.0 / (1.0 - _ORDERS**2.0 + (_ORDERS == 1)), 0.0)
-# After a step of Newton's method so short (in [-1, 1]) a place is exact; halving takes so many at most.
-_LAST_STEP, _STEPS = 1e-8, 60
+# Length in [-1, 1] of a step of Newton's method after which a root is exact.
+_LAST_STEP = 1e-8
+# Largest number of steps: as many as halving an interval needs.
+_STEPS = 60
 
 
 def basis(x: Floats) -> Floats:
@@ -49,7 +51,7 @@ def _slope_basis(x: Floats) -> Floats:
 
 
 _AT_NODES, _AT_PLACES, _SLOPES_AT_PLACES = basis(NODES), basis(PLACES), _slope_basis(PLACES).T
-# From the coefficients of series to those of their slopes.
+# Takes the coefficients of series to those of their derivatives.
 _DERIVATIVE = _slope_basis(NODES).T @ _TO_SERIES
 
 
@@ -59,9 +61,9 @@ def series(values: Floats) -> Floats:
 
 
 def remainder(coefficients: Floats) -> Floats:
-    """What series leave of their functions, about, shape (...): the next coefficients, if these go on to decay.
+    """Estimated truncation error of series, shape (...): the next coefficients, extrapolated from their decay.
 
-    Of an even or odd function every other coefficient is zero, so that they count in pairs.
+    Coefficients are compared in pairs, as every other one of an even or odd function is zero.
     """
     before, last = (np.abs(coefficients[..., pair]).max(axis=-1) for pair in (slice(-4, -2), slice(-2, None)))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -79,7 +81,7 @@ def at_nodes(coefficients: Floats) -> Floats:
 
 
 def nearest_node(x: Floats) -> Ints:
-    """The node that is nearest to each place in [-1, 1] by its angle arccos x."""
+    """Index of the node nearest to each place x in [-1, 1], measured in arccos x."""
     node: Ints = (COUNT - 1 - np.floor(np.arccos(x) * (COUNT / np.pi))).astype(np.intp)
     return np.maximum(node, 0)
 
@@ -95,7 +97,7 @@ def value(coefficients: Floats, x: Floats) -> Floats:
 
 
 def total(coefficients: Floats, table: Floats) -> Floats:
-    """Values of series of shape (n, COUNT) at places with the `basis` given, shape (n,)."""
+    """Values of series of shape (n, COUNT) at places whose `basis` is `table`, shape (n,)."""
     return np.asarray(np.einsum("nk,kn->n", coefficients, table))
 
 
@@ -117,9 +119,9 @@ def turning_points(coefficients: Floats) -> tuple[Ints, Floats, Floats]:
     """Places at which series of shape (n, COUNT) turn back: which series, the place in [-1, 1], the value there."""
     slopes = slopes_at_places(coefficients)
     which, cell = np.nonzero((slopes[:, 1:] >= 0) != (slopes[:, :-1] >= 0))
-    some = coefficients[which]
-    x = _root(some @ _DERIVATIVE, PLACES[cell], slopes[which, cell], PLACES[cell + 1], slopes[which, cell + 1])
-    return which, x, value(some, x)
+    turning = coefficients[which]
+    x = _root(turning @ _DERIVATIVE, PLACES[cell], slopes[which, cell], PLACES[cell + 1], slopes[which, cell + 1])
+    return which, x, value(turning, x)
 
 
 def zeros(coefficients: Floats, turning: tuple[Ints, Floats, Floats]) -> tuple[Ints, Floats]:
@@ -131,17 +133,17 @@ def zeros(coefficients: Floats, turning: tuple[Ints, Floats, Floats]) -> tuple[I
     which, cell = np.nonzero((values[:, 1:] >= 0) != (values[:, :-1] >= 0))
     low, high = PLACES[cell], PLACES[cell + 1]
     at_low, at_high = values[which, cell], values[which, cell + 1]
-    # Between two places with values of one sign a series may turn back beyond zero.
+    # Between two places with values of one sign a series may cross zero and turn back.
     turned, place, extreme = turning
     beside = np.clip(np.searchsorted(PLACES, place) - 1, 0, len(PLACES) - 2)
-    one, two = values[turned, beside], values[turned, beside + 1]
-    hidden = ((one >= 0) == (two >= 0)) & ((one >= 0) != (extreme >= 0))
+    below, above = values[turned, beside], values[turned, beside + 1]
+    hidden = ((below >= 0) == (above >= 0)) & ((below >= 0) != (extreme >= 0))
     turned, place, extreme, beside = turned[hidden], place[hidden], extreme[hidden], beside[hidden]
     which = np.concatenate([which, turned, turned])
     low = np.concatenate([low, PLACES[beside], place])
     high = np.concatenate([high, place, PLACES[beside + 1]])
-    at_low = np.concatenate([at_low, one[hidden], extreme])
-    at_high = np.concatenate([at_high, extreme, two[hidden]])
+    at_low = np.concatenate([at_low, below[hidden], extreme])
+    at_high = np.concatenate([at_high, extreme, above[hidden]])
     x = _root(coefficients[which], low, at_low, high, at_high)
     order = np.lexsort((x, which))
     return which[order], x[order]
@@ -151,17 +153,17 @@ def _root(coefficients: Floats, low: Floats, at_low: Floats, high: Floats, at_hi
     """Zeros of series between places with values of opposite signs."""
     slopes = coefficients @ _DERIVATIVE
 
-    def both(x: Floats) -> tuple[Floats, Floats]:
+    def value_and_slope(x: Floats) -> tuple[Floats, Floats]:
         table = basis(x)
         return total(coefficients, table), total(slopes, table)
 
-    return root(both, low, at_low, high, at_high)
+    return root(value_and_slope, low, at_low, high, at_high)
 
 
 def root(
     function: Callable[[Floats], tuple[Floats, Floats]], low: Floats, at_low: Floats, high: Floats, at_high: Floats
 ) -> Floats:
-    """Zeros of functions between places in [-1, 1] with values of opposite signs: Newton's method kept between them.
+    """Zeros of functions between places in [-1, 1] with values of opposite signs, by Newton's method kept in between.
 
     `function` gives all values and slopes at places of shape (n,).
     """
@@ -170,23 +172,23 @@ def root(
         x = low - at_low * (high - low) / (at_high - at_low)
         x = np.where((x >= low) & (x <= high), x, (low + high) / 2)
         for _ in range(_STEPS):
-            now, slopes = function(x)
-            same = (now >= 0) == (at_low >= 0)
-            low, high = np.where(same, x, low), np.where(same, high, x)
-            step = x - now / slopes
+            values, slopes = function(x)
+            on_low_side = (values >= 0) == (at_low >= 0)
+            low, high = np.where(on_low_side, x, low), np.where(on_low_side, high, x)
+            step = x - values / slopes
             step = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-            moved, x = np.abs(step - x), step
-            if not (moved > _LAST_STEP).any():
+            change, x = np.abs(step - x), step
+            if not (change > _LAST_STEP).any():
                 break
     return x
 
 
 def slope_series(coefficients: Floats) -> Floats:
-    """Series of the slopes of series, shape (..., COUNT)."""
+    """Coefficients of the derivatives of series, shape (..., COUNT)."""
     return np.asarray(coefficients @ _DERIVATIVE)
 
 
 def filled(values: Floats, good: Flags) -> Floats:
-    """Values at the nodes, shape (nodes,), those that are not good by the polynomial through the others."""
+    """Values at the nodes, shape (nodes,), those that are not `good` replaced by the polynomial through the others."""
     table = np.polynomial.chebyshev.chebvander(NODES, np.count_nonzero(good) - 1)
     return np.where(good, values, table @ np.linalg.solve(table[good], values[good]))

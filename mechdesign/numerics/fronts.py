@@ -1,4 +1,4 @@
-"""Pareto fronts of many points: those that no other surpasses."""
+"""Pareto fronts: the points among many that no other dominates."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# So few points, or pairs of points, are compared one with another.
+# Largest number of points, and of pairs of points, that are compared directly.
 _FEW_POINTS, _FEW_PAIRS = 64, 4096
 
 
 def front(values: Floats) -> Flags:
-    """Which rows of values, shape (points, goals), are on the front, less being better; of equals all or none.
+    """Which rows of values, shape (points, goals), are on the front; smaller values are better.
 
-    A row is on it where no other is as small in every goal and smaller in one. Of two goals by sorting, of more by
-    dividing the points, in ``n log(n)^(goals - 2)`` steps [Kung, Luccio & Preparata, On finding the maxima of a set of
-    vectors, 1975].
+    A row is on the front if no other row is at most as large in every goal and smaller in one; of equal rows
+    all are on it or none. Two goals are sorted; with more the points are divided, in ``n log(n)^(goals - 2)`` steps
+    [Kung, Luccio & Preparata, On finding the maxima of a set of vectors, 1975].
     """
     order = np.lexsort(values.T[::-1])
     ranked = values[order]
     first = np.concatenate([[True], (ranked[1:] != ranked[:-1]).any(axis=1)])[: len(order)]
     unique = ranked[first]
-    on_front = np.zeros(len(unique), dtype=bool)
-    on_front[_front(unique, np.arange(len(unique)))] = True
-    found = np.empty(len(order), dtype=bool)
-    found[order] = on_front[np.cumsum(first) - 1]
-    return found
+    unique_on_front = np.zeros(len(unique), dtype=bool)
+    unique_on_front[_front(unique, np.arange(len(unique)))] = True
+    on_front = np.empty(len(order), dtype=bool)
+    on_front[order] = unique_on_front[np.cumsum(first) - 1]
+    return on_front
 
 
 def _front(values: Floats, rows: Ints) -> Ints:
-    """Which of some rows are on their front; rows differ, and are sorted by the first goal, then by the next."""
+    """The rows that are on their own front; they differ, and are sorted by the first goal, then the next, and so on."""
     if values.shape[1] == 1:
         return rows[:1]
     if values.shape[1] == 2:
@@ -37,24 +37,24 @@ def _front(values: Floats, rows: Ints) -> Ints:
         before = np.concatenate([[np.inf], np.minimum.accumulate(last)])[: len(last)]
         return np.asarray(rows[(last < before) | (np.arange(len(rows)) == 0)])
     if len(rows) <= _FEW_POINTS:
-        # Of two rows that differ the later one never surpasses the earlier.
+        # As rows are sorted, a later one never dominates an earlier one.
         worse = (values[rows][:, None] <= values[rows]).all(axis=2)
         return np.asarray(rows[~np.triu(worse, 1).any(axis=0)])
     half = len(rows) // 2
     low, high = _front(values, rows[:half]), _front(values, rows[half:])
-    return np.concatenate([low, high[~_surpassed(values, low, high, values.shape[1] - 1)]])
+    return np.concatenate([low, high[~_dominated(values, low, high, values.shape[1] - 1)]])
 
 
-def _surpassed(values: Floats, by: Ints, rows: Ints, goal: int) -> Flags:
-    """Which rows are nowhere smaller than one of the others, from the second goal to a last one.
+def _dominated(values: Floats, by: Ints, rows: Ints, goal: int) -> Flags:
+    """Which of `rows` are dominated: in no goal from the second to `goal` smaller than some row of `by`.
 
     Parameters
     ----------
     values : ndarray, shape (points, goals)
     by, rows : ndarray of int
-        Points of which those in `by` are as small or smaller in all goals that are left out.
+        Points; in the goals that are not compared those of `by` are at most as large as those of `rows`.
     goal : int
-        The last of the goals that are compared.
+        Index of the last goal that is compared.
     """
     if not len(by) or not len(rows):
         return np.zeros(len(rows), dtype=bool)
@@ -67,19 +67,19 @@ def _surpassed(values: Floats, by: Ints, rows: Ints, goal: int) -> Flags:
         least = np.concatenate([[np.inf], np.minimum.accumulate(values[order, 2])])
         place = np.searchsorted(values[order, 1], values[rows, 1], side="right")
         return np.asarray((place > 0) & (least[place] <= values[rows, 2]))
-    others, own = values[by, goal], values[rows, goal]
-    if others.max() <= own.min():
-        return _surpassed(values, by, rows, goal - 1)
-    if others.min() > own.max():
+    by_values, row_values = values[by, goal], values[rows, goal]
+    if by_values.max() <= row_values.min():
+        return _dominated(values, by, rows, goal - 1)
+    if by_values.min() > row_values.max():
         return np.zeros(len(rows), dtype=bool)
-    # Divided so that both parts are smaller: some number lies above the limit, or all would be equal.
-    both = np.sort(np.concatenate([others, own]))
-    limit = both[(len(both) - 1) // 2]
-    limit = limit if limit < both[-1] else both[np.searchsorted(both, limit) - 1]
-    found = np.zeros(len(rows), dtype=bool)
-    low, high = own <= limit, own > limit
-    found[low] = _surpassed(values, by[others <= limit], rows[low], goal)
-    found[high] = _surpassed(values, by[others > limit], rows[high], goal)
-    left = np.flatnonzero(high)[~found[high]]
-    found[left] = _surpassed(values, by[others <= limit], rows[left], goal - 1)
-    return found
+    # The limit is below the largest number, so that both parts are smaller than the whole.
+    all_values = np.sort(np.concatenate([by_values, row_values]))
+    limit = all_values[(len(all_values) - 1) // 2]
+    limit = limit if limit < all_values[-1] else all_values[np.searchsorted(all_values, limit) - 1]
+    dominated = np.zeros(len(rows), dtype=bool)
+    low, high = row_values <= limit, row_values > limit
+    dominated[low] = _dominated(values, by[by_values <= limit], rows[low], goal)
+    dominated[high] = _dominated(values, by[by_values > limit], rows[high], goal)
+    open_rows = np.flatnonzero(high)[~dominated[high]]
+    dominated[open_rows] = _dominated(values, by[by_values <= limit], rows[open_rows], goal - 1)
+    return dominated

@@ -9,11 +9,15 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Floats
 
+# Largest number of steps.
 MOST_STEPS = 30
-# Part of the way to the nearest bound that a step takes.
+# Length of a step as a fraction of the way to the nearest bound.
 INSIDE = 0.995
-# Slack times multiplier, and what the equations miss, where a program is solved.
-COMPLEMENTARITY, RESIDUAL = 1e-9, 1e-9
+# Largest product of a slack and its multiplier where a program counts as solved.
+COMPLEMENTARITY = 1e-9
+# Largest residual of the equations there.
+RESIDUAL = 1e-9
+# Added to the diagonal of Newton's matrix, so that it is regular.
 REGULAR = 1e-13
 
 
@@ -21,8 +25,8 @@ REGULAR = 1e-13
 def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floats) -> tuple[Floats, Floats]:
     """Points where ``z bent z / 2 + slope z`` is least under ``rows z <= bounds``, and the multipliers of the rows.
 
-    Mehrotra's predictor and corrector [Nocedal & Wright, Numerical Optimization, 2006, alg. 16.4]. Numbers that matter
-    are to be about 1.
+    Mehrotra's predictor and corrector [Nocedal & Wright, Numerical Optimization, 2006, alg. 16.4]. Variables and rows
+    should be scaled to about 1.
 
     Parameters
     ----------
@@ -36,7 +40,8 @@ def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floa
     -------
     ndarray, shape (lanes, n)
     ndarray, shape (lanes, m)
-        Where a program has no end, or no point keeps its rows, the last point that was come to.
+        Points and multipliers. Those of a program that is unbounded, or whose rows no point satisfies, are the last
+        that were reached.
     """
     z = begin.copy()
     slack = np.maximum(bounds - _times(rows, z), 1.0)
@@ -45,29 +50,29 @@ def solve(bent: Floats, slope: Floats, rows: Floats, bounds: Floats, begin: Floa
         dual = _times(bent, z) + slope + _times(np.swapaxes(rows, 1, 2), multipliers)
         primal = _times(rows, z) + slack - bounds
         gap = slack * multipliers
-        missed = np.maximum(np.abs(dual).max(axis=1), np.abs(primal).max(axis=1))
-        open_ = (gap.max(axis=1) > COMPLEMENTARITY) | (missed > RESIDUAL)
+        residual = np.maximum(np.abs(dual).max(axis=1), np.abs(primal).max(axis=1))
+        open_ = (gap.max(axis=1) > COMPLEMENTARITY) | (residual > RESIDUAL)
         if not open_.any():
             break
         newton = _Newton(bent, rows, dual, primal, slack, multipliers)
         try:
             _, change, rise = newton.step(gap)
             mean = gap.mean(axis=1)
-            after = (slack + _most(slack, change) * change) * (multipliers + _most(multipliers, rise) * rise)
-            centre = (np.maximum(after.mean(axis=1), 0.0) / mean) ** 3 * mean
-            ways = newton.step(gap + change * rise - centre[:, None])
+            predicted = (slack + _longest(slack, change) * change) * (multipliers + _longest(multipliers, rise) * rise)
+            centre = (np.maximum(predicted.mean(axis=1), 0.0) / mean) ** 3 * mean
+            steps = newton.step(gap + change * rise - centre[:, None])
         except np.linalg.LinAlgError:
             break
-        open_ &= np.all([np.isfinite(way).all(axis=1) for way in ways], axis=0)
-        way, change, rise = (np.where(open_[:, None], way, 0.0) for way in ways)
-        length = INSIDE * np.minimum(_most(slack, change), _most(multipliers, rise))
-        z, slack, multipliers = z + length * way, slack + length * change, multipliers + length * rise
+        open_ &= np.all([np.isfinite(move).all(axis=1) for move in steps], axis=0)
+        move, change, rise = (np.where(open_[:, None], move, 0.0) for move in steps)
+        length = INSIDE * np.minimum(_longest(slack, change), _longest(multipliers, rise))
+        z, slack, multipliers = z + length * move, slack + length * change, multipliers + length * rise
     return z, multipliers
 
 
 @dataclass(frozen=True)
 class _Newton:
-    """Newton's method on the conditions of an optimum; what they miss is of `solve`'s shapes."""
+    """Newton's method on the conditions of an optimum; the residuals `dual` and `primal` have the shapes of `solve`."""
 
     bent: Floats
     rows: Floats
@@ -85,20 +90,20 @@ class _Newton:
         weights = (self.multipliers / self.slack)[:, :, None]
         return np.asarray(self.bent + self._across @ (weights * self.rows) + REGULAR * np.eye(self.rows.shape[2]))
 
-    def step(self, wanted: Floats) -> tuple[Floats, Floats, Floats]:
-        """Changes of the point, the slacks and the multipliers by which their products fall by what is wanted."""
-        right = -self.dual - _times(self._across, (self.multipliers * self.primal - wanted) / self.slack)
-        way = np.asarray(np.linalg.solve(self._matrix, right[:, :, None])[:, :, 0])
-        change = -self.primal - _times(self.rows, way)
-        return way, change, (-wanted - self.multipliers * change) / self.slack
+    def step(self, reduction: Floats) -> tuple[Floats, Floats, Floats]:
+        """Changes of the point, slacks and multipliers that lower the slacks times multipliers by `reduction`."""
+        right = -self.dual - _times(self._across, (self.multipliers * self.primal - reduction) / self.slack)
+        move = np.asarray(np.linalg.solve(self._matrix, right[:, :, None])[:, :, 0])
+        change = -self.primal - _times(self.rows, move)
+        return move, change, (-reduction - self.multipliers * change) / self.slack
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:
     return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])
 
 
-def _most(values: Floats, changes: Floats) -> Floats:
-    """The longest part of the way, at most all of it, that leaves values positive; shape (lanes, 1)."""
+def _longest(values: Floats, changes: Floats) -> Floats:
+    """The largest fraction, at most 1, of `changes` that leaves values positive; shape (lanes, 1)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = np.where(changes < 0, -values / changes, np.inf)
     return np.asarray(np.minimum(parts.min(axis=1, keepdims=True), 1.0))

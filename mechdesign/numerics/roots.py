@@ -11,17 +11,20 @@ from mechdesign.numerics.arrays import Floats, Ints
 
 # Values of the functions `which` (indices of brackets) at `x`.
 Evaluate = Callable[[Ints, Floats], Floats]
+# Largest number of steps to a root.
 MAX_ROOT_STEPS = 80
-# Shares of the way to where a function seems to end that are left: less where the points it is judged by are near.
+# Where a function becomes nan, a step towards the zero of a secant stops short of it, by a fraction of the way between
+# these two: the shorter the way compared with the secant, the smaller the fraction.
 SHORT = (1e-3, 0.1)
+# The golden section of an interval.
 GOLDEN = (math.sqrt(5) - 1) / 2
-# Golden sections that leave 1e-10 of a bracket: a value is exact then, as it is flat where it is smallest.
+# Golden sections that shrink a bracket to 1e-10: the value is exact then, as a function is flat at its minimum.
 GOLDEN_SECTIONS = 50
-# Successive parabolas at most.
+# Largest number of successive parabolas.
 MAX_PARABOLAS = 24
-# Part of a place, or of its bracket, to which the lowest place is found.
+# Accuracy of a minimum's place, as a fraction of the place or of its bracket.
 LOWEST_ACCURACY = 1e-9
-# How many times as far as a convex function one may fall.
+# A function may fall this many times as far as its convexity would allow.
 STEEP = 2.0
 
 
@@ -32,18 +35,26 @@ def bracketed_roots(
 
     The parabola through the ends and a third point has exactly one root between ends of opposite sign, so a step never
     leaves the bracket, and one step solves a quadratic function. nan counts as negative (the function ends there);
-    a bracket that shrinks too slowly, or has nan at an end, is halved. The third point `c` may lie anywhere (or be
-    nan); `tolerance` is the wanted accuracy of each root, if its digits hold it.
+    a bracket that shrinks too slowly, or has nan at an end, is halved.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Values of the functions of some brackets (indices) at places of the same shape.
+    a, b, c, fa, fb, fc : ndarray, shape (n,)
+        Both ends of each bracket and a third point, which may lie anywhere or be nan, and the values there.
+    tolerance : ndarray, shape (n,)
+        Accuracy of each root, as far as floating-point numbers allow.
     """
     a, b, c, fa, fb, fc = (np.array(v, dtype=float) for v in (a, b, c, fa, fb, fc))
     root = np.where(fa == 0, a, np.where(fb == 0, b, 0.5 * (a + b)))
     tolerance = np.maximum(tolerance, 2 * np.spacing(np.maximum(np.abs(a), np.abs(b))))
-    left = np.nonzero((fa != 0) & (fb != 0))[0]
+    active = np.nonzero((fa != 0) & (fb != 0))[0]
     before = np.abs(b - a)
     for step in range(MAX_ROOT_STEPS):
-        if not left.size:
+        if not active.size:
             break
-        al, bl, cl, fal, fbl, fcl = a[left], b[left], c[left], fa[left], fb[left], fc[left]
+        al, bl, cl, fal, fbl, fcl = a[active], b[active], c[active], fa[active], fb[active], fc[active]
         width = bl - al
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             slope = (fbl - fal) / width
@@ -52,42 +63,42 @@ def bracketed_roots(
             # Parabola about a: fal + linear x + bend x^2, solved without cancellation.
             linear = slope - bend * width
             square = np.sqrt(np.maximum(linear * linear - 4 * bend * fal, 0.0))
-            far = -0.5 * (linear + np.copysign(square, linear))
-            one, two = fal / far, far / bend
-            x = al + np.where((one / width >= 0) & (one / width <= 1), one, two)
-            # Where the function ends at one side of the bracket: the line through the other two points, and not quite
-            # as far, so that it is approached from where the function is known.
-            last, f_last = np.where(np.isnan(fal), bl, al), np.where(np.isnan(fal), fbl, fal)
-            secant = (fcl - f_last) / (cl - last)
+            half = -0.5 * (linear + np.copysign(square, linear))
+            first_root, second_root = fal / half, half / bend
+            x = al + np.where((first_root / width >= 0) & (first_root / width <= 1), first_root, second_root)
+            # Where the function is nan at one end: the secant through the other two points, and not quite to its zero,
+            # so that the root is approached from the side where the function has values.
+            finite_end, f_finite = np.where(np.isnan(fal), bl, al), np.where(np.isnan(fal), fbl, fal)
+            secant = (fcl - f_finite) / (cl - finite_end)
             ended = (np.isnan(fal) | np.isnan(fbl)) & np.isfinite(secant)
-            way = f_last / secant
-            short = np.clip(SHORT[1] * np.abs(way / (cl - last)), *SHORT)
-            x = np.where(ended, last - (1 - short) * way, x)
+            to_zero = f_finite / secant
+            short = np.clip(SHORT[1] * np.abs(to_zero / (cl - finite_end)), *SHORT)
+            x = np.where(ended, finite_end - (1 - short) * to_zero, x)
             square = np.where(ended, np.abs(secant), square)
         halve = ~((x - al) * (x - bl) <= 0) | (ended & ((x == al) | (x == bl)))
         if step % 3 == 2:
-            halve |= np.abs(width) > 0.5 * before[left]
-            before[left] = np.abs(width)
+            halve |= np.abs(width) > 0.5 * before[active]
+            before[active] = np.abs(width)
         x = np.where(halve, al + 0.5 * width, x)
-        fx = evaluate(left, x)
+        fx = evaluate(active, x)
         with np.errstate(invalid="ignore", divide="ignore"):
-            near = np.abs(fx) <= tolerance[left] * np.where(halve, np.abs(slope), square)
-        root[left] = x
+            near = np.abs(fx) <= tolerance[active] * np.where(halve, np.abs(slope), square)
+        root[active] = x
         lower = (fx > 0) == (fal > 0)
-        known = ~np.isnan(fx)
-        c[left] = np.where(known, np.where(lower, al, bl), cl)
-        fc[left] = np.where(known, np.where(lower, fal, fbl), fcl)
-        a[left], fa[left] = np.where(lower, x, al), np.where(lower, fx, fal)
-        b[left], fb[left] = np.where(lower, bl, x), np.where(lower, fbl, fx)
-        done = (fx == 0) | near | (np.abs(b[left] - a[left]) <= tolerance[left])
-        left = left[~done]
+        defined = ~np.isnan(fx)
+        c[active] = np.where(defined, np.where(lower, al, bl), cl)
+        fc[active] = np.where(defined, np.where(lower, fal, fbl), fcl)
+        a[active], fa[active] = np.where(lower, x, al), np.where(lower, fx, fal)
+        b[active], fb[active] = np.where(lower, bl, x), np.where(lower, fbl, fx)
+        done = (fx == 0) | near | (np.abs(b[active] - a[active]) <= tolerance[active])
+        active = active[~done]
     return root
 
 
 def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """Places and smallest values, shape (n,), between `low` and `high`, where each function falls and then rises.
+    """Places and values, shape (n,), of the minima between `low` and `high` of functions that fall and then rise.
 
-    `function` gives the values of all of them at places of shape (n,), never nan.
+    `function` gives the values of all functions at places of shape (n,), never nan.
     """
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_left, at_right = function(left), function(right)
@@ -107,35 +118,40 @@ def lowest(function: Callable[[Floats], Floats], low: Floats, high: Floats) -> t
 def dips(
     function: Callable[[Ints, Floats], Floats], x: Floats, values: Floats, enough: Floats, steps: int = MAX_PARABOLAS
 ) -> tuple[Floats, Floats]:
-    """Lowest places of many functions by successive parabolas, and their values; only so low as is `enough`.
+    """Places and values, shape (n,), of minima of many functions, by successive parabolas.
 
-    A function is left alone when it could not fall so far even as steeply as `STEEP` times what convexity allows.
-    ``function(which, x)`` gives the values of some functions (indices) at places of the same shape. `x` and `values`,
-    shape (3, n), are ascending places of which the middle one is lowest, and the values there, infinite where unknown;
-    `enough`, shape (n,), is minus infinity where the lowest place is wanted.
+    Parameters
+    ----------
+    function : callable
+        Values of some functions (indices) at places of the same shape.
+    x, values : ndarray, shape (3, n)
+        Ascending places of which the middle one is lowest, and the values there, infinite where unknown.
+    enough : ndarray, shape (n,)
+        A function is not lowered further once its value is below this, nor if it could not come so low even by falling
+        `STEEP` times as far as convexity allows. Minus infinity asks for the minimum itself.
     """
-    x, values, left = x.copy(), values.copy(), np.arange(x.shape[1])
+    x, values, active = x.copy(), values.copy(), np.arange(x.shape[1])
     for _ in range(steps):
-        (a, b, c), (fa, fb, fc) = x[:, left], values[:, left]
+        (a, b, c), (fa, fb, fc) = x[:, active], values[:, active]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
-            # From the lowest place a convex function falls no farther than the line from either end through it.
-            hopeless = fb - enough[left] > STEEP * np.maximum(fall * (c - b), rise * (b - a))
-            hopeless &= np.isfinite(enough[left])
+            # A convex function stays above both lines from an end of the bracket through the middle place.
+            too_high = fb - enough[active] > STEEP * np.maximum(fall * (c - b), rise * (b - a))
+            too_high &= np.isfinite(enough[active])
             vertex = b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)
-        met = np.abs(vertex - b) <= LOWEST_ACCURACY * np.maximum(np.abs(c), c - a)
-        keep = ~(hopeless | met | (fb < enough[left]))
-        left, a, b, c, fa, fb, fc, vertex = (v[keep] for v in (left, a, b, c, fa, fb, fc, vertex))
-        if not left.size:
+        converged = np.abs(vertex - b) <= LOWEST_ACCURACY * np.maximum(np.abs(c), c - a)
+        keep = ~(too_high | converged | (fb < enough[active]))
+        active, a, b, c, fa, fb, fc, vertex = (v[keep] for v in (active, a, b, c, fa, fb, fc, vertex))
+        if not active.size:
             break
         golden = np.where(c - b > b - a, b + (1 - GOLDEN) * (c - b), b - (1 - GOLDEN) * (b - a))
         trial = np.where((vertex > a) & (vertex < c), vertex, golden)
-        found = function(left, trial)
-        lower, above = found < fb, trial > b
+        trial_value = function(active, trial)
+        lower, above = trial_value < fb, trial > b
         # The lower of the two is the new middle, and the other an end.
-        x[1, left], values[1, left] = np.where(lower, trial, b), np.where(lower, found, fb)
-        other, f_other = np.where(lower, b, trial), np.where(lower, fb, found)
+        x[1, active], values[1, active] = np.where(lower, trial, b), np.where(lower, trial_value, fb)
+        other, f_other = np.where(lower, b, trial), np.where(lower, fb, trial_value)
         begins = lower == above
-        x[0, left], values[0, left] = np.where(begins, other, a), np.where(begins, f_other, fa)
-        x[2, left], values[2, left] = np.where(begins, c, other), np.where(begins, fc, f_other)
+        x[0, active], values[0, active] = np.where(begins, other, a), np.where(begins, f_other, fa)
+        x[2, active], values[2, active] = np.where(begins, c, other), np.where(begins, fc, f_other)
     return x[1], values[1]

@@ -1,4 +1,4 @@
-"""Curves on which a function of a grid is zero, and curves whose ends meet put together."""
+"""Curves on which a function sampled on a grid is zero, and curves joined where their ends meet."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
-# Accuracy of roots, as a part of the spacing of the grid's lines.
+# Accuracy of roots, as a fraction of the grid's spacing.
 ACCURACY = 1e-13
-# A point this near to a node, as a part of the spacing, is on it.
+# Distance within which a point is on a node, as a fraction of the spacing.
 NODE = 1e-9
-# A sign change where the function stays larger than this part of its values beside it is a jump, and no root.
+# A sign change is a jump, not a root, if the function there is larger than this fraction of its values at the nodes.
 JUMP = 1e-6
-# Ends of curves belong together when nearer to each other than this many of their last steps.
+# Largest distance of ends that meet, as a multiple of the last steps of their curves.
 LAST_STEPS = 1.5
 
 
 def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) -> list[Floats]:
-    """Curves on which a function changes its sign, on the lines of a grid.
+    """Points where a function changes its sign on the lines of a grid, in order along curves.
 
-    A curve that is touched but not crossed, and one that lies within a cell of the grid, are not found.
+    Curves at which the function touches zero without changing its sign are missed, and those within a cell of the grid.
 
     Parameters
     ----------
     values : ndarray, shape (m, n)
-        The function at the grid's nodes; nan where it has none.
+        The function at the grid's nodes; nan where it has no value.
     function : callable
         The function at fractional rows and columns of the grid.
 
@@ -38,8 +38,8 @@ def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) ->
     """
     from contourpy import contour_generator
 
-    found = contour_generator(z=np.ma.masked_invalid(values), corner_mask=False).lines(0.0)
-    lines = [np.asarray(line, dtype=float) for line in found]
+    contours = contour_generator(z=np.ma.masked_invalid(values), corner_mask=False).lines(0.0)
+    lines = [np.asarray(line, dtype=float) for line in contours]
     if not lines:
         return []
     # Each point lies on a line of the grid, between two nodes or on one.
@@ -64,9 +64,9 @@ def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) ->
 
 
 def joined(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
-    """Curves with those whose ends meet put together, the nearest first; one whose own ends meet is closed.
+    """Curves joined where their ends meet, the nearest ends first; a curve whose own ends meet is closed.
 
-    Ends nearer than `exact` meet whatever the spacing of the points.
+    Ends nearer than `exact` meet however densely the points are spaced.
     """
     curves = [curve for curve in curves if len(curve) > 1]
     if not curves:
@@ -76,29 +76,29 @@ def joined(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
     steps = np.abs([curve[[0, -1]] - curve[[1, -2]] for curve in curves]).ravel()
     gaps = np.abs(ends[:, None] - ends)
     reach = np.maximum(exact, LAST_STEPS * np.maximum(steps[:, None], steps))
-    own = np.arange(len(ends))
-    reach[own, own ^ 1] = exact
-    one, other = np.nonzero((gaps <= reach) & (own[:, None] < own))
+    numbers = np.arange(len(ends))
+    reach[numbers, numbers ^ 1] = exact
+    first, second = np.nonzero((gaps <= reach) & (numbers[:, None] < numbers))
     partner: dict[int, int] = {}
-    for k in np.argsort(gaps[one, other], kind="stable").tolist():
-        a, b = int(one[k]), int(other[k])
+    for k in np.argsort(gaps[first, second], kind="stable").tolist():
+        a, b = int(first[k]), int(second[k])
         if a not in partner and b not in partner:
             partner[a], partner[b] = b, a
-    left = set(range(len(curves)))
-    found = []
-    for start in [end for end in own.tolist() if end not in partner] + own.tolist():
-        if start // 2 not in left:
+    unused = set(range(len(curves)))
+    chains = []
+    for start in [free_end for free_end in numbers.tolist() if free_end not in partner] + numbers.tolist():
+        if start // 2 not in unused:
             continue
         parts: list[Complexes] = []
-        at: int | None = start
-        while at is not None and at // 2 in left:
-            left.discard(at // 2)
-            curve = curves[at // 2] if at % 2 == 0 else curves[at // 2][::-1]
+        end: int | None = start
+        while end is not None and end // 2 in unused:
+            unused.discard(end // 2)
+            curve = curves[end // 2] if end % 2 == 0 else curves[end // 2][::-1]
             meets = bool(parts) and abs(parts[-1][-1] - curve[0]) <= exact
             parts.append(curve[1:] if meets else curve)
-            at = partner.get(at ^ 1)
-        whole = np.concatenate(parts)
-        if at == start:
-            whole = np.append(whole[:-1] if abs(whole[-1] - whole[0]) <= exact else whole, whole[0])
-        found.append(whole)
-    return found
+            end = partner.get(end ^ 1)
+        chain = np.concatenate(parts)
+        if end == start:
+            chain = np.append(chain[:-1] if abs(chain[-1] - chain[0]) <= exact else chain, chain[0])
+        chains.append(chain)
+    return chains

@@ -1,1 +1,1 @@
-"""Where a point can be: its region of the plane, by rays about a centre. Knows none of the questions."""
+"""The region of the plane that a point can reach, by rays about a centre. Imports none of the questions."""

@@ -1,10 +1,10 @@
-"""Angles of a scan at which the margins change that bound the intervals of a ray.
+"""Breaks: angles of a scan at which the margins that bound the intervals of a ray change.
 
-There two ends of a ray's intervals meet: either one margin takes the place of another along the boundary, or an
-interval, or a gap between two, closes. The first happens where two margins are zero at one point (a corner); the other
-there too, or where a margin and its slope along the ray are zero (the ray touches the boundary). Both are one equation
-in the angle, followed along a curve r(theta): the other margin where the one is zero, or the margin where it is
-extreme. No ray needs to be traced for it.
+At a break two ends of a ray's intervals meet: either one margin replaces another along the boundary, or an interval, or
+the gap between two, closes. A margin replaces another at a corner, where both are zero. An interval or a gap closes at
+a corner as well, or where the ray touches the boundary: there a margin and its slope along the ray are zero. Each break
+is a root of one equation in the angle along a curve r(theta): of the second margin where the first is zero, or of the
+margin where it is extreme along the ray. Solving it traces no rays.
 """
 
 from __future__ import annotations
@@ -21,37 +21,45 @@ from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
-# Panel ends nearer to each other than this are one (radians): what lies between them is lost in rounding.
+# Panel ends nearer to each other than this angle (radians) are one: rounding hides what lies between them.
 TOGETHER = 1e-7
-# A break is looked at from either side, this part of its cell away, or so far (radians) that boundaries that touch
-# there have different names: if the signature there is not that of the cell's end, there is another break between.
+# Each break is confirmed by a ray on either side of it, as far away as this fraction of the distance between the two
+# rays that enclose the break. A ray beside it that differs from the enclosing ray on its side shows one more break.
 BESIDE = 1e-3
+# The least distance of these rays (radians): boundaries that touch at the break have different names there.
 APART = 1.5e-4
-# In a cell so small (as a part of it) nothing is looked at from farther away.
+# Their largest distance, as a fraction of the distance between the enclosing rays.
 WITHIN = 0.1
-# Rays of one design that may be traced; what is still not resolved by as many is rounding.
+# Largest number of rays traced for one design; differences that remain then are rounding.
 BUDGET = 10_000
-# A ray is also looked at from so near (radians), as it may be the break itself.
+# Distance (radians) at which an enclosing ray is compared with a ray beside it, as it may be the break itself.
 AT_END = 1e-9
-# Residual ratio below which the break lies on one of the two rays.
+# Ratio of the residuals on the two enclosing rays below which the break is the ray with the smaller one.
 ZERO = 1e-11
-# Sampling distances from a curve on which a margin is zero, step by step (parts of the reach).
+# Sampling distances, step by step, from a curve on which a margin is zero (fractions of the reach).
 TO_ZERO = (3e-3, 1e-8, 1e-5, 1e-8)
-# Sampling distances from a touching place (parts of the width of what closes there, and of the reach at least).
+# Sampling distances, step by step, from a touching point (fractions of the width of the interval or gap that closes).
 TO_EXTREME = (0.25, 0.01, 0.05, 0.01)
+# The least sampling distance from a touching point (fraction of the reach).
 LEAST = 1e-5
-# A step this small (as a part of the sampling distance) needs no further ones.
+# Steps shorter than this fraction of the sampling distance are the last.
 SETTLED = 1e-3
-# Longest step along the ray (part of the reach).
+# Longest step along the ray (fraction of the reach).
 FARTHEST = 0.5
-# Samples beside a curve: equally spaced in the square root of the distance, in which margins that end there are smooth.
+# Samples beside a curve (sampling distances): equally spaced in the square root of the distance, in which margins that
+# end on the curve are smooth.
 ROOTS = np.array([1.0, 4.0, 9.0])
+# Samples about a touching point (sampling distances).
 AROUND = np.array([-1.0, 0.0, 1.0])
 
-# Ends that may meet between a pair of neighbouring rays: the margin `curve` whose zeros are followed, and the `other`
-# one that is zero there too (the same where the ray touches; -1 at the centre of the rays); the direction along the ray
-# in which the followed margin is positive (of a touching ray +1 where an interval closes, -1 where a gap does); the
-# radius near which the curve is on either ray; the width of what closes.
+# Two ends of intervals that may meet between a pair of neighbouring rays:
+# `pair`: number of the pair of rays;
+# `curve`: margin whose zeros are followed;
+# `other`: margin that is zero at the break too (`curve` itself where the ray touches; -1 at the centre of the rays);
+# `side`: direction along the ray in which `curve` is positive (where the ray touches +1 if an interval closes, -1 if a
+# gap does);
+# `low`, `high`: radius of the curve, about, on the first ray and on the second;
+# `span`: width of the interval or gap that closes.
 MEETING = np.dtype([
     ("pair", np.intp), ("curve", np.intp), ("other", np.intp), ("side", np.intp),
     ("low", float), ("high", float), ("span", float),
@@ -60,12 +68,12 @@ Meetings = NDArray[Any]
 
 
 def signatures(intervals: Intervals, margins: int) -> Ints:
-    """One number a ray for the margins that bound its intervals, in order."""
+    """A number for each ray that encodes the margins bounding its intervals, in order."""
     code, slot = np.zeros(len(intervals.beyond), dtype=np.int64), intervals.slot
-    own = 1 + (intervals.enters + 1) * (margins + 1) + intervals.leaves + 1
+    ends = 1 + (intervals.enters + 1) * (margins + 1) + intervals.leaves + 1
     for k in range(int(slot.max(initial=-1)) + 1):
-        here = slot == k
-        code[intervals.ray[here]] = code[intervals.ray[here]] * ((margins + 1) ** 2 + 1) + own[here]
+        rows = slot == k
+        code[intervals.ray[rows]] = code[intervals.ray[rows]] * ((margins + 1) ** 2 + 1) + ends[rows]
     return code
 
 
@@ -74,18 +82,21 @@ def all_breaks(
 ) -> tuple[Ints, Floats]:
     """All breaks between neighbouring rays of a design that differ, also where several lie between two rays.
 
-    What may meet between two rays is solved for, and believed where the rays on both sides of it differ. Pairs
-    between which nothing is found so are halved.
+    A candidate is solved for where two ends may meet between two rays, and counts if the rays on both sides of it
+    differ. Pairs of rays without a confirmed candidate are halved.
 
     Parameters
     ----------
     reach : ndarray, shape (designs,)
-    intervals, design, angle
-        What was traced: rays ascending by design and angle.
+    intervals : Intervals
+        Those of the rays.
+    design, angle : ndarray, shape (rays,)
+        Design and angle of each ray, ascending by both.
 
     Returns
     -------
     (design, angle)
+        Of each break, in no order.
 
     Raises
     ------
@@ -96,80 +107,80 @@ def all_breaks(
     spent = np.zeros(designs.count, dtype=np.intp)
     owners, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
     codes = signatures(intervals, len(field.labels))
-    left = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
-    design, low, high, doubted = design[left], angle[left], angle[left + 1], np.zeros(len(left), dtype=bool)
+    lower = np.flatnonzero((codes[1:] != codes[:-1]) & (design[1:] == design[:-1]))
+    design, low, high, refuted = design[lower], angle[lower], angle[lower + 1], np.zeros(len(lower), dtype=bool)
     while True:
-        small = high - low <= field.accuracy
-        owners.append(design[small])
-        places.append(0.5 * (low + high)[small])
-        left, design, doubted = left[~small], design[~small], doubted[~small]
-        low, high = low[~small], high[~small]
+        resolved = high - low <= field.accuracy
+        owners.append(design[resolved])
+        places.append(0.5 * (low + high)[resolved])
+        lower, design, refuted = lower[~resolved], design[~resolved], refuted[~resolved]
+        low, high = low[~resolved], high[~resolved]
         if not design.size:
             return np.concatenate(owners), np.concatenate(places)
-        pair, angle = _solve(designs, _meetings(intervals, codes, left, field.singular), design, low, high, reach)
-        pair, angle = pair[~doubted[pair]], angle[~doubted[pair]]
+        pair, angle = _solve(designs, _meetings(intervals, codes, lower, field.singular), design, low, high, reach)
+        pair, angle = pair[~refuted[pair]], angle[~refuted[pair]]
         width, every = high - low, np.arange(len(design))
         step = np.minimum(np.maximum(BESIDE * width, APART), WITHIN * width)[pair]
-        # Where nothing is found one of the two rays may be the break.
-        none = np.setdiff1d(every, pair)
-        at_end = np.minimum(AT_END, WITHIN * width)[none]
-        pair, angle = np.concatenate([pair, none, none]), np.concatenate([angle, low[none], high[none]])
+        # Where a pair has no candidate one of its two rays may be the break.
+        idle = np.setdiff1d(every, pair)
+        at_end = np.minimum(AT_END, WITHIN * width)[idle]
+        pair, angle = np.concatenate([pair, idle, idle]), np.concatenate([angle, low[idle], high[idle]])
         step = np.concatenate([step, at_end, at_end])
         order = np.lexsort((angle, pair))
         pair, angle, step = pair[order], angle[order], step[order]
-        # What is found so near to each other is looked at together.
+        # Candidates of a pair whose rays beside them would overlap are confirmed together.
         new = np.append(True, (pair[1:] != pair[:-1]) | (np.diff(angle) > 2 * step[1:]))[: len(pair)]
         group = np.cumsum(new) - 1
         first, last = np.flatnonzero(new), np.flatnonzero(np.append(new[1:], True))[: new.sum()]
-        owner = pair[first]
+        group_pair = pair[first]
         start, stop = np.maximum(angle - step, low[pair])[first], np.minimum(angle + step, high[pair])[last]
-        rays = np.concatenate([low, high, 0.5 * (low + high)[none], start, stop])
-        of = np.concatenate([every, every, none, owner, owner])
-        about = np.full(len(rays), -1)
-        about[len(rays) - 2 * len(first) : len(rays) - len(first)] = np.arange(len(first))
-        order = np.lexsort((rays, of))
-        rays, of, about = rays[order], of[order], about[order]
-        both = design[of]
-        spent += np.bincount(both, minlength=len(spent))
+        rays = np.concatenate([low, high, 0.5 * (low + high)[idle], start, stop])
+        owner_pair = np.concatenate([every, every, idle, group_pair, group_pair])
+        group_of = np.full(len(rays), -1)
+        group_of[len(rays) - 2 * len(first) : len(rays) - len(first)] = np.arange(len(first))
+        order = np.lexsort((rays, owner_pair))
+        rays, owner_pair, group_of = rays[order], owner_pair[order], group_of[order]
+        ray_design = design[owner_pair]
+        spent += np.bincount(ray_design, minlength=len(spent))
         if spent.max() > BUDGET:
             raise AssemblyError(
                 f"seen from ({centre.real:g}, {centre.imag:g}) the boundary of the region is lost in rounding: "
                 "move scan.about nearer to the region or into it"
             )
-        intervals = trace(designs, both, rays, reach[both])
+        intervals = trace(designs, ray_design, rays, reach[ray_design])
         codes = signatures(intervals, len(field.labels))
-        left = np.flatnonzero((codes[1:] != codes[:-1]) & (of[1:] == of[:-1]))
-        believed = np.isin(group, about[left])
-        owners.append(design[pair[believed]])
-        places.append(angle[believed])
-        left = left[about[left] < 0]
-        doubted = np.isin(of[left], np.setdiff1d(np.setdiff1d(pair, none), pair[believed]))
-        design, low, high = both[left], rays[left], rays[left + 1]
+        lower = np.flatnonzero((codes[1:] != codes[:-1]) & (owner_pair[1:] == owner_pair[:-1]))
+        confirmed = np.isin(group, group_of[lower])
+        owners.append(design[pair[confirmed]])
+        places.append(angle[confirmed])
+        lower = lower[group_of[lower] < 0]
+        refuted = np.isin(owner_pair[lower], np.setdiff1d(np.setdiff1d(pair, idle), pair[confirmed]))
+        design, low, high = ray_design[lower], rays[lower], rays[lower + 1]
 
 
-def _meetings(intervals: Intervals, codes: Ints, left: Ints, leading: Flags) -> Meetings:
-    """What may meet between the rays `left` and those that follow them, by how their signatures `codes` differ.
+def _meetings(intervals: Intervals, codes: Ints, lower: Ints, leading: Flags) -> Meetings:
+    """Ends that may meet between the rays `lower` and the next ones, by the difference of their signatures `codes`.
 
-    Margins that are `leading` are followed rather than others, which may end at them.
+    Of two margins the one that is `leading` is followed: the other may end where the leading one is zero.
     """
-    found = [np.zeros(0, dtype=MEETING)]
-    kinds = np.unique(np.stack([codes[left], codes[left + 1]]), axis=1, return_inverse=True)[1].ravel()
+    meetings = [np.zeros(0, dtype=MEETING)]
+    kinds = np.unique(np.stack([codes[lower], codes[lower + 1]]), axis=1, return_inverse=True)[1].ravel()
     for kind in range(int(kinds.max(initial=-1)) + 1):
         pair = np.flatnonzero(kinds == kind)
-        found += _differences(pair, _ends(intervals, left[pair]), _ends(intervals, left[pair] + 1), leading)
-    return np.concatenate(found)
+        meetings += _differences(pair, _ends(intervals, lower[pair]), _ends(intervals, lower[pair] + 1), leading)
+    return np.concatenate(meetings)
 
 
 def _meeting(pair: Ints, *values: float | Floats) -> Meetings:
-    """The same meeting of several pairs; `values` in the order of `MEETING`."""
-    found = np.zeros(len(pair), dtype=MEETING)
+    """Meetings of the same kind for several pairs; `values` in the order of `MEETING`."""
+    meetings = np.zeros(len(pair), dtype=MEETING)
     for name, value in zip(MEETING.names or (), (pair, *values), strict=True):
-        found[name] = value
-    return found
+        meetings[name] = value
+    return meetings
 
 
 def _ends(intervals: Intervals, rays: Ints) -> tuple[list[int], Floats]:
-    """Margins at the ends of the intervals of rays of one signature, and the radii (rays, ends)."""
+    """Margins at the ends of the intervals of rays that share a signature, and the radii, shape (rays, ends)."""
     first = np.searchsorted(intervals.ray, rays)
     count = int(np.searchsorted(intervals.ray, rays[0], side="right") - first[0])
     at = first[:, None] + np.arange(count)
@@ -179,17 +190,20 @@ def _ends(intervals: Intervals, rays: Ints) -> tuple[list[int], Floats]:
 
 
 def _differences(
-    pair: Ints, here: tuple[list[int], Floats], there: tuple[list[int], Floats], leading: Flags
+    pair: Ints, first_ends: tuple[list[int], Floats], second_ends: tuple[list[int], Floats], leading: Flags
 ) -> Iterator[Meetings]:
-    """What may meet between rays that all have the ends `here` and rays that have the ends `there`."""
-    forward = len(here[0]) <= len(there[0])
-    (few, near), (many, far) = (here, there) if forward else (there, here)
+    """Ends that may meet between rays with the ends `first_ends` and their neighbours with the ends `second_ends`.
+
+    Ends are the margins, the same for all rays, and the radii, shape (rays, ends).
+    """
+    forward = len(first_ends[0]) <= len(second_ends[0])
+    (few, near), (many, far) = (first_ends, second_ends) if forward else (second_ends, first_ends)
     lost = len(many) - len(few)
     if lost > 2:
         return
 
-    def first_followed(one: int, two: int) -> bool:
-        return two < 0 or (one >= 0 and (bool(leading[one]) or not leading[two]))
+    def first_followed(first_margin: int, second_margin: int) -> bool:
+        return second_margin < 0 or (first_margin >= 0 and (bool(leading[first_margin]) or not leading[second_margin]))
 
     for first, at in _closing((many, far), (few, near)) if lost else [(len(many), np.arange(len(pair)))]:
         rest = [j for j in range(len(many)) if not first <= j < first + lost]
@@ -200,109 +214,112 @@ def _differences(
             low, high = (near[at, k], far[at, j]) if forward else (far[at, j], near[at, k])
             yield _meeting(pair[at], curve, other, 1 - 2 * (j % 2), low, high, 0.0)
         if lost:
-            one, two = many[first], many[first + 1]
+            first_margin, second_margin = many[first], many[first + 1]
             inner, outer = far[at, first], far[at, first + 1]
-            if one == two:
+            if first_margin == second_margin:
                 middle = 0.5 * (inner + outer)
-                yield _meeting(pair[at], one, one, 1 - 2 * (first % 2), middle, middle, outer - inner)
-            elif first_followed(one, two):
-                yield _meeting(pair[at], one, two, 1 - 2 * (first % 2), inner, inner, outer - inner)
+                yield _meeting(pair[at], first_margin, first_margin, 1 - 2 * (first % 2), middle, middle, outer - inner)
+            elif first_followed(first_margin, second_margin):
+                yield _meeting(pair[at], first_margin, second_margin, 1 - 2 * (first % 2), inner, inner, outer - inner)
             else:
-                yield _meeting(pair[at], two, one, 2 * (first % 2) - 1, outer, outer, outer - inner)
+                yield _meeting(pair[at], second_margin, first_margin, 2 * (first % 2) - 1, outer, outer, outer - inner)
 
 
 def _closing(longer: tuple[list[int], Floats], shorter: tuple[list[int], Floats]) -> list[tuple[int, Ints]]:
-    """Which two neighbouring ends the shorter of two kinds of rays lacks, and of which pairs of rays.
+    """Which two neighbouring ends the rays with fewer ends lack: the number of the first, and the pairs of rays.
 
-    The others should bear the same names; of several such, those that are nearest where the other ray has them.
+    The remaining ends should be of the same margins; among several choices their radii should agree best.
     """
     names, radii = longer
     count = len(names)
     rest = [[j for j in range(count) if j not in (first, first + 1)] for first in range(count - 1)]
-    strange = np.array([sum(names[j] != name for j, name in zip(row, shorter[0], strict=True)) for row in rest])
-    away = np.stack([np.abs(radii[:, row] - shorter[1]).sum(axis=1) for row in rest])
-    best = np.where((strange == strange.min())[:, None], away, np.inf).argmin(axis=0)
+    mismatches = np.array([sum(names[j] != name for j, name in zip(row, shorter[0], strict=True)) for row in rest])
+    distance = np.stack([np.abs(radii[:, row] - shorter[1]).sum(axis=1) for row in rest])
+    best = np.where((mismatches == mismatches.min())[:, None], distance, np.inf).argmin(axis=0)
     return [(int(first), np.flatnonzero(best == first)) for first in np.unique(best)]
 
 
 def _solve(
     designs: Designs, meetings: Meetings, design: Ints, begin: Floats, end: Floats, reach: Floats
 ) -> tuple[Ints, Floats]:
-    """Pairs and angles of those that meet between `begin` and `end`, which are of each pair, as is `design`."""
+    """Pairs and angles of the meetings that take place between their two rays.
+
+    `design`, `begin` and `end` are the design and the angles of both rays of each pair.
+    """
     pair = meetings["pair"]
     if not pair.size:
         return pair, np.zeros(0)
     begin, end, owner = begin[pair], end[pair], design[pair]
     reach, places = reach[owner], designs.of(owner)
-    # Margins of the assembly cost as much as all others.
+    # Margins of the assembly cost as much as all others together: they are computed only where they meet.
     of_assembly = np.array([*(name.startswith("assembly") for _, name in designs.field.labels), False])
-    dear = of_assembly[meetings["curve"]] | of_assembly[meetings["other"]]
+    with_assembly = of_assembly[meetings["curve"]] | of_assembly[meetings["other"]]
 
-    def ahead(which: Ints, theta: Floats) -> Floats:
+    def residual_at(which: Ints, theta: Floats) -> Floats:
         share = (theta - begin[which]) / (end - begin)[which]
         low, high = meetings["low"][which], meetings["high"][which]
-        radius, found = low + share * (high - low), np.empty(len(which))
+        radius, residual = low + share * (high - low), np.empty(len(which))
         for assembly in (False, True):
-            some = np.flatnonzero(dear[which] == assembly)
-            at = which[some]
-            if some.size:
-                local = {name: value[at] for name, value in places.items()}
-                found[some] = _ahead(designs, meetings[at], theta[some], radius[some], reach[at], local, assembly)
-        return found
+            rows = np.flatnonzero(with_assembly[which] == assembly)
+            of = which[rows]
+            if rows.size:
+                local = {name: value[of] for name, value in places.items()}
+                residual[rows] = _residual(designs, meetings[of], theta[rows], radius[rows], reach[of], local, assembly)
+        return residual
 
     every = np.arange(len(pair))
-    at_begin, at_end = ahead(every, begin), ahead(every, end)
+    at_begin, at_end = residual_at(every, begin), residual_at(every, end)
     with np.errstate(invalid="ignore"):
         on_begin, on_end = np.abs(at_begin) <= ZERO * np.abs(at_end), np.abs(at_end) <= ZERO * np.abs(at_begin)
     at_begin, at_end = np.where(on_begin, 0.0, at_begin), np.where(on_end, 0.0, at_end)
     use = np.flatnonzero(((at_begin > 0) != (at_end > 0)) | on_begin | on_end)
-    none = np.full(len(use), np.nan)
+    unknown = np.full(len(use), np.nan)
     angles = bracketed_roots(
-        lambda which, theta: ahead(use[which], theta), begin[use], at_begin[use], end[use], at_end[use],
-        none, none, np.full(len(use), designs.field.accuracy),
+        lambda which, theta: residual_at(use[which], theta), begin[use], at_begin[use], end[use], at_end[use],
+        unknown, unknown, np.full(len(use), designs.field.accuracy),
     )  # fmt: skip
     return pair[use], angles
 
 
-def _ahead(
+def _residual(
     designs: Designs, meetings: Meetings, theta: Floats, radius: Floats, reach: Floats, places: Places, assembly: bool
 ) -> Floats:
-    """What is zero where ends meet, at some angles; the curve is near `radius` there.
+    """Residuals at angles `theta` that are zero where the two ends meet, shape (meetings,).
 
-    `assembly` says whether margins of the assembly are among theirs.
+    The followed curve is near `radius`; `assembly` says whether margins of the assembly are computed.
     """
     curve, other, side = meetings["curve"], meetings["other"], meetings["side"]
     touching, central = curve == other, other < 0
     lane, turn = np.arange(len(theta)), np.exp(1j * theta)
     radius, near, settled = np.where(central, 0.0, radius), reach, np.zeros(len(theta), dtype=bool)
-    for zero, extreme in zip(TO_ZERO, TO_EXTREME, strict=True):
-        step = np.where(touching, np.maximum(extreme * meetings["span"], LEAST * reach), zero * reach)
+    for zero_step, touching_step in zip(TO_ZERO, TO_EXTREME, strict=True):
+        step = np.where(touching, np.maximum(touching_step * meetings["span"], LEAST * reach), zero_step * reach)
         near = np.where(settled, near, step)
         x = near * np.where(touching, AROUND[:, None], ROOTS[:, None] * side)
         margins = designs.field.margins(designs.about + (radius + x) * turn, places, assembly=assembly)
-        value, rival = margins[curve, :, lane].T, margins[other, :, lane].T
+        value, other_value = margins[curve, :, lane].T, margins[other, :, lane].T
         a, b, c = parabola(x, value)
         with np.errstate(invalid="ignore", divide="ignore"):
-            top = np.where(c * side < 0, -0.5 * b / c, np.nan)
-            nearest = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
-        step = np.where(touching, top, np.where(central, 0.0, nearest))
-        if zero == TO_ZERO[-1]:
-            # Each by itself, so that what else is looked at changes nothing.
+            extreme = np.where(c * side < 0, -0.5 * b / c, np.nan)
+            root = -2 * a / (b + np.copysign(np.sqrt(b * b - 4 * a * c), b))
+        step = np.where(touching, extreme, np.where(central, 0.0, root))
+        if zero_step == TO_ZERO[-1]:
+            # Each meeting settles on its own, so that its root does not depend on the others.
             settled |= ~(np.abs(step) > SETTLED * near)
             if settled.all():
                 break
         step = np.where(settled, 0.0, step)
         radius = radius + np.clip(step, -FARTHEST * reach, FARTHEST * reach)
     with np.errstate(invalid="ignore"):
-        zero_too = parabola(np.sqrt(value), rival)[0]
-    found: Floats = np.where(touching, side * (a + 0.5 * b * top), np.where(central, b * reach, zero_too))
-    return found
+        zero_too = parabola(np.sqrt(value), other_value)[0]
+    residual: Floats = np.where(touching, side * (a + 0.5 * b * extreme), np.where(central, b * reach, zero_too))
+    return residual
 
 
 def parabola(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
     """Coefficients of a + b x + c x^2 through three points (first axis)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        one, two = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
-        c = (two - one) / (x[2] - x[0])
-        b = one - c * (x[0] + x[1])
+        first_slope, second_slope = (y[1] - y[0]) / (x[1] - x[0]), (y[2] - y[1]) / (x[2] - x[1])
+        c = (second_slope - first_slope) / (x[2] - x[0])
+        b = first_slope - c * (x[0] + x[1])
         return y[0] - x[0] * (b + c * x[0]), b, c

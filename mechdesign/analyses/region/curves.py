@@ -1,4 +1,4 @@
-"""The region of one design as patches: boundary curves and a grid between them, and poses at its nodes."""
+"""The region of one design as patches between two boundary curves, grids of nodes in them, and the poses there."""
 
 from __future__ import annotations
 
@@ -16,20 +16,24 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
+# Fraction of the reach by which rounding may exchange the ends of an interval that is kept.
 SLACK = 1e-9
-# Rays of the narrowest panel; and how far inside its ends it is traced, farther where the ends are still degenerate.
+# Least number of rays of a panel.
 FEWEST = 25
+# Distances of a panel's first and last ray from its ends (fractions of the panel), tried one after the other while
+# these rays meet other intervals than the rest.
 BESIDE = (0.0, 1e-9, 1e-7, 1e-5)
 # Nodes of a map along each ray, from boundary to boundary.
 GRID = 33
-# An index may be infinite on the boundary itself: the outermost nodes stay this fraction of the interval inside.
+# Distance of the outermost nodes from the boundary, where an index may be infinite (fraction of the interval).
 INSET = 1e-6
-# Places of a ray's nodes between both curves.
+# Places of a ray's nodes between the two curves.
 FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
-# Poses of all regions together, about (a question may cost much at each), and rays of a patch at least;
+# Number of poses of all regions together, about: a question may be costly at each of them.
 MAX_POSES = 2000
+# Least number of rays of a patch.
 MIN_RAYS = 3
-# of a region: with fewer a map would not show its levels.
+# Least number of rays of a region: with fewer a map does not show its levels.
 ENOUGH_RAYS = 36
 
 
@@ -40,11 +44,11 @@ class Patch:
     Parameters
     ----------
     theta, inner, outer : ndarray, shape (rays,)
-        Angles and the radii of both curves.
+        Angles of the rays, and the radii of both curves there.
     enters, leaves : int
         Margins that are zero on them; -1 where the patch begins at the centre of the scan.
     piece : int
-        Number of the region's piece that it belongs to, from 1.
+        Number of the piece of the region to which the patch belongs, from 1.
     """
 
     theta: Floats
@@ -60,19 +64,19 @@ class Patch:
         return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
 
     def middle(self, about: complex) -> complex:
-        """A place inside, in the middle of the widest interval."""
+        """The middle of the widest interval, a place inside the patch."""
         k = int(np.argmax(self.outer - self.inner))
         return complex(about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
 
     def holds(self, z: Complexes, about: complex) -> Flags:
-        """Which places lie in the patch, as far as its rays tell."""
+        """Which places lie in the patch, its curves being interpolated between the rays."""
         radius, theta = np.abs(z - about), ray_through(z - about, self.theta[0])
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 
 
 def patches(panels: Panels, rays: int) -> Iterator[Patch]:
-    """Patches of a single design, with about `rays` rays over all panels (both ends of each included)."""
+    """Patches of a single design, with about `rays` rays over all panels, among them the ends of each panel."""
     total = float(np.sum(panels.high - panels.low))
     for low, high in zip(panels.low, panels.high, strict=True):
         number = max(FEWEST, round(rays * (high - low) / total) + 1)
@@ -80,10 +84,10 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
         theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
         steps = np.zeros(2, dtype=np.intp)
         for attempt in range(len(BESIDE)):
-            # At its very ends a panel meets its neighbour, or an interval vanishes.
+            # At its very ends a panel may meet the intervals of its neighbour, or lack one that vanishes.
             first, last = (high - low) * np.array(BESIDE)[steps]
-            at = np.clip(theta, low + first, high - last)
-            traced = panels.trace(np.zeros(number, dtype=np.intp), at, SLACK)
+            angles = np.clip(theta, low + first, high - last)
+            traced = panels.trace(np.zeros(number, dtype=np.intp), angles, SLACK)
             ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
             counts = np.bincount(ray, minlength=number)
             usual = _most(counts)
@@ -96,22 +100,25 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
         kept = np.flatnonzero(counts == usual)
         begins = np.searchsorted(ray, kept)
         for slot in range(usual):
-            own: Ints = begins + slot
-            yield Patch(at[kept], inner[own], outer[own], _most(enters[own]), _most(leaves[own]))
+            row: Ints = begins + slot
+            yield Patch(angles[kept], inner[row], outer[row], _most(enters[row]), _most(leaves[row]))
 
 
 def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
-    """Patches of a single design, piece by piece; about `rays` rays over all panels."""
+    """Patches of a single design, piece by piece, with about `rays` rays over all panels."""
     total = float(np.sum(pieces.panels.high - pieces.panels.low))
-    found = []
+    all_patches = []
     for number, panels in enumerate(pieces.all(), start=1):
-        own = round(rays * float(np.sum(panels.high - panels.low)) / total)
-        found += [replace(patch, piece=number) for patch in patches(panels, own)]
-    return found
+        share = round(rays * float(np.sum(panels.high - panels.low)) / total)
+        all_patches += [replace(patch, piece=number) for patch in patches(panels, share)]
+    return all_patches
 
 
 def whole(traced: Intervals, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-    """Intervals with those made one that a single point divides, such as where a leg has no length."""
+    """Ray, radii and margins of intervals, those joined that only a point divides (such as where a leg has no length).
+
+    Intervals of a ray are joined where the gap between them is at most `near`.
+    """
     ray = traced.ray
     meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)
     begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
@@ -119,13 +126,13 @@ def whole(traced: Intervals, near: Floats | float) -> tuple[Ints, Floats, Floats
 
 
 def _most(values: Ints) -> int:
-    """What most rays have: single rays may meet another margin (a corner)."""
+    """The most frequent of values, one for each ray: a ray through a corner may meet another margin than the rest."""
     names, counts = np.unique(values, return_counts=True)
     return int(names[np.argmax(counts)])
 
 
 def workspace_nodes(study: Study) -> Poses:
-    """Nodes of a grid that follows the boundary, as that of ``local.csv`` but with fewer rays.
+    """Poses at the nodes of a grid that follows the boundary, as that of ``local.csv`` but with fewer rays.
 
     Returns
     -------
@@ -135,30 +142,29 @@ def workspace_nodes(study: Study) -> Poses:
     Raises
     ------
     StudyError
-        If the workspace section lacks what cannot be assumed.
+        If the workspace section lacks a key that has no default.
     AssemblyError
         If nothing is reachable.
     """
-    asked = regions(study)
-    panels = [(region, found) for region in asked if (found := _panels(region)) is not None]
+    all_regions = regions(study)
+    reachable = [(region, panels) for region in all_regions if (panels := _panels(region)) is not None]
+    rays = max(ENOUGH_RAYS, MAX_POSES // GRID // len(all_regions))
     parts: list[Complexes] = []
-    sectors = []
-    for region, each in panels:
-        sectors.append(_sectors(region, each, max(ENOUGH_RAYS, MAX_POSES // GRID // len(asked)), parts))
+    sectors = [_sectors(region, panels, rays, parts) for region, panels in reachable]
     if not parts:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
     z = np.concatenate([grid.ravel() for grid in parts])
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
-    for name in asked[0].held:
-        rows = [GRID * (each.patches[-1].rays.stop - each.patches[0].rays.start) for each in sectors]
-        values[name] = np.repeat([region.held[name] for region, _ in panels], rows)
+    nodes = [GRID * (grid.patches[-1].rays.stop - grid.patches[0].rays.start) for grid in sectors]
+    for name in all_regions[0].held:
+        values[name] = np.repeat([region.held[name] for region, _ in reachable], nodes)
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
     return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(sectors))
 
 
 def _panels(region: Region) -> Panels | None:
-    """Panels of the piece of a region that counts, None where nothing is reachable."""
+    """Panels of the region, or of the piece that the sketch's assembly reaches; None where nothing is reachable."""
     panels = find_panels(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
     if region.field.same_assembly:
         panels = Pieces.of(panels).only(0)
@@ -166,13 +172,16 @@ def _panels(region: Region) -> Panels | None:
 
 
 def _sectors(region: Region, panels: Panels, most: int, parts: list[Complexes]) -> Sectors:
-    """The patches of one region, whose nodes, shape (rays, GRID), on about `most` rays, are added to `parts`."""
-    found = list(patches(panels, min(region.rays or RAYS, most)))
+    """The patches of one region as sectors; their nodes, on about `most` rays, are appended to `parts`.
+
+    Each part is of shape (rays, GRID).
+    """
+    coarse = list(patches(panels, min(region.rays or RAYS, most)))
     finer = list(patches(panels, region.rays or RAYS))
-    # Every panel has a fewest number of rays: of too many some are left out, never the ends of a patch: others begin.
-    total = sum(float(np.ptp(patch.theta)) for patch in found)
+    # Every panel has at least `FEWEST` rays: where these are too many, some but the first and the last are left out.
+    total = sum(float(np.ptp(patch.theta)) for patch in coarse)
     sectors = []
-    for patch, fine in zip(found, finer if len(finer) == len(found) else found, strict=True):
+    for patch, fine in zip(coarse, finer if len(finer) == len(coarse) else coarse, strict=True):
         number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
         kept = evenly(len(patch.theta), number)
         begin = sum(len(grid) for grid in parts)

@@ -1,7 +1,7 @@
-"""Panels of a scan: ranges of the ray's angle over which the same margins bound the same intervals.
+"""Panels of a scan: ranges of the ray angle over which the same margins bound the same intervals.
 
-Within a panel the ends of the intervals are smooth functions of the angle. Where the bounding margins change (corners),
-or intervals appear (cusps, tangents), a panel ends, so that quadrature rules keep their order.
+Within a panel the ends of the intervals are smooth functions of the angle, so that quadrature rules keep their order. A
+panel ends where the bounding margins change (corners), or intervals appear or vanish (cusps, tangents).
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from mechdesign.analyses.region.rays import FARTHEST_TURN, SAME_ROOT, Designs, I
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-# Times that the reach is doubled at most.
+# Largest number of times that the reach is doubled.
 DOUBLINGS = 16
-# Rounds in which rays are put where the raster shows what others pass by.
-LOOKS = 4
-# A ray inside a panel, not at half of it: by symmetry a single point may divide the ray there.
+# Largest number of rounds that add rays (where the raster shows hidden pieces and holes) or divide panels.
+ROUNDS = 4
+# Place of the ray that stands for a panel, as a fraction of the panel. In symmetric mechanisms the ray at exactly half
+# of it may pass through a single point that divides its interval.
 MIDDLE = 0.4871
-# Rays of a panel, as parts of it, that have to meet as many intervals: between those that do not is another break.
+# Rays that test a panel, as fractions of it: where they meet unequal numbers of intervals, the panel is divided.
 PROBES = np.array([0.01, 0.13, 0.31, MIDDLE, 0.69, 0.87, 0.99])
-# Width (radians) below which a panel may hold nothing but a tip.
+# Width (radians) below which a panel may hold nothing but the tip of a cusp.
 NARROW = 1e-3
 
 
@@ -37,17 +38,17 @@ class Panels:
     design, low, high : ndarray, shape (panels,)
         Design and range of angle of each panel.
     cut : ndarray of bool, shape (designs,)
-        Whether margins of the assembly leave out anything of a region that the others bound.
+        Whether margins of the assembly take anything from the region that the other margins bound.
     reach : ndarray, shape (designs,)
-        Radius beyond the whole region of each design.
+        Radius about the centre of the rays that holds the whole region of each design.
     closes : ndarray of bool, shape (designs,)
-        Whether any ray met the region.
+        Whether any ray meets the region.
     intervals : ndarray of int, shape (panels,)
-        Intervals of a ray inside each panel.
+        Number of intervals of each ray in a panel.
     seen : ndarray, shape (designs,)
-        Area that the raster is sure of: that of its cells inside, less what it is not known to.
+        Lower bound of the area by the raster: its inside cells, less the error of that sum.
     unseen : ndarray, shape (designs,)
-        Area of places that the raster cannot exclude though none of them was met.
+        Area of the cells of which the raster neither found a point inside nor excludes one.
     """
 
     designs: Designs
@@ -62,27 +63,27 @@ class Panels:
     unseen: Floats
 
     def trace(self, design: Ints, theta: Floats, slack: float = 0.0) -> Intervals:
-        """Rays of designs, as long as they need be; `slack` as in `mechdesign.analyses.region.rays.trace`.
+        """Intersect rays, as long as the reach, with the region; `slack` as in `mechdesign.analyses.region.rays.trace`.
 
-        Margins of the assembly are only looked at where they are known to cut something.
+        Margins of the assembly are computed only for the designs whose region they `cut`.
         """
         cut = self.cut[design]
         parts = [(self.designs, np.flatnonzero(cut)), (self.designs.in_any_assembly, np.flatnonzero(~cut))]
-        parts = [(designs, own) for designs, own in parts if own.size] or parts[:1]
-        found = [trace(designs, design[own], theta[own], self.reach[design[own]], slack) for designs, own in parts]
-        return joined([own for _, own in parts], found)
+        parts = [(designs, rays) for designs, rays in parts if rays.size] or parts[:1]
+        traced = [trace(designs, design[rays], theta[rays], self.reach[design[rays]], slack) for designs, rays in parts]
+        return joined([rays for _, rays in parts], traced)
 
     def through(self, design: Ints, z: Complexes) -> tuple[Floats, Intervals, Flags]:
-        """Angles of rays through places, their intervals, and which of these hold the place; none does off the scan."""
-        (begin, end), way = self.designs.scan, z - self.designs.about
-        # At the centre of the scan one ray is as good as another.
-        centre = np.abs(way) <= SAME_ROOT * self.reach[design]
-        theta = np.where(centre, begin + MIDDLE * (end - begin), ray_through(way, begin))
-        known = np.isfinite(way) & (theta <= end)
-        theta, radius = np.where(known, theta, begin), np.where(centre, 0.0, np.abs(way))
-        found = self.trace(design, theta)
-        at = radius[found.ray]
-        return theta, found, known[found.ray] & (found.inner <= at) & (at <= found.outer)
+        """Angles of rays through places, their intervals, and whether each holds the place; none does off the scan."""
+        (begin, end), offset = self.designs.scan, z - self.designs.about
+        # All rays pass through the centre of the scan: any will do.
+        centre = np.abs(offset) <= SAME_ROOT * self.reach[design]
+        theta = np.where(centre, begin + MIDDLE * (end - begin), ray_through(offset, begin))
+        on_scan = np.isfinite(offset) & (theta <= end)
+        theta, radius = np.where(on_scan, theta, begin), np.where(centre, 0.0, np.abs(offset))
+        traced = self.trace(design, theta)
+        distance = radius[traced.ray]
+        return theta, traced, on_scan[traced.ray] & (traced.inner <= distance) & (distance <= traced.outer)
 
 
 def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
@@ -91,7 +92,7 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     Raises
     ------
     AssemblyError
-        If the region has no end.
+        If the region is unbounded, or its boundary is lost in rounding.
     """
     count, scan, number = designs.count, designs.scan, designs.effort.rays + 1
     raster = Raster.of(designs)
@@ -100,82 +101,92 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     design, angle = np.repeat(every, number), np.tile(np.linspace(*scan, number), count)
     if owner.size:
         through = ray_through(hole - designs.about, scan[0])
-        met = through < scan[1]
-        rays = np.unique(np.concatenate([design + 1j * angle, (owner + 1j * through)[met]]))
+        on_scan = through < scan[1]
+        rays = np.unique(np.concatenate([design + 1j * angle, (owner + 1j * through)[on_scan]]))
         design, angle = rays.real.astype(np.intp), rays.imag
     reach = np.where(least > 0, least, raster.reach)
     reach, intervals = _extent(designs, design, angle, reach, least)
     owner = every
-    for _ in range(LOOKS):
+    for _ in range(ROUNDS):
         owner, hidden = raster.hidden(np.unique(owner), design, angle, intervals)
         rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
         if len(rays) == len(design):
             break
         design, angle = rays.real.astype(np.intp), rays.imag
         reach, intervals = _extent(designs, design, angle, reach, least)
-    found, breaks = all_breaks(designs, reach, intervals, design, angle)
+    broken, breaks = all_breaks(designs, reach, intervals, design, angle)
     every, fixed = np.repeat(every, 2 + len(cuts)), np.tile([*scan, *cuts], count)
-    owner, low, high = _between(every, fixed, found, breaks)
-    some, cut = np.arange(len(low)), raster.cut | (np.bincount(design, intervals.cut, count) > 0)
-    for _ in range(LOOKS):
-        # Two rays may be alike though two breaks lie between them: then others between them are not, or links jump.
-        of, rays = np.tile(owner[some], (len(PROBES), 1)), low[some] + (high - low)[some] * PROBES[:, None]
-        wide = (high - low)[some] > TOGETHER / PROBES[0]
-        traced = trace(designs, of.ravel(), rays.ravel(), reach[of.ravel()])
-        cut |= np.bincount(of.ravel(), traced.cut, count) > 0
+    owner, low, high = _between(every, fixed, broken, breaks)
+    tested, cut = np.arange(len(low)), raster.cut | (np.bincount(design, intervals.cut, count) > 0)
+    for _ in range(ROUNDS):
+        # Rays at both ends of a panel may be alike though two breaks lie between: rays between them differ, or a link
+        # jumps from one to the next.
+        probed, rays = np.tile(owner[tested], (len(PROBES), 1)), low[tested] + (high - low)[tested] * PROBES[:, None]
+        wide = (high - low)[tested] > TOGETHER / PROBES[0]
+        traced = trace(designs, probed.ravel(), rays.ravel(), reach[probed.ravel()])
+        cut |= np.bincount(probed.ravel(), traced.cut, count) > 0
         counts = traced.counts.reshape(rays.shape)
-        unlike = (np.ptp(counts, axis=0) > 0) & wide
-        panel, between, jumps = _turn_by_turn(designs, of, rays, traced, reach, wide & ~unlike)
-        unlike[panel] = True
-        if not unlike.any():
+        differ = (np.ptp(counts, axis=0) > 0) & wide
+        panel, between, jumps = _split_by_turns(designs, probed, rays, traced, reach, wide & ~differ)
+        differ[panel] = True
+        if not differ.any():
             break
-        of = np.concatenate([of[:, unlike].ravel(), owner[some[panel]]])
-        rays = np.concatenate([rays[:, unlike].ravel(), between])
-        order = np.lexsort((rays, of))
-        of, rays = of[order], rays[order]
-        more, angles = all_breaks(designs, reach, trace(designs, of, rays, reach[of]), of, rays)
-        more, angles = np.concatenate([more, owner[some[panel[jumps]]]]), np.concatenate([angles, between[jumps]])
-        found, breaks = np.concatenate([found, more]), np.concatenate([breaks, angles])
-        owner, low, high = _between(every, fixed, found, breaks)
-        some = np.flatnonzero(np.isin(owner, more))
-    # A panel is empty where a ray inside it meets nothing; a narrow one may hold a tip that is lost in rounding.
+        probed = np.concatenate([probed[:, differ].ravel(), owner[tested[panel]]])
+        rays = np.concatenate([rays[:, differ].ravel(), between])
+        order = np.lexsort((rays, probed))
+        probed, rays = probed[order], rays[order]
+        split, angles = all_breaks(designs, reach, trace(designs, probed, rays, reach[probed]), probed, rays)
+        split, angles = np.concatenate([split, owner[tested[panel[jumps]]]]), np.concatenate([angles, between[jumps]])
+        broken, breaks = np.concatenate([broken, split]), np.concatenate([breaks, angles])
+        owner, low, high = _between(every, fixed, broken, breaks)
+        tested = np.flatnonzero(np.isin(owner, split))
+    # A panel whose middle ray meets nothing is empty, unless it is narrow: it may hold a tip that is lost in rounding.
     middle = low + MIDDLE * (high - low)
     counts = trace(designs, owner, middle, reach[owner]).counts
     full = (counts > 0) | (high - low < NARROW)
     closes = np.bincount(design, intervals.counts, count) > 0
-    area, doubt = raster.area
-    return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - doubt,
+    area, error = raster.area
+    return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
                   raster.unseen)  # fmt: skip
 
 
-def _turn_by_turn(
+def _split_by_turns(
     designs: Designs, design: Ints, theta: Floats, traced: Intervals, reach: Floats, alike: Flags
 ) -> tuple[Ints, Floats, Flags]:
-    """Further rays of panels whose rays are `alike`, where links lie otherwise at the ends of their intervals.
+    """Further rays of panels whose rays are `alike`, where a link turns far from one interval end to the next ray's.
 
-    So many that from one of them to the next either the intervals are others or no link turns far, or else until they
-    are one: then the link jumps there. Rays of shape (rays, panels).
+    Two such rays are halved until the rays between have other intervals, or no link turns far from ray to ray, or they
+    are `TOGETHER`: there the link jumps.
+
+    Parameters
+    ----------
+    design, theta : ndarray, shape (rays, panels)
+        Design and angle of the rays of each panel.
+    traced : Intervals
+        Those of all these rays.
 
     Returns
     -------
     (panel, angle, jumps)
+        Of each further ray; `jumps` where a link jumps at it.
     """
     counts = traced.counts.reshape(theta.shape)[0]
     panel = np.flatnonzero(alike & (counts > 1))
     most = int(counts[panel].max(initial=0))
 
     def ends(traced: Intervals) -> Floats:
-        found = np.full((2, most, len(traced.beyond)), np.nan)
-        radii = traced.by_ray(traced.inner, traced.outer)[:, :most]
-        found[:, : radii.shape[1]] = radii
-        return found.reshape(2 * most, -1)
+        """Inner and outer radii of each ray, shape (2 largest count, rays); nan beyond its last interval."""
+        radii = np.full((2, most, len(traced.beyond)), np.nan)
+        of_rays = traced.by_ray(traced.inner, traced.outer)[:, :most]
+        radii[:, : of_rays.shape[1]] = of_rays
+        return radii.reshape(2 * most, -1)
 
     def turned(panel: Ints, theta: Floats, radii: Floats) -> Flags:
-        """Whether a link turns far from each ray to the next."""
+        """Whether a link turns far from each ray to the next, shape (rays - 1, panels)."""
         z = designs.about + radii * np.exp(1j * theta[:, None])
         owner = np.tile(design[0, panel], z.shape[1])
-        found = designs.field.sampled(z.reshape(len(z), -1), designs.of(owner))[1].reshape(len(z) - 1, *z.shape[1:])
-        return np.asarray((found > FARTHEST_TURN).any(axis=1))
+        turns = designs.field.sampled(z.reshape(len(z), -1), designs.of(owner))[1].reshape(len(z) - 1, *z.shape[1:])
+        return np.asarray((turns > FARTHEST_TURN).any(axis=1))
 
     panels, angles, jumps = [panel[:0]], [theta[0, :0]], [alike[:0]]
     if panel.size:
@@ -190,22 +201,22 @@ def _turn_by_turn(
         jumps.append(last)
         panel, middle, pair, radii = panel[~last], middle[~last], pair[:, ~last], radii[:, :, ~last]
         traced = trace(designs, design[0, panel], middle, reach[design[0, panel]])
-        like = traced.counts == counts[panel]
-        pair, radii = np.insert(pair, 1, middle, axis=0)[:, like], np.insert(radii, 1, ends(traced), axis=0)[:, :, like]
-        panel = panel[like]
+        same = traced.counts == counts[panel]
+        pair, radii = np.insert(pair, 1, middle, axis=0)[:, same], np.insert(radii, 1, ends(traced), axis=0)[:, :, same]
+        panel = panel[same]
         half, which = np.nonzero(turned(panel, pair, radii))
         panel = panel[which]
         pair, radii = pair[[half, half + 1], which], radii[[half, half + 1], :, which].swapaxes(1, 2)
     return np.concatenate(panels), np.concatenate(angles), np.concatenate(jumps)
 
 
-def _between(every: Ints, fixed: Floats, found: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:
-    """Design and ends of the panels between `fixed` ends of the designs `every` and breaks of the designs `found`."""
-    owner, place = np.concatenate([every, found]), np.concatenate([fixed, breaks])
+def _between(every: Ints, fixed: Floats, broken: Ints, breaks: Floats) -> tuple[Ints, Floats, Floats]:
+    """Design and both ends of the panels between `fixed` angles of the designs `every` and `breaks` of `broken`."""
+    owner, place = np.concatenate([every, broken]), np.concatenate([fixed, breaks])
     firm = np.arange(len(place)) < len(fixed)
     order = np.lexsort((place, owner))
     owner, place, firm = owner[order], place[order], firm[order]
-    # Breaks that rounding sets beside each other, or beside the end of the scan, are one.
+    # Breaks that rounding sets beside each other, or beside a fixed end, are one.
     near = (owner[1:] == owner[:-1]) & (np.diff(place) < TOGETHER)
     drop = np.zeros(len(place), dtype=bool)
     drop[1:] |= near & ~firm[1:]
@@ -216,9 +227,12 @@ def _between(every: Ints, fixed: Floats, found: Ints, breaks: Floats) -> tuple[I
 
 
 def _extent(designs: Designs, design: Ints, theta: Floats, reach: Floats, least: Floats) -> tuple[Floats, Intervals]:
-    """Trace rays, doubling the reach until no ray ends inside; returns the reach needed and the intervals.
+    """Trace rays, doubling the reach until no ray ends inside.
 
-    The reach of a design is `least` at least.
+    Returns
+    -------
+    (reach, intervals)
+        The reach that each design needs, at least `least`, and the intervals of all rays.
     """
     for _ in range(DOUBLINGS):
         intervals = trace(designs, design, theta, reach[design])

@@ -1,8 +1,8 @@
-"""A raster of a region: which cells of a box that holds all of it lie inside.
+"""A raster of a region: which cells of a box around the region lie inside it.
 
-Rays about one point may pass a piece of a region by; cells cannot, if the piece is larger than they are. So the raster
-says how far rays have to go, and between which of them something is hidden; and the number of its cells is an area
-that shares nothing with the integrals but the margins.
+Rays about one point may miss a piece of a region; cells miss no piece that is larger than a cell. The raster therefore
+tells how long the rays have to be, and between which two of them a piece or a hole is hidden. The area of its cells is
+a check on the integrals, with which it shares only the margins.
 """
 
 from __future__ import annotations
@@ -15,34 +15,48 @@ import numpy as np
 from mechdesign.analyses.region.rays import Designs, Intervals, ray_through
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-# A box is drawn wider by this share, so that rounding leaves nothing outside.
+# Fraction by which a box is widened, so that rounding leaves no part of the region outside.
 ROOM = 1e-6
-# Cells looked at at once.
+# Cells whose margins are computed at once.
 BLOCK = 1 << 17
-# Share of their area by which cells on the boundary may be miscounted, if they all err alike.
+# Error of the area of a boundary cell, as a fraction of the cell, if all boundary cells err alike.
 EDGE = 0.5
-# Steps of the parabolas that lead to the lowest place of a margin, as parts of a cell, and the places of each.
+# Sampling distances of the successive parabolas that lead to the minimum of a margin (cells).
 PARABOLAS = (1.0, 0.1)
+# Samples of one parabola: the place itself, right, left, up, down and across (sampling distances).
 AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
-# Farthest that such a place is from a centre (cells).
+# Longest step of a parabola in x and y (cells).
 FARTHEST = 1.0
-# Times that a cell is divided in which a sliver may lie, and parts each way.
-DIVISIONS, PARTS = 3, 4
-# Cells around those of the scan that are looked at, too.
+# How often a cell that may hold a sliver is divided.
+DIVISIONS = 3
+# Parts of a divided cell in x, and in y.
+PARTS = 4
+# Rows and columns that are added around those of the scan.
 RING = 2
-# Times that a box is doubled whose outermost cells lie inside, where the mechanism's dimensions give no bound.
+# How often a box is doubled while its outermost cells lie inside, where the mechanism's dimensions bound nothing.
 DOUBLINGS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Raster:
-    """Cells of a box around the region of each design, by their centres.
+    """Cells of a box around the region of each design, judged by their centres.
 
-    A circle larger than the one around a cell always holds a centre: pieces that hold one are met. Of each design the
-    lower left corner of the box, width and height of a cell, both complex, and whether the centres of the cells lie in
-    the region, shape (designs, rows, columns). And places in holes, and in slivers of the region, that no centre met,
-    with their designs, and the area in which slivers may lie that are still thinner. And of which designs
-    margins of the assembly exclude a centre that no other margin does.
+    A circle larger than the one around a cell holds a centre: the raster misses no piece that holds such a circle.
+
+    Parameters
+    ----------
+    low : complex ndarray, shape (designs,)
+        Lower left corner of each box.
+    cell : complex ndarray, shape (designs,)
+        Width (real part) and height (imaginary part) of a cell.
+    inside : ndarray of bool, shape (designs, rows, columns)
+        Whether the centre of each cell lies in the region.
+    holes, slivers : (ndarray of int, complex ndarray)
+        Designs and places in holes, and in slivers of the region, that hold no centre.
+    unseen : ndarray, shape (designs,)
+        Area that may hold slivers thinner still.
+    cut : ndarray of bool, shape (designs,)
+        Whether margins of the assembly exclude a centre within the scan that no other margin excludes.
     """
 
     designs: Designs
@@ -56,50 +70,50 @@ class Raster:
 
     @staticmethod
     def of(designs: Designs) -> Raster:
-        """Look at places of each design, as many as the effort says each way, those within the scan."""
+        """Compute the margins at the centres of all cells of each design, `effort.cells` in x and in y."""
         cells, (begin, end) = designs.effort.cells, designs.scan
         low, high, bounded = _box(designs)
         of_assembly = sum(name.startswith("assembly ") for _, name in designs.field.labels)
         for _ in range(DOUBLINGS):
-            none = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
+            empty = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=complex)
             blank, cut = np.zeros((designs.count, cells, cells), dtype=bool), np.zeros(designs.count, dtype=bool)
-            found, holes = (
-                Raster(designs, low, (high - low) / cells, blank, none, none, np.zeros(designs.count), cut),
-                [none],
+            raster, holes = (
+                Raster(designs, low, (high - low) / cells, blank, empty, empty, np.zeros(designs.count), cut),
+                [empty],
             )
-            slivers = [none]
-            for some, part, z in found._centres(np.arange(designs.count)):
-                good, margins = designs.look(z.reshape(-1, len(some)), some)
-                inside, margins = good.reshape(z.shape), margins.reshape(-1, *z.shape)
+            slivers = [empty]
+            for chunk, part, z in raster._centres(np.arange(designs.count)):
+                is_inside, margins = designs.look(z.reshape(-1, len(chunk)), chunk)
+                inside, margins = is_inside.reshape(z.shape), margins.reshape(-1, *z.shape)
                 scanned = ray_through(z - designs.about, begin) <= end
-                cut[some] = (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
-                holes.append(found._between_centres(some, z, margins, inside))
-                slivers.append(found._thin(some, z, margins, inside, scanned))
-                found.inside[some, *part] = np.moveaxis(scanned & inside, 2, 0)
-            rim = found.inside.copy()
+                cut[chunk] = (scanned & ~(margins[len(margins) - of_assembly :] > 0)).any(axis=(0, 1, 2))
+                holes.append(raster._between_centres(chunk, z, margins, inside))
+                slivers.append(raster._thin(chunk, z, margins, inside, scanned))
+                raster.inside[chunk, *part] = np.moveaxis(scanned & inside, 2, 0)
+            rim = raster.inside.copy()
             rim[:, 1:-1, 1:-1] = False
             open_ = rim.any(axis=(1, 2)) & ~bounded
             if not open_.any():
                 break
             size = np.where(open_, high - low, 0)
             low, high = low - 0.5 * size, high + 0.5 * size
-        (owners, places), (thin, within) = zip(*holes, strict=True), zip(*slivers, strict=True)
+        (owners, places), (thin_owners, thin_places) = zip(*holes, strict=True), zip(*slivers, strict=True)
         return replace(
-            found, holes=(np.concatenate(owners), np.concatenate(places)),
-            slivers=(np.concatenate(thin), np.concatenate(within)),
+            raster, holes=(np.concatenate(owners), np.concatenate(places)),
+            slivers=(np.concatenate(thin_owners), np.concatenate(thin_places)),
         )  # fmt: skip
 
     def _thin(
-        self, some: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
+        self, designs: Ints, place: Complexes, margins: Floats, inside: Flags, scanned: Flags
     ) -> tuple[Ints, Complexes]:  # fmt: skip
-        """Designs and places in the region where no centre around is: cells that no margin excludes are divided.
+        """Designs and places of slivers: points of the region in cells without an inside centre in or beside them.
 
-        Once, and then as long as that takes no more places than the raster. Parts left are unseen where nothing is met
-        in the cell and every margin is positive somewhere around.
+        Cells that no margin excludes are divided once, and again while that takes no more points than the raster has.
+        What is left counts as unseen area if no part of its cell lies inside and each margin is positive at some part.
         """
         row, column, lane = _open(margins, *np.nonzero(scanned & ~_spread(inside)))
-        design, place, cell = some[lane], place[row, column, lane], self.cell[some[lane]]
-        owner, found, whole = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
+        design, place, cell = designs[lane], place[row, column, lane], self.cell[designs[lane]]
+        cell_design, witness, cell_of_part = design, np.full(len(lane), np.nan, dtype=complex), np.arange(len(lane))
         rises = np.zeros(len(lane), dtype=bool)
         parts = (np.arange(PARTS) - 0.5 * (PARTS - 1))[:, None]
         x, y = (part.reshape(-1, 1) for part in np.meshgrid(parts, parts))
@@ -108,56 +122,56 @@ class Raster:
                 break
             cell = cell / PARTS
             part = place + x * cell.real + 1j * y * cell.imag
-            good, margins = self.designs.look(part, design, assembly=True)
-            met = good.any(axis=0)
-            found[whole[met]] = part[good.argmax(axis=0), np.arange(len(design))][met]
-            unmet = np.nonzero(np.broadcast_to(~met, (PARTS, PARTS, len(design))))
-            row, column, lane = _open(margins.reshape(len(margins), PARTS, PARTS, len(design)), *unmet)
+            is_inside, margins = self.designs.look(part, design, assembly=True)
+            hit = is_inside.any(axis=0)
+            witness[cell_of_part[hit]] = part[is_inside.argmax(axis=0), np.arange(len(design))][hit]
+            misses = np.nonzero(np.broadcast_to(~hit, (PARTS, PARTS, len(design))))
+            row, column, lane = _open(margins.reshape(len(margins), PARTS, PARTS, len(design)), *misses)
             at = row * PARTS + column
-            design, place, cell, whole = design[lane], part[at, lane], cell[lane], whole[lane]
+            design, place, cell, cell_of_part = design[lane], part[at, lane], cell[lane], cell_of_part[lane]
             rises = (np.fmax.reduce(margins, axis=1) > 0).all(axis=0)[lane]
-        met = ~np.isnan(found)
-        np.add.at(self.unseen, design, cell.real * cell.imag * (rises & ~met[whole]))
-        return owner[met], found[met]
+        hit = ~np.isnan(witness)
+        np.add.at(self.unseen, design, cell.real * cell.imag * (rises & ~hit[cell_of_part]))
+        return cell_design[hit], witness[hit]
 
-    def _between_centres(self, some: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
-        """Designs and places where a margin is negative, though at the centres of all cells around it is not.
+    def _between_centres(self, designs: Ints, z: Complexes, margins: Floats, inside: Flags) -> tuple[Ints, Complexes]:
+        """Designs and places of holes between centres: a margin is negative there, but at no centre around.
 
-        From the lowest of neighbouring centres a parabola through the places around leads on: it is exact for squares
-        of distances.
+        Parabolas lead from a centre where a margin is lower than beside it to the margin's minimum; they are exact for
+        squared distances.
         """
-        here = margins[:, 1:-1, 1:-1]
+        centre = margins[:, 1:-1, 1:-1]
         low = np.repeat(inside[None, 1:-1, 1:-1], len(margins), axis=0)
         for beside in (margins[:, 1:-1, :-2], margins[:, 1:-1, 2:], margins[:, :-2, 1:-1], margins[:, 2:, 1:-1]):
-            low &= here <= beside
+            low &= centre <= beside
         margin, row, column, lane = np.nonzero(low)
-        place, cell = z[row + 1, column + 1, lane], self.cell[some[lane]]
-        each, places = np.arange(len(lane)), self.designs.of(some[lane])
-        good = np.ones(len(lane), dtype=bool)
+        place, cell = z[row + 1, column + 1, lane], self.cell[designs[lane]]
+        every, places = np.arange(len(lane)), self.designs.of(designs[lane])
+        converges = np.ones(len(lane), dtype=bool)
         for step in PARABOLAS:
             x, y = step * cell.real, step * cell.imag
             around = place + x * AROUND.real[:, None] + 1j * y * AROUND.imag[:, None]
-            here, right, left, up, down, across = self.designs.field.margins(around, places)[margin, :, each].T
+            centre, right, left, up, down, across = self.designs.field.margins(around, places)[margin, :, every].T
             with np.errstate(invalid="ignore", divide="ignore"):
                 gx, gy = 0.5 * (right - left), 0.5 * (up - down)
-                xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
+                xx, yy, xy = right + left - 2 * centre, up + down - 2 * centre, across + centre - right - up
                 det = xx * yy - xy * xy
                 dx, dy = (gy * xy - gx * yy) / det, (gx * xy - gy * xx) / det
-                good &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
-                # To twice the depth of the parabola, as the margin is none exactly.
-                good &= here + gx * dx + gy * dy < 0
-            place = place + np.where(good, x * dx, 0.0) + 1j * np.where(good, y * dy, 0.0)
-        return some[lane[good]], place[good]
+                converges &= (xx > 0) & (det > 0) & (np.maximum(np.abs(dx), np.abs(dy)) < FARTHEST / step)
+                # Twice the depth of the parabola, which only approximates the margin.
+                converges &= centre + gx * dx + gy * dy < 0
+            place = place + np.where(converges, x * dx, 0.0) + 1j * np.where(converges, y * dy, 0.0)
+        return designs[lane[converges]], place[converges]
 
     @property
     def area(self) -> tuple[Floats, Floats]:
-        """Area of the cells inside of each design, and what that is not known to."""
-        inside, one = self.inside, self.cell.real * self.cell.imag
+        """Cell area inside each design, and its error, both of shape (designs,)."""
+        inside, cell_area = self.inside, self.cell.real * self.cell.imag
         edge = np.zeros(inside.shape, dtype=bool)
         for axis in (1, 2):
             first, last = inside.take([0], axis), inside.take([-1], axis)
             edge |= np.diff(inside, axis=axis, prepend=first) | np.diff(inside, axis=axis, append=last)
-        return inside.sum(axis=(1, 2)) * one, EDGE * edge.sum(axis=(1, 2)) * one
+        return inside.sum(axis=(1, 2)) * cell_area, EDGE * edge.sum(axis=(1, 2)) * cell_area
 
     @property
     def reach(self) -> Floats:
@@ -168,34 +182,34 @@ class Raster:
 
     @property
     def farthest(self) -> Floats:
-        """Distance from the centre within which all cells inside lie, shape (designs,); 0 where there is none."""
-        found = np.zeros(len(self.low))
-        for some, part, z in self._centres(np.arange(len(self.low))):
-            inside = np.moveaxis(self.inside[some, *part], 0, 2)
+        """Radius about the centre of the rays that holds all inside cells, shape (designs,); 0 where there are none."""
+        farthest = np.zeros(len(self.low))
+        for chunk, part, z in self._centres(np.arange(len(self.low))):
+            inside = np.moveaxis(self.inside[chunk, *part], 0, 2)
             distance = np.where(inside, np.abs(z - self.designs.about), 0.0).max(axis=(0, 1))
-            found[some] = np.where(distance > 0, distance + np.abs(self.cell[some]), 0.0)
-        return found
+            farthest[chunk] = np.where(distance > 0, distance + np.abs(self.cell[chunk]), 0.0)
+        return farthest
 
-    def hidden(self, some: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
-        """Design and angle of further rays of some designs, to what rays passed by: pieces and holes between two.
+    def hidden(self, searched: Ints, design: Ints, angle: Floats, intervals: Intervals) -> tuple[Ints, Floats]:
+        """Designs and angles of further rays, to pieces and holes that the given rays miss in the `searched` designs.
 
-        The rays ascend by design and angle; each design has at least those at both ends of the scan.
+        The given rays ascend by design and angle; each design has at least those at both ends of the scan.
         """
         begin, end = self.designs.scan
         rays, ends = design + 1j * angle, intervals.by_ray(intervals.inner, intervals.outer)
         owners, angles = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-        for owner, z, inside in self._looked_at(some):
-            way = z - self.designs.about
-            theta, radius = ray_through(way, begin), np.abs(way)
+        for owner, z, inside in self._looked_at(searched):
+            offset = z - self.designs.about
+            theta, radius = ray_through(offset, begin), np.abs(offset)
             within = (theta < end) & (theta > begin)
             owner, theta, radius, inside = owner[within], theta[within], radius[within], inside[within]
-            at = np.searchsorted(rays, owner + 1j * theta) - 1
-            before, after = _hold(ends, at, radius), _hold(ends, at + 1, radius)
+            gap_of = np.searchsorted(rays, owner + 1j * theta) - 1
+            before, after = _hold(ends, gap_of, radius), _hold(ends, gap_of + 1, radius)
             passed = np.where(inside, ~before & ~after, before & after)
-            owner, theta, inside, gap = owner[passed], theta[passed], inside[passed], at[passed]
-            # Of the places between the same two rays the one farthest from both: a piece, and a hole.
-            aside = np.minimum(theta - angle[gap], angle[gap + 1] - theta)
-            kind = 2 * gap + inside
+            owner, theta, inside, left_ray = owner[passed], theta[passed], inside[passed], gap_of[passed]
+            # Between two rays: a ray to the piece, and one to the hole, that is farthest from both.
+            aside = np.minimum(theta - angle[left_ray], angle[left_ray + 1] - theta)
+            kind = 2 * left_ray + inside
             order = np.lexsort((-aside, kind))
             chosen = order[np.append(True, np.diff(kind[order]) > 0)[: len(order)]]
             owners.append(owner[chosen])
@@ -203,49 +217,48 @@ class Raster:
         return np.concatenate(owners), np.concatenate(angles)
 
     def _looked_at(self, designs: Ints) -> Iterator[tuple[Ints, Complexes, Flags]]:
-        """Designs, places, and whether they lie inside: centres of the cells of some designs, and in slivers."""
-        for some, part, z in self._centres(designs):
-            yield np.broadcast_to(some, z.shape).ravel(), z.ravel(), np.moveaxis(self.inside[some, *part], 0, 2).ravel()
+        """Design, place and whether it is inside, of the centres of all cells and of the slivers of some designs."""
+        for chunk, at, z in self._centres(designs):
+            yield np.broadcast_to(chunk, z.shape).ravel(), z.ravel(), np.moveaxis(self.inside[chunk, *at], 0, 2).ravel()
         owner, place = self.slivers
-        own = np.isin(owner, designs)
-        yield owner[own], place[own], np.ones(int(own.sum()), dtype=bool)
+        chosen = np.isin(owner, designs)
+        yield owner[chosen], place[chosen], np.ones(int(chosen.sum()), dtype=bool)
 
     def _centres(self, designs: Ints) -> Iterator[tuple[Ints, tuple[slice, slice], Complexes]]:
-        """Some of the designs, the rows and columns around the scan, and centres of the cells there.
+        """Chunks of the designs, the rows and columns around the scan, and the cell centres there.
 
-        They are of shape (rows, columns, designs).
+        The centres are of shape (rows, columns, designs of the chunk).
         """
         size, about = self.inside.shape[1], self.designs.about
-        place, (least, most) = np.arange(size) + 0.5, _sides(self.designs.scan)
+        steps, (least, most) = np.arange(size) + 0.5, _sides(self.designs.scan)
         step = max(1, BLOCK // size**2)
         for k in range(0, len(designs), step):
-            some = designs[k : k + step]
-            low, cell = self.low[some], self.cell[some]
-            part = []
+            chunk = designs[k : k + step]
+            low, cell = self.low[chunk], self.cell[chunk]
+            window = []
             for begin, width, centre, first, last in (
                 (low.imag, cell.imag, about.imag, least.imag, most.imag),
                 (low.real, cell.real, about.real, least.real, most.real),
             ):
-                at = (centre - begin) / width
-                start = int(np.clip(at.min() - RING, 0, size - 1)) if first == 0 else 0
-                stop = int(np.clip(at.max() + 1 + RING, 1, size)) if last == 0 else size
-                part.append(slice(start, stop))
-            y, x = place[part[0], None, None], place[part[1], None]
-            yield some, (part[0], part[1]), low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
+                position = (centre - begin) / width
+                start = int(np.clip(position.min() - RING, 0, size - 1)) if first == 0 else 0
+                stop = int(np.clip(position.max() + 1 + RING, 1, size)) if last == 0 else size
+                window.append(slice(start, stop))
+            y, x = steps[window[0], None, None], steps[window[1], None]
+            yield chunk, (window[0], window[1]), low.real + x * cell.real + 1j * (low.imag + y * cell.imag)
 
 
 def _sides(scan: tuple[float, float]) -> tuple[complex, complex]:
-    """Least and largest x and y of the directions of a scan, or 0 if that is beyond."""
+    """Least x and y, and largest, of the origin and the unit vectors of a scan."""
     begin, end = scan
     quarters = 0.5 * np.pi * np.arange(np.ceil(begin / (0.5 * np.pi)), np.floor(end / (0.5 * np.pi)) + 1)
-    way = np.round(np.exp(1j * np.array([begin, *quarters, end])), 9)
-    return complex(way.real.min(initial=0), way.imag.min(initial=0)), complex(
-        way.real.max(initial=0), way.imag.max(initial=0)
-    )
+    directions = np.round(np.exp(1j * np.array([begin, *quarters, end])), 9)
+    x, y = directions.real, directions.imag
+    return complex(x.min(initial=0), y.min(initial=0)), complex(x.max(initial=0), y.max(initial=0))
 
 
 def _spread(cells: Flags) -> Flags:
-    """Cells (rows, columns, designs) with those around them."""
+    """Cells (rows, columns, designs) and their eight neighbours."""
     for axis in (0, 1):
         before = np.moveaxis(cells, axis, 0)
         after = before.copy()
@@ -256,35 +269,35 @@ def _spread(cells: Flags) -> Flags:
 
 
 def _open(margins: Floats, row: Ints, column: Ints, lane: Ints) -> tuple[Ints, Ints, Ints]:
-    """Those of the given cells none of whose margins falls so far below zero as it changes to the next cell.
+    """Cells that no margin excludes: each margin exceeds zero when its change to a neighbouring cell is added.
 
     Margins are of shape (margins, rows, columns, lanes).
     """
     for margin in margins:
-        most = margin[row, column, lane]
-        below = np.flatnonzero(~(most > 0))
-        most[below] = _most(margin, row[below], column[below], lane[below])
-        unknown = np.flatnonzero(np.isnan(most))
+        largest = margin[row, column, lane]
+        below = np.flatnonzero(~(largest > 0))
+        largest[below] = _most(margin, row[below], column[below], lane[below])
+        unknown = np.flatnonzero(np.isnan(largest))
         if unknown.size:
-            # What is unknown beside where a leg is stretched is as it is at the next cell.
+            # A margin that is unknown beside a stretched leg is judged by the neighbouring cells.
             beside = _beside(margin, row[unknown], column[unknown])
-            most[unknown] = np.fmax.reduce([_most(margin, *place, lane[unknown]) for place in beside])
-        keep = most > 0
+            largest[unknown] = np.fmax.reduce([_most(margin, *place, lane[unknown]) for place in beside])
+        keep = largest > 0
         row, column, lane = row[keep], column[keep], lane[keep]
     return row, column, lane
 
 
 def _most(margin: Floats, row: Ints, column: Ints, lane: Ints) -> Floats:
-    """A margin at cells, and its change to the next cell, whichever is the largest."""
-    here, change = margin[row, column, lane], np.zeros(len(row))
+    """A margin at cells plus its largest change to a neighbouring cell; nan where it is unknown."""
+    value, change = margin[row, column, lane], np.zeros(len(row))
     with np.errstate(invalid="ignore"):
         for place in _beside(margin, row, column):
-            change = np.fmax(change, np.abs(margin[*place, lane] - here))
-        return here + np.minimum(change, np.finfo(float).max)
+            change = np.fmax(change, np.abs(margin[*place, lane] - value))
+        return value + np.minimum(change, np.finfo(float).max)
 
 
 def _beside(margin: Floats, row: Ints, column: Ints) -> list[tuple[Ints, Ints]]:
-    """Rows and columns of the cells beside some; at the rim those themselves."""
+    """Rows and columns of the four neighbours of cells; beyond the rim the cell itself."""
     rows, columns = margin.shape[:2]
     return [
         (np.maximum(row - 1, 0), column), (np.minimum(row + 1, rows - 1), column),
@@ -293,19 +306,19 @@ def _beside(margin: Floats, row: Ints, column: Ints) -> list[tuple[Ints, Ints]]:
 
 
 def _hold(ends: Floats, ray: Ints, radius: Floats) -> Flags:
-    """Whether rays hold radii between the `ends` of one of their intervals."""
-    held = np.zeros(ray.shape, dtype=bool)
+    """Whether each radius lies in an interval of its ray; `ends` are inner and outer radii, (2, intervals, rays)."""
+    holds = np.zeros(ray.shape, dtype=bool)
     for inner, outer in zip(*ends, strict=True):
-        held |= (inner[ray] <= radius) & (radius <= outer[ray])
-    return held
+        holds |= (inner[ray] <= radius) & (radius <= outer[ray])
+    return holds
 
 
 def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
-    """Corners of a box around the region of each design, shape (designs,), and whether it is known to hold all of it.
+    """Lower left and upper right corners of a box for each design, shape (designs,), and whether it holds the region.
 
-    From the lengths of links, strokes and limits of distance alone. Every point lies in a box. One pinned to another by
-    a link is no farther from it than the link is long, and one that slides along the ground no farther than its stroke.
-    Where nothing bounds the point, the box is a guess about its place in the sketch: the sum of all lengths.
+    The box follows from the lengths of links, the strokes and the limits of distances alone: two points of a link are
+    no farther apart than the link is long, and what slides along the ground moves no farther than its stroke. Where
+    these do not bound the point, the box is a guess: the sum of all lengths about its place in the sketch.
     """
     field, count = designs.field, designs.count
     mechanism = field.mechanism
@@ -353,7 +366,7 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
         for side, sign in ((low, -1), (high, 1))
     )
     middle, size = 0.5 * (corner + other), 0.5 * (other - corner)
-    # Where dimensions cannot close at all the corners are exchanged, or one.
+    # Where the dimensions close in no pose, a corner may lie on the wrong side of the other.
     least = 1e-9 * guess
     size = np.maximum(size.real * (1 + ROOM), least) + 1j * np.maximum(size.imag * (1 + ROOM), least)
     return middle - size, middle + size, bounded

@@ -1,4 +1,4 @@
-"""The region that the workspace section means: of which point, at which held values, seen from where."""
+"""Regions that the workspace section asks for: the point, the held coordinates, the centre of the rays."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ RAYS = 181
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where a point can be, at some values of the other degrees of freedom.
+    """A region of the plane: where a point can be while the other degrees of freedom are held.
 
     Parameters
     ----------
     held : mapping of str to float
         Values of the coordinates of ``at``, in the study's units.
     about : complex
-        Where the rays start.
+        Centre of the rays.
     scan : (float, float)
         First and last angle of the rays (radians).
     rays : int or None
-        As the study asks.
+        Number of rays over the scan that the study sets; None where it leaves the choice to the analysis.
     followed : mapping of str to Amount
-        Numbers of the field that follow parameters, by the names under which it takes them beside the dimensions.
+        Held values and characteristic length that follow parameters, by their names `HELD` and `LENGTH` of the field.
     """
 
     field: Field
@@ -47,18 +47,18 @@ class Region:
     followed: dict[str, Amount]
 
     def places(self, numbers: Numbers) -> dict[str, Floats]:
-        """What differs from design to design as the field takes it, each of shape (designs,)."""
-        moved = {name: amount for name, amount in self.followed.items() if numbers.moves(amount)}
-        return {**numbers.places, **{name: numbers.of(amount) for name, amount in moved.items()}}
+        """Dimensions and numbers of the field that differ between designs, each of shape (designs,)."""
+        varying = {name: numbers.of(amount) for name, amount in self.followed.items() if numbers.moves(amount)}
+        return {**numbers.places, **varying}
 
 
 def regions(study: Study) -> list[Region]:
-    """One region a value of ``at``.
+    """A region for each combination of the values of ``at``.
 
     Raises
     ------
     StudyError
-        If the section lacks what cannot be assumed.
+        If the section lacks a key that has no default, or its keys do not fit the mobility.
     """
     section = study.workspace
     if section is None or section.point is None:
@@ -106,18 +106,19 @@ def regions(study: Study) -> list[Region]:
 
 
 def _followed(held: Sequence[float], factors: Sequence[float], length: float | None) -> dict[str, Amount]:
-    """Held values, each with its factor from the study's units, and the characteristic length, that follow parameters.
+    """Held values and the characteristic length, as amounts, as far as they follow parameters.
 
-    They are amounts, if they do.
+    `factors` take the held values from the study's units to radians (1 for lengths).
     """
-    found = {f"{HELD}{k}": Amount.by("value*factor", value=v, factor=f)
+    amounts = {f"{HELD}{k}": Amount.by("value*factor", value=v, factor=f)
              for k, (v, f) in enumerate(zip(held, factors, strict=True))}  # fmt: skip
     if length is not None:
-        found[LENGTH] = Amount.of(length)
-    return {name: amount for name, amount in found.items() if amount.expression is not None}
+        amounts[LENGTH] = Amount.of(length)
+    return {name: amount for name, amount in amounts.items() if amount.expression is not None}
 
 
 def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:
+    """First and last angle of the rays (radians), at most a turn apart."""
     if section.scan.from_ is None or section.scan.to is None:
         return 0.0, 2 * np.pi
     start, stop = section.scan.from_ * unit, section.scan.to * unit

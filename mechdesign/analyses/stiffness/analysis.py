@@ -1,6 +1,6 @@
 """How stiff is it? Stiffness and compliance at a point, equivalent springs and deflections under loads.
 
-Of one design or of many at once: their poses are one batch, and so are the numbers of the section in which they differ.
+The poses of several designs are one batch, and so are the numbers of the section in which the designs differ.
 """
 
 from __future__ import annotations
@@ -51,35 +51,38 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
 
-# Poses solved together.
+# Number of poses solved together.
 CHUNK = 8192
 # Tables in the order in which they are shown.
 ORDER = ("stiffness", "compliance", "eigen", "springs", "deflections", "forces", "displacements")
-# Wrenches (of unit size) nearer to dependence than this get a warning: rounding and tolerances decide the answer.
+# Smallest singular value of the unit wrenches below which a pose gets a warning: its stiffness depends on rounding and
+# tolerances.
 NEAR_SINGULAR = 1e-4
+# A pose: its row, and the mechanism in it.
 Pose = tuple[int, Configuration]
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The body, or the pin, whose stiffness is asked, and what carries it; ready for any number of poses.
+    """The body, or the pin, whose stiffness is asked, and what carries it, for any number of poses.
 
     Parameters
     ----------
     given : StiffnessSection
-        The study's section.
+        The section as the study gives it.
     legs : tuple of Leg or None
-        Where the body stands on serial chains, those; None where it does not.
+        The serial legs on which the body stands; None where it does not stand on such legs alone.
     network : Network
-        All that carries, whatever it is.
+        All joints and beams that carry the body.
     size : int
         3 for a body's twist, 2 for the displacement of a pin.
     condensed : bool
-        The pin is a point of one link only, or its end on one: the link turns freely under forces at it.
+        Whether the pin is a point of one link, its only one or the one that ``at`` names: this link turns freely under
+        forces at the pin.
     extent : float
         Size of the mechanism.
     poses, rows : optional
-        The poses that it is asked in, and their rows among these, where designs differ in numbers of the section.
+        All poses, and the rows of those in which the body is, where designs differ in numbers of the section.
     """
 
     given: StiffnessSection
@@ -96,7 +99,7 @@ class Body:
         return replace(self, poses=poses, rows=rows)
 
     def take(self, index: Ints) -> Body:
-        """The body in some of its poses, by index."""
+        """The body in the poses `index` of its own."""
         return self if self.rows is None else replace(self, rows=self.rows[index])
 
     @cached_property
@@ -108,14 +111,14 @@ class Body:
 
     @property
     def loads(self) -> Floats:
-        """Forces and moment of each load in each pose, shape (poses, loads, 3); one pose where all have the same."""
+        """Loads (fx, fy, mz) in each pose, shape (poses, loads, 3); of a single pose where all poses have the same."""
         parts = np.broadcast_arrays(*(part for load in self.section.loads for part in load))
         return np.stack(parts, axis=-1).reshape(-1, len(self.given.loads), 3)
 
     def length(self, configuration: Configuration) -> Floats:
-        """What turns rotations into lengths where sizes are compared, shape (n,); no result depends on it.
+        """Length as which a radian counts where sizes are compared, shape (n,): the spread of the joints that carry.
 
-        It is how far the joints that carry lie apart; whatever else is far away does not count.
+        No result depends on it.
         """
         return spread([edge.point for edge in self.network.edges], configuration, self.extent)
 
@@ -134,7 +137,7 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
 
 @one_thread()
 def answers(study: Study, poses: Poses) -> Answers:
-    """Answer `stiffness` for the poses of several designs, each as if it were asked alone, without pictures.
+    """Stiffness at the poses of several designs, without pictures; each design has the answer that it has alone.
 
     A design without a valid pose has an error.
     """
@@ -142,26 +145,27 @@ def answers(study: Study, poses: Poses) -> Answers:
 
 
 def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: Progress) -> Group:
+    """The result of all designs, each with its warnings, counts and errors."""
     solved = solve(study, body, poses, jobs, progress)
-    each, designs = poses.count // poses.designs, poses.designs
+    count, designs = poses.count // poses.designs, poses.designs
     cautions, ends = _Cautions(study, poses, body, solved.held), []
-    for k, reason in enumerate(solved.reason.reshape(designs, each)):
-        counts = {"poses": each, "invalid": int(np.count_nonzero(reason))}
+    for k, reason in enumerate(solved.reason.reshape(designs, count)):
+        counts = {"poses": count, "invalid": int(np.count_nonzero(reason))}
         try:
-            warnings, failed = judge_failures(study, poses, reason, k * each, "stiffness")
+            warnings, failed = judge_failures(study, poses, reason, k * count, "stiffness")
         except AssemblyError as error:
             ends.append(End(counts=counts, error=error))
             continue
-        warnings += cautions.of(slice(k * each, (k + 1) * each))
+        warnings += cautions.of(slice(k * count, (k + 1) * count))
         ends.append(End(warnings, failed, invalid_in_words(reason), counts))
-    made = tables(study, body, poses, solved).values()
+    all_tables = tables(study, body, poses, solved).values()
     if designs > 1:
-        scoped = {table.name: replace(table, scope=Scope(poses_only=True)) for table in made}
-        uneven = {"springs": solved.springs.counts(designs, each)}
+        scoped = {table.name: replace(table, scope=Scope(poses_only=True)) for table in all_tables}
+        uneven = {"springs": solved.springs.counts(designs, count)}
         return Group(np.arange(designs), Result("stiffness", scoped), ends, uneven)
     (end,) = ends
     result = Result(
-        "stiffness", of_poses(made, solved.reason), end.warnings, end.counts, end.failed,
+        "stiffness", of_poses(all_tables, solved.reason), end.warnings, end.counts, end.failed,
         drawn=_drawn(body, poses, solved),
     )  # fmt: skip
     return Group(np.arange(1), result, ends)
@@ -169,10 +173,22 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """How the body is held in every pose, why poses fail (`Reason`, shape (poses,)), and the effects of any loads.
+    """All poses solved.
 
-    `first` and `loose` are the first valid pose and the first that has a free twist, with their rows; `shown` are the
-    poses that pictures can show.
+    Parameters
+    ----------
+    held : Held
+        How the body is held in each pose.
+    reason : ndarray of int8, shape (poses,)
+        Why a pose fails (`Reason`); 0 where it is valid.
+    springs : Springs
+        Equivalent springs of the legs.
+    effects : Effects or None
+        Effects of the study's loads.
+    first, loose : Pose or None
+        The first valid pose, and the first with a free twist.
+    shown : Shown
+        The poses that pictures can show.
     """
 
     held: Held
@@ -186,7 +202,10 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """One pose as pictures show it, and the row of it; `twists` by vertex, shape (3, loads), about the asked point."""
+    """A pose that pictures show, with its row.
+
+    `springs` are those of the pose; `twists` those of each vertex about the asked point, shape (3, loads).
+    """
 
     body: Body
     row: int
@@ -196,13 +215,13 @@ class Drawn:
 
 
 def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
-    """All poses, those that pictures can show; the first valid one, and the first that has a free twist."""
+    """What pictures show: the poses, the first valid one, and the first with a free twist."""
     drawn: dict[str, Any] = {"poses": poses, "shown": solved.shown}
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
             row, configuration = pose
             moved = by_forces(body, configuration).displacements if body.given.loads else {}
-            twists = {vertex: (each @ body.loads[0, :, : body.size].T)[0] for vertex, each in moved.items()}
+            twists = {vertex: (twist @ body.loads[0, :, : body.size].T)[0] for vertex, twist in moved.items()}
             drawn[name] = Drawn(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
     return drawn
 
@@ -210,12 +229,12 @@ def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
 def solve(
     study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress: Progress = NULL, *, effects: bool = True
 ) -> Solved:
-    """Solve all poses; one that cannot be assembled is nan. `effects` are those of the loads, if there are any."""
+    """Solve all poses; one that cannot be assembled is nan. `effects` adds those of the loads, if any."""
     held = Held.unknown(poses.count, body.size)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
     loads = len(body.given.loads) if effects else 0
-    moved = Effects.unknown(body.network, poses.count, loads) if loads else None
+    all_effects = Effects.unknown(body.network, poses.count, loads) if loads else None
     first: Pose | None = None
     loose: Pose | None = None
     keeper = Keeper(study, poses)
@@ -228,52 +247,58 @@ def solve(
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
         batches = ((body.at(poses, solved.rows[index]), configuration.take(index)) for index in chunks)
         answers = map_chunks(partial(_evaluate, effects=bool(loads)), batches, jobs)
-        for index, (part, found, effect) in zip(chunks, answers, strict=True):
+        for index, (held_part, leg_springs, effect) in zip(chunks, answers, strict=True):
             rows = solved.rows[index]
-            put(held, rows, part)
-            springs += [replace(s, row=rows[s.row]) for s in found]
-            if moved is not None and effect is not None:
-                put(moved, rows, effect)
+            put(held, rows, held_part)
+            springs += [replace(s, row=rows[s.row]) for s in leg_springs]
+            if all_effects is not None and effect is not None:
+                put(all_effects, rows, effect)
             progress.update(len(index))
         loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
-    return Solved(held, reason, Springs.sorted(springs), moved, first, loose, keeper.shown)
+    return Solved(held, reason, Springs.sorted(springs), all_effects, first, loose, keeper.shown)
 
 
-def _pose(solved: SolvedPoses, wanted: Flags) -> Pose | None:
-    """The first of some solved poses that is wanted, and its row."""
-    index = np.flatnonzero(wanted)[:1]
+def _pose(solved: SolvedPoses, chosen: Flags) -> Pose | None:
+    """The first of some solved poses that `chosen` marks, with its row; None where it marks none."""
+    index = np.flatnonzero(chosen)[:1]
     return (int(solved.rows[index[0]]), solved.configuration.take(index)) if len(index) else None
 
 
 def tables(
-    study: Study, body: Body, poses: Poses, solved: Solved, wanted: Collection[str] = ORDER
+    study: Study, body: Body, poses: Poses, solved: Solved, names: Collection[str] = ORDER
 ) -> dict[str, Table]:  # fmt: skip
-    """Those of some tables that the study has, with the rows of all designs."""
+    """The study's tables, as far as they are among `names`, with the rows of all designs."""
     soft, effects = solved.held.compliance, solved.effects
     body = body.at(poses, np.arange(poses.count))
     section = body.section
     loads = np.broadcast_to(body.loads, (poses.count, len(section.loads), 3)) if section.loads else None
     method = "serial legs" if body.legs is not None else "force method"
-    made: dict[str, Callable[[], Table]] = {
+    makers: dict[str, Callable[[], Table]] = {
         "stiffness": lambda: stiffness_table(study, poses, solved.held, solved.reason == 0, method, section.direction),
         "compliance": lambda: compliance_table(study, poses, soft),
     }
     length = section.characteristic_length
     if body.size == 3 and length is not None:
-        made["eigen"] = lambda: eigen_table(study, poses, soft, length)
+        makers["eigen"] = lambda: eigen_table(study, poses, soft, length)
     legs = body.legs
     if legs is not None:
-        made["springs"] = lambda: springs_table(study, poses, [leg.name for leg in legs], solved.springs)
+        makers["springs"] = lambda: springs_table(study, poses, [leg.name for leg in legs], solved.springs)
     if loads is not None:
-        made["deflections"] = lambda: deflections_table(study, poses, loads, soft)
+        makers["deflections"] = lambda: deflections_table(study, poses, loads, soft)
     if effects is not None:
-        made["forces"] = lambda: forces_table(study, poses, body.network, effects)
-        made["displacements"] = lambda: displacements_table(study, poses, body.network, effects)
-    return {name: make() for name, make in made.items() if name in wanted}
+        makers["forces"] = lambda: forces_table(study, poses, body.network, effects)
+        makers["displacements"] = lambda: displacements_table(study, poses, body.network, effects)
+    return {name: make() for name, make in makers.items() if name in names}
 
 
 def ask(study: Study) -> Body:
-    """Find what carries the asked body; a StudyError where the study has no stiffness section."""
+    """The body whose stiffness the study asks, and what carries it.
+
+    Raises
+    ------
+    StudyError
+        If the study has no stiffness section.
+    """
     section = study.stiffness
     if section is None:
         message = "is missing: say which point's stiffness is asked, for example {link: platform, at: P}"
@@ -282,18 +307,18 @@ def ask(study: Study) -> Body:
     link, links = section.bearer, mechanism.graph.links_at(point)
     lone = link is None and len(links) == 1
     standing = build_bodies(mechanism, links[0] if lone else link, point, section)
-    pinned = build_bodies(mechanism, None, point, section) if lone else standing
+    carried = build_bodies(mechanism, None, point, section) if lone else standing
     legs = find_legs(standing, list(mechanism.description.links))
-    network = build_network(pinned)
+    network = build_network(carried)
     condensed = section.link is None and (lone or link is not None)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size or 1.0)
 
 
 def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs]]:
-    """Stiffness and springs in a batch of assembled poses of shape (n,).
+    """How the body is held in a batch of assembled poses of shape (n,), and the equivalent springs of its legs.
 
-    By the reciprocal wrenches of its legs where these hold the body in closed form (six times as fast), else by the
-    force method.
+    The reciprocal wrenches of the legs are used where they hold the body in closed form (six times as fast as the force
+    method), else the force method.
     """
     if body.legs is None:
         return by_forces(body, configuration).held, []
@@ -306,14 +331,14 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Sprin
 
 
 def by_forces(body: Body, configuration: Configuration) -> Loaded:
-    """The body in a batch of assembled poses by the force method, and what unit loads do."""
+    """The body, and the effects of unit loads, in a batch of assembled poses, by the force method."""
     return load(twists_of(body.network, body.section, configuration, body.length(configuration)), body.size)
 
 
 def _evaluate(
     batch: tuple[Body, Configuration], *, effects: bool
 ) -> tuple[Held, Iterable[Springs], Effects | None]:  # fmt: skip
-    """As `hold` of a body in its poses, and what the study's loads do."""
+    """`hold` of a body in its poses, and the effects of the study's loads; None without `effects`."""
     body, configuration = batch
     if not effects:
         return *hold(body, configuration), None
@@ -324,7 +349,7 @@ def _evaluate(
 
 
 class _Cautions:
-    """What is doubtful of the poses of designs."""
+    """Warnings about under-constrained poses, links without a beam, and legs without a free joint."""
 
     def __init__(self, study: Study, poses: Poses, body: Body, held: Held) -> None:
         self.study, self.poses, self.margin = study, poses, held.margin

@@ -1,4 +1,4 @@
-"""How a body is held; and its stiffness on serial legs that bear as many wrenches as it has freedoms.
+"""How a body is held, and its stiffness on serial legs that bear as many wrenches as it has freedoms.
 
 With W the wrenches of all legs and C_c their compliances (block diagonal), a wrench w on the body gives the legs
 lambda = W^-1 w and the body the twist W^-T C_c lambda: no inverse of C_c is needed, rigid directions are zeros in it.
@@ -16,7 +16,7 @@ from mechdesign.analyses.stiffness.screws import RIGID, screw_product
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-# Wrenches of unit size with a determinant above this are solved in closed form, the others by singular values.
+# Determinant of the unit wrenches above which their matrix is inverted in closed form; others need singular values.
 REGULAR = 1e-4
 
 
@@ -35,7 +35,7 @@ class Held:
     free : ndarray, shape (n, size)
         The free twist where there is one, else nan: per radian where it turns, else of unit length.
     margin : ndarray, shape (n,)
-        Smallest singular value of the wrenches (unit columns, moments scaled); infinite where not needed.
+        Smallest singular value of the wrenches (unit columns, moments scaled); infinite where it was not computed.
     """
 
     stiffness: Floats
@@ -46,58 +46,58 @@ class Held:
 
     @staticmethod
     def unknown(n: int, size: int) -> Held:
-        """Room for n poses: of rank 0, all else nan."""
+        """A record for n poses to be filled: rank 0, all else nan."""
         matrix = np.full((n, size, size), np.nan)
         return Held(matrix, matrix.copy(), np.zeros(n, dtype=np.intp), matrix[:, 0].copy(), np.full(n, np.inf))
 
     def seen_from(self, arm: Complexes) -> Held:
-        """The same body asked at points that are `arm` (n,) away; a pin is asked where it is.
+        """The same body seen from points at a distance `arm`, shape (n,), of the present ones; a pin stays as it is.
 
-        Nothing is inverted, so that a point may be far away: C' = M C M^T, K' = M^-T K M^-1  [S4].
+        C' = M C M^T and K' = M^-T K M^-1 [S4]; as no matrix is inverted, the points may be far away.
         """
         if self.compliance.shape[1] == 2 or not arm.any():
             return self
-        there, back = moved_to(arm), moved_to(-arm)
+        forth, back = moved_to(arm), moved_to(-arm)
         return replace(
             self,
             stiffness=back.swapaxes(1, 2) @ self.stiffness @ back,
-            compliance=there @ self.compliance @ there.swapaxes(1, 2),
-            free=(there @ self.free[:, :, None])[:, :, 0],
+            compliance=forth @ self.compliance @ forth.swapaxes(1, 2),
+            free=(forth @ self.free[:, :, None])[:, :, 0],
         )
 
 
 def put(whole: object, rows: Ints, part: object) -> None:
-    """Fill in some poses of a record of arrays."""
+    """Write the arrays of `part` into the rows `rows` of the arrays of `whole`."""
     for name, values in vars(part).items():
         getattr(whole, name)[rows] = values
 
 
 def poses_by(values: Ints) -> Iterator[tuple[int, Ints]]:
-    """Each of the values, of shape (n,), and the poses that have it."""
+    """Each different value of `values`, shape (n,), with the poses that have it."""
     for value in np.unique(values).tolist():
         yield value, np.flatnonzero(values == value)
 
 
 def moved_to(arm: Complexes) -> Floats:
-    """M, shape (n, 3, 3), that takes a body's twist to that at a point `arm` away; its inverse is that of `-arm`."""
-    found = np.tile(np.eye(3), (len(arm), 1, 1))
-    found[:, 0, 2], found[:, 1, 2] = -arm.imag, arm.real
-    return found
+    """M, shape (n, 3, 3), which takes a body's twist to a point `arm` away; its inverse is the M of `-arm`."""
+    matrix = np.tile(np.eye(3), (len(arm), 1, 1))
+    matrix[:, 0, 2], matrix[:, 1, 2] = -arm.imag, arm.real
+    return matrix
 
 
 def scales(length: Value, count: int, size: int = 3) -> Floats:
-    """Factors of moments and forces, shape (count, size), where a radian counts as a length, or as one in each pose."""
-    found = np.ones((count, size))
-    found[:, 2:] /= np.reshape(length, (-1, 1))
-    return found
+    """Factors of forces and moments, shape (count, size), that count a radian as `length`, of all poses or of each."""
+    factors = np.ones((count, size))
+    factors[:, 2:] /= np.reshape(length, (-1, 1))
+    return factors
 
 
 def by_wrenches(
     wrenches: Sequence[Floats], compliances: Sequence[Floats], length: Value, size: int = 3
 ) -> tuple[Floats, Floats, Flags]:
-    """Stiffness and compliance, shape (n, size, size), where as many wrenches as needed hold the body, and where so.
+    """Stiffness and compliance, shape (n, size, size), of a body held by `size` wrenches, and where these are regular.
 
-    Wrenches and compliances are those of all legs, shapes (3, m, n) and (m, m, n). Moments are divided by `length`
+    Wrenches and compliances are those of each leg, shapes (3, m, n) and (m, m, n). Moments are divided by `length`
     wherever sizes are compared; on a pin (`size` 2) no leg exerts a moment.
     """
     scale = scales(length, wrenches[0].shape[2], size)
@@ -113,35 +113,35 @@ def by_wrenches(
 
 
 def stiffness_of(compliance: Floats) -> Floats:
-    """Inverses of compliances, nan where one is rigid in some direction."""
+    """Inverses of compliances, shape (n, size, size); nan where the body is rigid in some direction."""
     inverse, soft = inverses(compliance, RIGID)
     return np.where(soft[:, None, None], (inverse + inverse.swapaxes(1, 2)) / 2, np.nan)
 
 
 def inverses(matrix: Floats, limit: float) -> tuple[Floats, Flags]:
-    """Inverses, and where the smallest singular value is certainly above this share of the largest; 0 elsewhere."""
+    """Inverses where the smallest singular value is certainly above `limit` times the largest, else 0; and where so."""
     inverse, regular = np.zeros(matrix.shape), np.ones(len(matrix), dtype=bool)
     try:
         inverse[:] = np.linalg.inv(matrix)
     except np.linalg.LinAlgError:
-        # Some pose is exactly singular; the answers of the others are not to hang on the company they are in.
+        # Some pose is exactly singular: invert the others, so that they do not depend on it.
         regular = np.linalg.det(matrix) != 0
         inverse[regular] = np.linalg.inv(matrix[regular])
-    one, other = (np.einsum("nij,nij->n", part, part) for part in (inverse, matrix))
-    regular &= one * other < 1 / limit**2
+    inverse_norm, matrix_norm = (np.einsum("nij,nij->n", part, part) for part in (inverse, matrix))
+    regular &= inverse_norm * matrix_norm < 1 / limit**2
     inverse[~regular] = 0.0
     return inverse, regular
 
 
 def directional(soft: Floats, direction: Value) -> Floats:
-    """Stiffness to a force in a direction (radians, of all poses or of each), the displacement counted along it."""
+    """Stiffness to a force in a direction (radians, of all poses or of each), by the displacement along it."""
     x, y = np.cos(direction), np.sin(direction)
     with np.errstate(divide="ignore"):
         return np.asarray(1 / (x * x * soft[:, 0, 0] + 2 * x * y * soft[:, 0, 1] + y * y * soft[:, 1, 1]))
 
 
 def _inverse(matrix: Floats) -> tuple[Floats, Flags]:
-    """Inverse (size, size, n) of the square wrench matrix where it is regular, and where that is."""
+    """Inverse (size, size, n) of the square wrench matrix, and where that is regular: elsewhere it is no inverse."""
     norms = np.sqrt((matrix**2).sum(axis=0)).prod(axis=0)
     if len(matrix) == 2:
         (a, b), (c, d) = matrix

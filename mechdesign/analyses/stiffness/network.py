@@ -1,12 +1,12 @@
-"""Bodies held together by joints and beams: a network, its loops, and what lies on the way to each body.
+"""Bodies connected by joints and beams: a network, its loops, and the path from the ground to each body.
 
-Vertices are rigid bodies, and the places of elastic links where something sits on their beams; edges are joints and, of
-an elastic link, the way along its beams from their beginning to each such place. Motors that hold the angle between two
-links that no joint joins are edges of their own: free to shift, held in turning. A tree from the ground reaches every
-vertex; every other edge closes a loop.
+Vertices are rigid bodies, and the places of elastic links at which something is attached to their beams. Edges are
+joints and, for an elastic link, the stretch of its beams from their beginning to each such place. A motor that holds
+the angle between two links without a common joint is an edge of its own, free to shift. A tree from the ground reaches
+every vertex; each other edge closes a loop.
 
-A telescopic leg is two bodies, the pin of a slot a massless block of its own, and a pin of three or more links, none
-of them the ground or the asked body, a massless body to which each is hinged.
+A telescopic leg is two bodies. The pin of a slot is a massless block. A pin of three or more links is a massless body
+to which each of them is hinged, unless one of them is the ground or the asked body.
 """
 
 from __future__ import annotations
@@ -25,17 +25,24 @@ from mechdesign.mechanism.model import Drive, Fixed, Prismatic
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.stiffness import StiffnessSection
 
+# The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
 ASKED = ":asked"
+# Prefix of the massless body of a pin; its point follows.
 _PIN = "pin:"
-Way = tuple[tuple[int, int], ...]
+# Edges along a path, each with its direction: 1 from `a` to `b`, -1 from `b` to `a`.
+EdgePath = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
 class NetworkEdge:
-    """A joint or a beam from vertex `a` to vertex `b`, its freedoms in order from `a`.
+    """A joint, or a stretch of beams, from vertex `a` to vertex `b`, with its freedoms in order from `a`.
 
-    Its `name` is that of the joint's point or slide, or of the link whose beams it goes along; there, `point` is what
-    sits at its end.
+    Parameters
+    ----------
+    name : str
+        Of a joint, its point or slide; of beams, their link.
+    point : str
+        The joint's point; of beams, the point at their end.
     """
 
     a: str
@@ -46,16 +53,22 @@ class NetworkEdge:
 
     @property
     def beam(self) -> Beam | None:
-        """The way along the beams of a link; None of a joint."""
+        """The stretch of a link's beams; None for a joint."""
         return next((element for element in self.elements if isinstance(element, Beam)), None)
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """Bodies of a mechanism, by what joins them.
+    """Bodies of a mechanism and the edges that connect them.
 
-    The `asked` one is that of the `link`, or `ASKED` for a pin (without a link) or the end of an elastic link. `points`
-    are those of each link that moves, with the vertices that bear them.
+    Parameters
+    ----------
+    asked : str
+        The body whose stiffness is computed: that of the `link`, or `ASKED` for a pin or the end of an elastic link.
+    link : str or None
+        None for a pin.
+    points : mapping of str to tuple of (str, str)
+        Points of each moving link, with the vertices to which they belong.
     """
 
     edges: tuple[NetworkEdge, ...]
@@ -65,7 +78,7 @@ class Bodies:
 
 
 def link_of(body: str) -> str:
-    """The link that a body belongs to; empty for massless ones."""
+    """The link to which a body belongs; empty for a massless body."""
     return "" if body.startswith((_PIN, "slot:", ASKED)) else body.removesuffix(":rod")
 
 
@@ -75,9 +88,9 @@ def is_pin(body: str) -> bool:
 
 
 def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Bodies:
-    """All joints of a mechanism, the motors that sit at no joint, and the ways along the beams of elastic links.
+    """Bodies with all joints of a mechanism, the motors without a joint, and the beams of elastic links.
 
-    An elastic asked link is a body of its leg like any other: what is asked is its section at the point.
+    If the asked link is elastic, the asked body is its cross-section at the point `at`.
     """
     graph, description = mechanism.graph, mechanism.description
 
@@ -112,7 +125,7 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
             clamps.append((holder(link, at), ASKED, at))
     for a, b, point in clamps:
         builder.join(a, b, (), point, point)
-    pins = {point: _clusters(point, there, clamps) for point, there in holders.items()}
+    pins = {point: _clusters(point, bodies, clamps) for point, bodies in holders.items()}
     for point, clusters in pins.items():
         builder.hinges(point, clusters)
     for drive in description.drives.values():
@@ -125,7 +138,10 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
 
 @dataclass
 class _Builder:
-    """The edges so far, by slide what rides on each body, and the drives that hold a joint."""
+    """Collects edges.
+
+    `riding` are the slides on each body, with the points that ride there; `held` are the drives that hold a joint.
+    """
 
     mechanism: Mechanism
     section: StiffnessSection
@@ -137,76 +153,76 @@ class _Builder:
     def join(
         self, a: str, b: str, elements: tuple[Element, ...], name: str, point: str, seat: str | None = None
     ) -> None:  # fmt: skip
-        """A joint between two bodies at a point; on body `a` it sits at `seat`."""
+        """Add a joint between two bodies at a point, on body `a` at the point or slide `seat`."""
         self.edges.append(NetworkEdge(self._vertex(a, seat or point), self._vertex(b, point), elements, name, point))
 
     def slide(self, name: str, a: str, b: str, point: str, base: str | None = None) -> None:
-        """A slide of body `b` along body `a`; the bearing of a telescopic leg is at its base."""
+        """Add a slide of body `b` along body `a`; the bearing of a telescopic leg is at its `base`."""
         slide = self.mechanism.graph.slides.index(name)
         drives = self.mechanism.description.drives.values()
-        drive = next((each.name for each in drives if each.kind != "angle" and each.target == name), None)
+        drive = next((d.name for d in drives if d.kind != "angle" and d.target == name), None)
         elements = (*self._freedom(Guide(slide, drive)), *self._bearing(name, base or point, slide))
-        # The beam of the rod of a leg begins at the base.
+        # The beam of a leg's rod begins at the base.
         end = self._vertex(b, point) if base is None else self._node(b, base)
         self.edges.append(NetworkEdge(self._vertex(a, name), end, elements, name, point))
         self.riding.setdefault(a, {})[name] = point
 
     def hinges(self, point: str, clusters: list[list[str]]) -> None:
-        """The pin of clusters of bodies: its bearing gives between two; of more, between each and the pin."""
+        """Add the pin of clusters of bodies, with its bearing: between two, or between each of more and the pin."""
         if len(clusters) < 2:
             return
         fixed = next((cluster for cluster in clusters if GROUND in cluster), None)
         hub = fixed or next((cluster for cluster in clusters if self.asked in cluster), None)
-        # What is fixed, or asked, holds each of the others by itself; an asked pin lies midway between two links.
+        # The ground and the asked body hold each cluster directly; an asked pin lies midway between two links.
         if hub is None or not (fixed or hub == [ASKED] or len(clusters) == 2 or point not in self.section.bearings):
             hub = clusters[0] if len(clusters) == 2 else [_PIN + point]
         give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0) if hub == [ASKED] else 1.0
         for cluster in clusters:
             if cluster is not hub:
-                drive = self._turner(hub, cluster)
+                drive = self._drive_between(hub, cluster)
                 elements = (*self._freedom(Hinge(point, drive)), *self._bearing(point, point, None, give))
-                self.join(self._speaker(hub), self._speaker(cluster), elements, point, point)
+                self.join(self._hinged_body(hub), self._hinged_body(cluster), elements, point, point)
 
     def motor(self, drive: Drive, pins: Mapping[str, list[list[str]]]) -> None:
-        """A motor between two links that no joint joins: at a pin of both, or else at their first points."""
+        """Add a motor between two links without a common joint: at a pin of both, or else at their first points."""
         links = (drive.reference, drive.target)
         seat, point = (next(iter(self.mechanism.description.links[link].points), origin_of(link)) for link in links)
         a, b = links
         for pin, clusters in pins.items():
-            near, far = (next((b for c in clusters for b in c if link_of(b) == link), None) for link in links)
-            if near is not None and far is not None:
-                a, b, seat, point = near, far, pin, pin
+            body, other_body = (next((b for c in clusters for b in c if link_of(b) == link), None) for link in links)
+            if body is not None and other_body is not None:
+                a, b, seat, point = body, other_body, pin, pin
                 break
         elements = (Shift(1.0 + 0j), Shift(1j), *self._freedom(Hinge(point, drive.name)))
         self.join(a, b, elements, drive.name, point, seat)
 
     def beams(self, name: str) -> None:
-        """From the beginning of a link's beams to its other points and to what slides on it."""
+        """Add the beams of a link, from their beginning to each other point and to each slide on the link."""
         link = self.mechanism.description.links[name]
         body = rod_of(name) if link.telescopic else name
-        sitting = {point: point for point in corners_of(link)}
+        points = {point: point for point in corners_of(link)}
         if not link.telescopic:
-            sitting |= {point: point for point in link.points} | self.riding.get(name, {})
-        root, *others = sitting
+            points |= {point: point for point in link.points} | self.riding.get(name, {})
+        root, *seats = points
         section = self.section.elastic[name]
-        for seat in others:
-            beam = Beam(link, root, sitting[seat], section)
-            self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, sitting[seat]))
+        for seat in seats:
+            beam = Beam(link, root, points[seat], section)
+            self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, points[seat]))
 
     def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
-        """Points of every link that moves, and their vertices."""
-        found = {}
+        """Points of each moving link, with their vertices."""
+        points = {}
         for name, link in self.mechanism.description.links.items():
             if name == GROUND:
                 continue
-            here = [(point, self._node(name, point)) for point in link.points]
+            vertices = [(point, self._node(name, point)) for point in link.points]
             if link.telescopic and link.ends is not None:
-                here.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
-            found[name] = tuple(here)
-        return found
+                vertices.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
+            points[name] = tuple(vertices)
+        return points
 
     def _freedom(self, element: Hinge | Guide) -> tuple[Element, ...]:
-        """A joint's freedom, unless a rigid drive holds it."""
+        """The freedom of a joint; none if a rigid drive holds it."""
         self.held.add(element.drive)
         return (element,) if element.drive is None or element.drive in self.section.actuators else ()
 
@@ -219,33 +235,32 @@ class _Builder:
         if body == GROUND or link not in self.section.elastic:
             return body
         telescopic = self.mechanism.description.links[link].telescopic
-        # Of a telescopic leg the first body is rigid, and the second the cantilever, from the leg's base to its end.
+        # The first body of a telescopic leg is rigid; the second is the cantilever from the leg's base to its end.
         return body if telescopic and body == link else f"{body}@{point}"
 
     def _vertex(self, body: str, point: str) -> str:
-        """The vertex of a body at a joint; of the rod of a telescopic leg its end."""
+        """The vertex of a body at a joint; that of a telescopic leg's rod is at its end."""
         link = self.mechanism.description.links.get(link_of(body))
         end = link.ends[1] if link is not None and link.telescopic and link.ends is not None else point
         return self._node(body, end)
 
-    def _turner(self, first: list[str], second: list[str]) -> str | None:
-        """The drive of the angle between two clusters of bodies."""
-        one, two = (set(map(link_of, cluster)) for cluster in (first, second))
+    def _drive_between(self, first: list[str], second: list[str]) -> str | None:
+        """The drive of the angle between two clusters of bodies; None if there is none."""
+        clusters = [set(map(link_of, cluster)) for cluster in (first, second)]
         for drive in self.mechanism.description.drives.values():
-            target, reference = drive.target, drive.reference
-            across = (target in one and reference in two) or (target in two and reference in one)
+            across = any(drive.target in a and drive.reference in b for a, b in (clusters, clusters[::-1]))
             if drive.kind == "angle" and across:
                 return drive.name
         return None
 
-    def _speaker(self, cluster: list[str]) -> str:
-        """The body of a cluster to which others are hinged: where it is fixed or asked, that one."""
+    def _hinged_body(self, cluster: list[str]) -> str:
+        """The body of a cluster to which others are hinged: the ground or the asked body, or else the first."""
         return next((body for body in (GROUND, self.asked) if body in cluster), cluster[0])
 
 
-def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
-    """Bodies at a point, those clamped to each other there together."""
-    clusters = [[body] for body in there]
+def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
+    """Bodies at a point, those that are clamped to each other there in one cluster."""
+    clusters = [[body] for body in bodies]
     for a, b, place in clamps:
         if place == point:
             joined = [c for c in clusters if a in c or b in c]
@@ -255,52 +270,52 @@ def _clusters(point: str, there: list[str], clamps: list[tuple[str, str, str]]) 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Vertices, of which one is asked, edges and loops.
+    """Vertices, edges and loops that carry the `asked` body.
 
     Parameters
     ----------
-    paths : mapping of str to ((int, int), ...)
-        To each vertex, the edges on the way from the ground and whether they are gone along (1) or against (-1).
-    loops : tuple of ((int, int), ...)
-        Edges of each loop, with their directions.
+    paths : mapping of str to EdgePath
+        The path from the ground to each vertex.
+    loops : tuple of EdgePath
+        The edges around each loop.
     points : mapping of str to tuple of (str, str)
-        Of each link, its points and the vertices that bear them.
+        Points of each moving link, with the vertices to which they belong.
     """
 
     edges: tuple[NetworkEdge, ...]
     asked: str
-    paths: Mapping[str, Way]
-    loops: tuple[Way, ...]
+    paths: Mapping[str, EdgePath]
+    loops: tuple[EdgePath, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
 
     @cached_property
-    def ways_along_beams(self) -> tuple[tuple[int, ...], ...]:
-        """Of each elastic link that carries, the edges that go along its beams."""
-        found: dict[str, tuple[int, ...]] = {}
+    def edges_along_beams(self) -> tuple[tuple[int, ...], ...]:
+        """The edges along the beams of each elastic link that carries a load."""
+        edges: dict[str, tuple[int, ...]] = {}
         for k, edge in enumerate(self.edges):
             if edge.beam:
-                found[edge.name] = (*found.get(edge.name, ()), k)
-        return tuple(found.values())
+                edges[edge.name] = (*edges.get(edge.name, ()), k)
+        return tuple(edges.values())
 
     def pin(self, point: str) -> tuple[str, ...]:
-        """Vertices of which the pin at a point is the middle, where it gives: itself, or both ends; none elsewhere."""
+        """Vertices whose mean displacement is that of the elastic pin at a point; none where the pin is rigid."""
         for edge in self.edges:
             if edge.name == point and any(isinstance(element, Bearing) for element in edge.elements):
                 return (edge.a,) if is_pin(edge.a) else (edge.a, edge.b)
         return ()
 
-    def signs(self, way: Sequence[tuple[int, int]]) -> Floats:
-        """Sign of each edge on a way, 0 where it is not on it, shape (edges,)."""
-        found = np.zeros(len(self.edges))
-        for edge, sign in way:
-            found[edge] += sign
-        return found
+    def signs(self, path: Sequence[tuple[int, int]]) -> Floats:
+        """Direction of each edge along a path, 0 for the others, shape (edges,)."""
+        signs = np.zeros(len(self.edges))
+        for edge, sign in path:
+            signs[edge] += sign
+        return signs
 
 
 def build_network(bodies: Bodies) -> Network:
-    """The network of a mechanism; parts that carry nothing have no edges and go along with what they hang on."""
+    """The network of a mechanism; parts that carry no load have no edges and move with the vertex they hang on."""
     kept = carrying(bodies)
-    # Along beams that carry, the way to a place where nothing is borne stays: what is bent before it moves it.
+    # On a link that carries, an edge to an unloaded place stays: the beams before that place bend and move it.
     bent = {edge.name for edge in kept if edge.beam}
     kept = [edge for edge in bodies.edges if edge in kept or (edge.beam and edge.name in bent)]
     network = _looped(tuple(_pinned(kept, bodies)), bodies)
@@ -308,7 +323,7 @@ def build_network(bodies: Bodies) -> Network:
 
 
 def carrying(bodies: Bodies) -> list[NetworkEdge]:
-    """Edges that can carry a load from the asked body: what hangs by one edge is taken off, again and again."""
+    """Edges that can carry a load of the asked body: vertices with a single edge are removed, again and again."""
     edges = list(bodies.edges)
     while True:
         degree = Counter(end for edge in edges for end in (edge.a, edge.b))
@@ -319,33 +334,33 @@ def carrying(bodies: Bodies) -> list[NetworkEdge]:
 
 
 def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:
-    """Massless pins turn with the first link that they join, so that no motion of theirs is open."""
-    found, seen = list[NetworkEdge](), set[str]()
+    """Edges with each massless pin clamped to the first link that it joins, so that the pin cannot turn freely."""
+    pinned, seen = list[NetworkEdge](), set[str]()
     for edge in edges:
         pins = {end for end in (edge.a, edge.b) if is_pin(end) or (end == ASKED and bodies.link is None)}
         if pins - seen:
-            edge = replace(edge, elements=tuple(each for each in edge.elements if not isinstance(each, Hinge)))
+            edge = replace(edge, elements=tuple(element for element in edge.elements if not isinstance(element, Hinge)))
         seen |= pins
-        found.append(edge)
-    return found
+        pinned.append(edge)
+    return pinned
 
 
-def _with_idle(edges: Sequence[NetworkEdge], paths: Mapping[str, Way]) -> dict[str, Way]:
-    """Ways to all vertices: to those that carry nothing as to what they hang on."""
-    found = dict(paths)
+def _with_idle(edges: Sequence[NetworkEdge], paths: Mapping[str, EdgePath]) -> dict[str, EdgePath]:
+    """Paths to all vertices: a vertex that carries no load has the path of the vertex on which it hangs."""
+    all_paths = dict(paths)
     waiting = list(edges)
     while waiting:
-        ready = [edge for edge in waiting if edge.a in found or edge.b in found]
+        ready = [edge for edge in waiting if edge.a in all_paths or edge.b in all_paths]
         for edge in ready:
-            near, far = (edge.a, edge.b) if edge.a in found else (edge.b, edge.a)
-            found.setdefault(far, found[near])
+            near, far = (edge.a, edge.b) if edge.a in all_paths else (edge.b, edge.a)
+            all_paths.setdefault(far, all_paths[near])
         waiting = [edge for edge in waiting if edge not in ready]
-    return found
+    return all_paths
 
 
 def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
-    """A tree from the ground, as short ways as possible, and a loop for every other edge."""
-    paths: dict[str, Way] = {GROUND: ()}
+    """The network of the shortest paths from the ground, and of a loop for every other edge."""
+    paths: dict[str, EdgePath] = {GROUND: ()}
     queue = deque([GROUND])
     tree: set[int] = set()
     while queue:
@@ -360,8 +375,8 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
     for k, edge in enumerate(edges):
         if k not in tree and edge.a in paths and edge.b in paths:
             total: dict[int, int] = {k: 1}
-            for way, sign in ((paths[edge.a], 1), (paths[edge.b], -1)):
-                for other, direction in way:
+            for path, sign in ((paths[edge.a], 1), (paths[edge.b], -1)):
+                for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
     return Network(edges, bodies.asked, paths, tuple(loops), bodies.points)

@@ -18,10 +18,10 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, cross, vector
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
-# Below this share of the largest singular value a direction counts as lost. Elbows at full stretch, found through the
-# root of a difference, are straight to 1e-8 only.
+# Singular values below this fraction of the largest one count as zero. Elbows at full stretch, which are found through
+# the root of a difference, are straight to 1e-8 only.
 RANK = 1e-7
-# Below this share of a leg's largest compliance its smallest is rounding: rigid.
+# Compliances below this fraction of a leg's largest one are rounding: the leg is rigid there.
 RIGID = 1e-12
 
 
@@ -42,9 +42,16 @@ def screw_product(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class LegScrews:
-    """A serial leg in n poses: twists, shape (3, n), of its free and its elastic joints, and compliances of the latter.
+    """A serial leg in n poses.
 
-    `base` and `tip` are the places of its first and last joint from the origin.
+    Parameters
+    ----------
+    passive, elastic : sequence of ndarray, shape (3, n)
+        Twists of its free joints, and of its elastic ones.
+    compliance : sequence of float or ndarray, shape (n,)
+        Compliances of the elastic joints.
+    base, tip : complex ndarray, shape (n,)
+        Places of its first and last joint, seen from the origin.
     """
 
     passive: Sequence[Floats]
@@ -54,7 +61,7 @@ class LegScrews:
     tip: Complexes
 
     def take(self, index: Ints) -> LegScrews:
-        """Poses by index."""
+        """The leg in the poses `index`."""
         return LegScrews(
             [twist[:, index] for twist in self.passive],
             [twist[:, index] for twist in self.elastic],
@@ -65,7 +72,7 @@ class LegScrews:
 
 
 def joint_rank(passive: Sequence[Floats], length: Value) -> Ints | int:
-    """Rank of the free joints' twists in each pose, rotations scaled by a length, or one of each pose."""
+    """Rank of the free joints' twists in each pose; rotations are scaled by `length`, one for all poses or one each."""
     count = len(passive)
     if count < 2:
         return count
@@ -98,10 +105,11 @@ def reciprocal_wrenches(passive: Sequence[Floats], rank: int, length: Value, cou
 
 
 def _one_joint(twist: Floats) -> Floats:
+    """Two wrenches, shape (3, 2, n), on which the twist of a single joint does no work."""
     dx, dy, turn = twist
     one, zero = np.ones(dx.shape), np.zeros(dx.shape)
     if turn.all():
-        # All forces through the pin.
+        # A hinge: all forces through its pin.
         return np.stack([np.stack([one, zero]), np.stack([zero, one]), np.stack([-dx / turn, -dy / turn])])
     return np.stack([np.stack([-dy, zero]), np.stack([dx, zero]), np.stack([zero, one])])
 
@@ -135,7 +143,7 @@ class Spring(NamedTuple):
 
 
 def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> list[Spring]:
-    """Springs that hold the body as a leg does: one on the line of one wrench, two for two; none for three.
+    """Springs that hold the body as a leg does: one along a single wrench, two for two wrenches, none for three.
 
     Two wrenches reciprocal to a slide give two parallel springs at +-a along it from the tip, a = sqrt(c11/c22), the
     one away from the base first [S4, eqs. 40-42]; two reciprocal to a hinge the principal springs through its pin, the
@@ -147,15 +155,16 @@ def equivalent_springs(wrenches: Floats, chain: LegScrews, length: Value) -> lis
     if count != 2:
         return []
     twist = screw_product(wrenches[:, 0], wrenches[:, 1])
-    far = np.hypot(twist[0], twist[1]) > np.abs(twist[2]) * length / RANK
+    sliding = np.hypot(twist[0], twist[1]) > np.abs(twist[2]) * length / RANK
     slides, pins = _parallel_springs(twist, chain), _pin_springs(twist, chain)
     return [
-        Spring(*(np.where(far, a, b) for a, b in zip(slide, pin, strict=True)))
+        Spring(*(np.where(sliding, a, b) for a, b in zip(slide, pin, strict=True)))
         for slide, pin in zip(slides, pins, strict=True)
     ]
 
 
 def _single(wrench: Floats, chain: LegScrews, length: Value) -> Spring:
+    """The spring along one wrench (3, n): linear, or rotational where the wrench is a pure moment."""
     compliance = constraint_compliance(wrench[:, None], chain)[0, 0]
     force = vector(wrench[0], wrench[1])
     size = np.abs(force)
@@ -171,6 +180,7 @@ def _single(wrench: Floats, chain: LegScrews, length: Value) -> Spring:
 
 
 def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
+    """The two springs of wrenches that are reciprocal to the slide `twist`, shape (3, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         along = vector(twist[0], twist[1])
         along = along / np.abs(along)
@@ -201,6 +211,7 @@ def _parallel_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
 
 
 def _pin_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
+    """The two springs of wrenches that are reciprocal to the hinge `twist`, shape (3, n)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place = vector(-twist[1] / twist[2], twist[0] / twist[2])
         basis = _one_joint(np.stack([place.imag, -place.real, np.ones(place.shape)]))
@@ -209,7 +220,10 @@ def _pin_springs(twist: Floats, chain: LegScrews) -> list[Spring]:
 
 
 def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
-    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi)."""
+    """Smallest and largest stiffness to a force over all directions, and the angle of the largest in [0, pi).
+
+    `soft` are compliances, shape (n, 2 or more, 2 or more).
+    """
     mean, half = (soft[:, 0, 0] + soft[:, 1, 1]) / 2, (soft[:, 0, 0] - soft[:, 1, 1]) / 2
     radius = np.hypot(half, soft[:, 0, 1])
     with np.errstate(divide="ignore"):
@@ -221,6 +235,7 @@ def principal(soft: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _scaled(twist: Floats, length: Value) -> Floats:
+    """Twists (3, n) with rotations scaled by `length`, of unit size."""
     unit = twist.copy()
     unit[2] *= length
     return np.asarray(unit / np.linalg.norm(unit, axis=0))

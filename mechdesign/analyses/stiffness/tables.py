@@ -22,7 +22,7 @@ from mechdesign.study.poses import Poses
 
 @dataclass(frozen=True, eq=False)
 class Springs(Lanes):
-    """Rows of the table of springs."""
+    """Rows of the table of springs: pose and leg (numbers), stiffness, a place on the line and its angle (radians)."""
 
     row: Ints
     leg: Ints
@@ -32,13 +32,13 @@ class Springs(Lanes):
 
     @staticmethod
     def sorted(parts: Sequence[Springs]) -> Springs:
-        """All together, by pose and leg."""
-        none = Springs(*(np.zeros(0, dtype) for dtype in (np.intp, np.intp, float, complex, float)))
-        whole = Springs.joined([none, *parts])
-        return whole.take(np.lexsort((whole.leg, whole.row)))
+        """All springs, ordered by pose and leg."""
+        empty = Springs(*(np.zeros(0, dtype) for dtype in (np.intp, np.intp, float, complex, float)))
+        springs = Springs.joined([empty, *parts])
+        return springs.take(np.lexsort((springs.leg, springs.row)))
 
     def counts(self, designs: int, poses: int) -> Ints:
-        """How many each of several designs has, which have as many poses."""
+        """Number of springs of each design; `poses` is the number of poses of a design."""
         return np.bincount(self.row // poses, minlength=designs)
 
 
@@ -57,7 +57,7 @@ def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str)
 def stiffness_table(
     study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: Value | None
 ) -> Table:
-    """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
+    """``stiffness.csv``; `direction` is in the study's units, one for all poses or each."""
     units, soft = study.units, held.compliance
     size = soft.shape[1]
     low, high, angle = principal(soft)
@@ -89,15 +89,16 @@ def stiffness_table(
 def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Table:
     """``eigen.csv``: eigen-stiffnesses of a body, softest first, and the twists along which they act.
 
-    Of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size meets a wrench along itself.
+    They are those of K with rotations counted as lengths: a twist (dx, dy, length dphi) of unit size causes a wrench
+    along itself.
     """
     scale = 1 / scales(length, len(soft))
-    known = np.isfinite(soft).all(axis=(1, 2))
+    finite = np.isfinite(soft).all(axis=(1, 2))
     values, vectors = np.full((len(soft), 3), np.nan), np.full((len(soft), 3, 3), np.nan)
-    values[known], vectors[known] = np.linalg.eigh((soft * scale[:, :, None] * scale[:, None])[known])
+    values[finite], vectors[finite] = np.linalg.eigh((soft * scale[:, :, None] * scale[:, None])[finite])
     with np.errstate(divide="ignore"):
         stiffness = np.where(values > 1e-13 * values[:, -1:], 1 / values, np.where(np.isnan(values), np.nan, np.inf))
-    # Softest first; a twist points up, or to the right.
+    # Softest first; the first entry of a twist that is not zero is positive.
     order = slice(None, None, -1)
     stiffness, twists = stiffness[:, order], vectors.swapaxes(1, 2)[:, order]
     lead = np.argmax(np.abs(twists) > 1e-9, axis=2)
@@ -116,7 +117,7 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Tabl
 
 
 def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
-    """``compliance.csv``: C11 ... C33."""
+    """``compliance.csv``: C11 to C33, a row for each pose."""
     columns = pose_columns(study, poses) + _entries(study, "C", soft, "compliance", "displacement per load")
     return Table(
         "compliance", tuple(columns), "twist (dx, dy, dphi in radians) at the asked point per load, axes of the world"
@@ -124,7 +125,7 @@ def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
 
 
 def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
-    """``springs.csv``: a row a pose, leg and spring."""
+    """``springs.csv``: a row for each pose, leg and spring."""
     units = study.units
     per_radian = units.label("rotational_stiffness")
     columns = [
@@ -140,7 +141,7 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Spri
 
 
 def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
-    """``deflections.csv``: a row a pose and load; `loads` of shape (poses, loads, 3)."""
+    """``deflections.csv``: a row for each pose and load; `loads` of shape (poses, loads, 3)."""
     units = study.units
     size = soft.shape[1]
     moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
@@ -156,7 +157,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
 
 
 def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
-    """``forces.csv``: what every joint bears, a row a pose, load and joint."""
+    """``forces.csv``: what every joint bears, a row for each pose, load and joint."""
     edges = [network.edges[k] for k in joints_of(network)]
     count, joints, loads, _ = effects.forces.shape
     values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
@@ -179,7 +180,7 @@ def forces_table(study: Study, poses: Poses, network: Network, effects: Effects)
 
 
 def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
-    """``displacements.csv``: where every point goes, a row a pose, load and point of a link."""
+    """``displacements.csv``: displacements of all points, a row for each pose, load and point of a link."""
     points = points_of(network)
     count, number, loads = effects.moves.shape
     moved = effects.moves.swapaxes(1, 2).ravel()
@@ -198,12 +199,12 @@ def displacements_table(study: Study, poses: Poses, network: Network, effects: E
 
 
 def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
-    """Pose columns and the number of the load, for so many rows of each."""
+    """Columns of the pose and of the load's number, for `rows` rows of each pose and load."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
     numbers = np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count)
     return [*pose_columns(study, poses, repeat), Column("load", numbers, "", "which of the study's loads")]
 
 
 def _link(vertex: str) -> str:
-    """The link that a vertex is a part of; of massless ones their kind."""
+    """The link to which a vertex belongs; of a massless body its name."""
     return vertex.split("@")[0].removesuffix(":rod").removeprefix(":")

@@ -167,7 +167,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.analyses.stiffness.elements import corners_of, course_of
+    from mechdesign.analyses.stiffness.elements import beam_line, corners_of
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
@@ -175,7 +175,7 @@ def _lines(study: Study, name: str, configuration: Configuration, index: int) ->
     yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in corners])
     if link.telescopic or len(corners) < 2:
         return
-    course = course_of(link, configuration)
+    course = beam_line(link, configuration)
     riding = [joint.point for joint in mechanism.description.joints.values()
               if not isinstance(joint, Fixed) and joint.line.link == name]  # fmt: skip
     for point in (*link.points, *riding):

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
-from mechdesign.analyses.stiffness.elements import corners_of, course_of
+from mechdesign.analyses.stiffness.elements import beam_line, corners_of
 from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
@@ -123,7 +123,7 @@ def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
 
     shapes = [(np.array([at]), shift(network.asked, at)[None])]
     bent = set()
-    for ways in network.ways_along_beams:
+    for ways in network.edges_along_beams:
         bent.add(network.edges[ways[0]].name)
         shapes += _bent([network.edges[k] for k in ways], drawn.configuration, moved, shift)
     for link, points in network.points.items():
@@ -144,7 +144,7 @@ def _bent(
     """The beams of an elastic link between the places where something sits, and its brackets."""
     beam = ways[0].beam
     assert beam is not None
-    course = course_of(beam.link, configuration)
+    course = beam_line(beam.link, configuration)
     # The rod of a telescopic leg slides in its cylinder, whose pin stays where it is.
     root = beam.link.name if beam.link.telescopic else ways[0].a
     sitting = [(root, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
