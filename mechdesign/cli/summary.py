@@ -12,7 +12,8 @@ import numpy as np
 
 from mechdesign.cli.execution import Outcome
 from mechdesign.errors import printable, printable_lines
-from mechdesign.results import Column, Table
+from mechdesign.experiments.columns import SUMMARY
+from mechdesign.results import Table
 
 if TYPE_CHECKING:
     from junitparser import JUnitXml
@@ -49,11 +50,11 @@ def summary(answers: Sequence[Outcome]) -> Table:
         "warnings": (int, lambda given: len(given.warnings)),
         "directory": (str, lambda given: str(given.directory) if given.rows else ""),
     }
-    columns = (
-        Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
+    columns = {
+        name: np.array([tell_of(given) for given in answers if given.command], dtype=kind)
         for name, (kind, tell_of) in found.items()
-    )
-    return Table("summary", tuple(columns), meaning="what became of each question")
+    }
+    return SUMMARY.table(SUMMARY.columns({}, **columns))
 
 
 def junit(answers: Sequence[Outcome]) -> str:

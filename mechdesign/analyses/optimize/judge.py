@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.batch import Evaluated
+from mechdesign.analyses.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, goals_of, unit_of
@@ -174,35 +174,44 @@ class Designs:
         """Unit of a goal or a variable, where it is known."""
         for each in self.goals:
             if each.name == name:
-                return self._unit_and_meaning(each)[0]
+                return self._unit(each)
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
         """Unit of what a condition bounds; none of the scale of a shape."""
-        return "" if condition.outline is not None else self._unit_and_meaning(condition)[0]
+        return "" if condition.outline is not None else self._unit(condition)
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
         for name in self.variables:
-            yield Column(name, self.shown(name)[rows], self.unit_of(name), "design variable")
+            yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
         for each in self.goals:
             # A parameter that varies is a goal and a variable at once.
             if each.name not in self.variables:
-                yield Column(each.name, self.found[each][rows], *self._unit_and_meaning(each))
+                yield self._column(each, self.found[each][rows])
         for each, error in self.errors.items() if errors else ():
             if each in self.goals:
-                meaning = f"estimated error of {each.name}"
-                yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
+                yield DESIGNS["<result>_error"].column(error[rows], self._unit(each), result=each.name)
         for each in self.conditions:
             if each.outline is not None:
-                yield Column(each.column, self.found[each][rows], "", self.meanings[each.column][1])
-        yield from shared(self.study.units, CPI=self.cpi[rows])
+                words = {"meaning of the result": self.meanings[each.column][1]}
+                yield RESULT.column(self.found[each][rows], "", each.column, **words)
+        yield CPI.column(self.cpi[rows])
 
-    def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
-        if judged.expression is not None:
-            return unit_of(self.study, judged.column), "expression over parameters"
-        worst = (self._coordinate_unit(judged), f"worst row of {judged.name}")
-        return self.meanings.get(judged.column, worst) if judged.regional else worst
+    def _column(self, goal: Goal, values: Floats) -> Column:
+        if goal.expression is not None:
+            return EXPRESSION.column(values, self._unit(goal), goal.name)
+        if goal.regional and goal.column in self.meanings:
+            words = {"meaning of the result": self.meanings[goal.column][1]}
+            return RESULT.column(values, self._unit(goal), goal.name, **words)
+        return WORST_ROW.column(values, self._unit(goal), result=goal.name)
+
+    def _unit(self, goal: Goal) -> str:
+        if goal.expression is not None:
+            return unit_of(self.study, goal.column)
+        if goal.regional and goal.column in self.meanings:
+            return self.meanings[goal.column][0]
+        return self._coordinate_unit(goal)
 
     def _coordinate_unit(self, judged: Goal) -> str:
         """Unit of a coordinate, its rates and its error; none where a goal is something else."""
