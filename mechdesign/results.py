@@ -82,7 +82,7 @@ class ColumnKind:
         return self.name.split(", ")
 
     def column(self, values: ArrayLike, unit: str = "", name: str = "", /, **words: str) -> Column:
-        """A column of this kind, of one of its names, with the words that stand at its places."""
+        """A column of this kind, with the words that stand at its places; `name` is one of several names."""
         return Column(_filled(name or self.name, words), np.asarray(values), unit, _filled(self.meaning, words), self)
 
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from mechdesign.results import ColumnKind
+from importlib import import_module
+
+from mechdesign.results import ColumnKind, TableKind
 from mechdesign.study import Units
 
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")
 GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
 VALID = ColumnKind("valid", "1 where the pose is assembled and within its limits")
+
+
+def tables_of(command: str) -> list[TableKind]:
+    """The tables of a question, as the `columns` of its folder declare them."""
+    declared = vars(import_module(f"mechdesign.analyses.{command}.columns"))
+    return [table for table in declared.values() if isinstance(table, TableKind)]
 
 
 def power_of_length(units: Units, power: int) -> str:

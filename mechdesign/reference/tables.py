@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from importlib import import_module
 
+from mechdesign.analyses.columns import tables_of
 from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.experiments import columns
 from mechdesign.indices import REGIONAL, STATISTICS
@@ -16,10 +16,8 @@ from mechdesign.results import PLACE, ColumnKind, TableKind
 @cache
 def tables() -> tuple[tuple[str, TableKind], ...]:
     """All tables with the command that writes each, a command's together."""
-    declared = [(name, vars(import_module(f"mechdesign.analyses.{name}.columns"))) for name in COMMANDS]
-    found = [(name, each) for name, words in declared for each in words.values() if isinstance(each, TableKind)]
     cases = (("run", columns.SUMMARY), (SWEEP.name, columns.SWEEP), (SENSITIVITIES.name, columns.SENSITIVITIES))
-    return (*found, *cases)
+    return (*((name, table) for name in COMMANDS for table in tables_of(name)), *cases)
 
 
 def entries() -> Iterator[Entry]:

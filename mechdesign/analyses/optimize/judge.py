@@ -22,7 +22,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
-from mechdesign.results import Column
+from mechdesign.results import Column, ColumnKind
 from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
@@ -174,12 +174,12 @@ class Designs:
         """Unit of a goal or a variable, where it is known."""
         for each in self.goals:
             if each.name == name:
-                return self._unit(each)
+                return self._kind(each)[1]
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
         """Unit of what a condition bounds; none of the scale of a shape."""
-        return "" if condition.outline is not None else self._unit(condition)
+        return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
@@ -188,30 +188,25 @@ class Designs:
         for each in self.goals:
             # A parameter that varies is a goal and a variable at once.
             if each.name not in self.variables:
-                yield self._column(each, self.found[each][rows])
+                kind, unit, meaning = self._kind(each)
+                words = {"parameter": each.name, "result": each.name, "meaning of the result": meaning}
+                yield kind.column(self.found[each][rows], unit, **words)
         for each, error in self.errors.items() if errors else ():
             if each in self.goals:
-                yield DESIGNS["<result>_error"].column(error[rows], self._unit(each), result=each.name)
+                yield DESIGNS["<result>_error"].column(error[rows], self._kind(each)[1], result=each.name)
         for each in self.conditions:
             if each.outline is not None:
-                words = {"meaning of the result": self.meanings[each.column][1]}
-                yield RESULT.column(self.found[each][rows], "", each.column, **words)
+                words = {"result": each.column, "meaning of the result": self.meanings[each.column][1]}
+                yield RESULT.column(self.found[each][rows], **words)
         yield CPI.column(self.cpi[rows])
 
-    def _column(self, goal: Goal, values: Floats) -> Column:
+    def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
+        """Kind of a goal's column, its unit, and the meaning of a number of the workspace."""
         if goal.expression is not None:
-            return EXPRESSION.column(values, self._unit(goal), goal.name)
+            return EXPRESSION, unit_of(self.study, goal.column), ""
         if goal.regional and goal.column in self.meanings:
-            words = {"meaning of the result": self.meanings[goal.column][1]}
-            return RESULT.column(values, self._unit(goal), goal.name, **words)
-        return WORST_ROW.column(values, self._unit(goal), result=goal.name)
-
-    def _unit(self, goal: Goal) -> str:
-        if goal.expression is not None:
-            return unit_of(self.study, goal.column)
-        if goal.regional and goal.column in self.meanings:
-            return self.meanings[goal.column][0]
-        return self._coordinate_unit(goal)
+            return RESULT, *self.meanings[goal.column]
+        return WORST_ROW, self._coordinate_unit(goal), ""
 
     def _coordinate_unit(self, judged: Goal) -> str:
         """Unit of a coordinate, its rates and its error; none where a goal is something else."""

@@ -201,9 +201,9 @@ def index_columns(study: Study, question: Question) -> dict[str, Column]:
     words = study.units.labels | {"as resistivity": index("resistivity").unit(study, question.field)}
     found = {column.name: column for column in INDICES.columns(words, **dict.fromkeys(COLUMNS, ()))}
     for name in (name for name in question.wanted if name not in COLUMNS):
-        declared, kind = index(split(name)[0]), split(name)[1]
-        unit, words = declared.unit(study, question.field), {"meaning of the index": declared.meaning}
-        found[name] = INDICES[f"<index>_{kind}"].column((), unit, name, **words)
+        local, kind = split(name)
+        words = {"index": local, "meaning of the index": index(local).meaning}
+        found[name] = INDICES[f"<index>_{kind}"].column((), index(local).unit(study, question.field), **words)
     return found
 
 
@@ -223,7 +223,7 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         determinant = np.copysign(determinant, np.broadcast_to(middle, len(found))[patch])
     columns = [
         LOCAL["<index>"].column(np.broadcast_to(each.values(local), z.shape), each.index.unit(study, question.field),
-                                each.name, **{"meaning of the index": each.index.meaning})
+                                **{"index": each.name, "meaning of the index": each.index.meaning})
         for each in prepare(study, list(names))
     ]  # fmt: skip
     words = study.units.labels | {"as its outputs over the drives, multiplied": per_area}
