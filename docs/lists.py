@@ -168,7 +168,11 @@ def table_page(command: str, found: Iterable[TableKind]) -> str:
                 for column in table.kinds]  # fmt: skip
         lines = ["| column | meaning | unit | formula |", "| --- | --- | --- | --- |",
                  *("| " + " | ".join(row) + " |" for row in rows)]  # fmt: skip
-        parts += [f"## {table.file}", f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.", "\n".join(lines)]
+        parts += [
+            f"## {table.name}.csv",
+            f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.",
+            "\n".join(lines),
+        ]
     return _page(f"Tables of {command}", parts)
 
 

@@ -99,11 +99,6 @@ class TableKind:
         """A table of column kinds, or of their name, meaning, unit and formula."""
         return cls(name, meaning, tuple(ColumnKind(*kind) if isinstance(kind, tuple) else kind for kind in kinds))
 
-    @property
-    def file(self) -> str:
-        """Name of its file."""
-        return f"{self.name}.csv"
-
     @cached_property
     def _by_name(self) -> dict[str, ColumnKind]:
         return {name: kind for kind in self.kinds for name in kind.names}

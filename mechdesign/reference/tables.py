@@ -25,10 +25,10 @@ def entries() -> Iterator[Entry]:
     where: dict[tuple[str, ColumnKind], list[str]] = {}
     for command, table in tables():
         words = tuple((kind.name, kind.meaning) for kind in table.kinds)
-        yield Entry(table.file, "table", f"{table.meaning}; mechdesign {command} writes it", words=words)
+        yield Entry(f"{table.name}.csv", "table", f"{table.meaning}; mechdesign {command} writes it", words=words)
         for kind in table.kinds:
             for name in kind.names:
-                where.setdefault((name, kind), []).append(table.file)
+                where.setdefault((name, kind), []).append(f"{table.name}.csv")
     for (name, kind), files in where.items():
         word = PLACE.sub("*", name)
         # Numbers of a workspace are results that have entries of their own.

@@ -31,7 +31,8 @@ _STUDIES = {
 def names(command: str, formats: str = "", *, animate: bool = False) -> Iterator[str]:
     """Patterns of the names of a command's tables and studies, and of its pictures in these formats."""
     # The one table of cases is named as its command.
-    yield from [table.file for table in tables_of(command)] if command in COMMANDS else [f"{command}.csv"]
+    tables = [table.name for table in tables_of(command)] if command in COMMANDS else [command]
+    yield from (f"{table}.csv" for table in tables)
     yield from _STUDIES.get(command, "").split()
     pictures = (MECHANISM, *_PICTURES[command].split(), *(INDEX_NAMES if command == "workspace" else ()))
     yield from (f"{name}.{kind}" for kind in formats.split(",") for name in pictures)

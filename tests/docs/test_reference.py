@@ -145,10 +145,10 @@ def test_no_column_of_the_reference_is_idle():
     for name, told in ((name, told) for each in found for name, told in each["tables"].items()):
         seen.setdefault(name, set()).update(column["name"] for column in told["columns"])
     idle = [
-        (table.file, kind.name)
+        (f"{table.name}.csv", kind.name)
         for command, table in tables()
         for kind in table.kinds
-        if command != "run" and not any(named(kind, name) for name in seen.get(table.file, ()))
+        if command != "run" and not any(named(kind, name) for name in seen.get(f"{table.name}.csv", ()))
     ]
     assert idle == []
 

@@ -16,7 +16,7 @@ def unsaid(manifest: Mapping[str, Any]) -> list[str]:
     units = Units(**manifest["study"]["resolved"].get("units", {}))
     wrong = []
     for name, told in manifest["tables"].items():
-        alike = [table for _, table in tables() if table.file == name and re.fullmatch(_pattern(table.meaning),
+        alike = [table for _, table in tables() if f"{table.name}.csv" == name and re.fullmatch(_pattern(table.meaning),
                                                                                        told["meaning"])]  # fmt: skip
         for column in told["columns"]:
             fit = [kind for table in alike for kind in table.kinds if _says(kind, column["name"], column["meaning"])]

@@ -26,6 +26,7 @@ from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.results import POSES_ONLY, Column, TableKind
 from mechdesign.statistics import Asked, Part
+from mechdesign.study import Study
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
@@ -228,15 +229,12 @@ class Along:
 
     def place_columns(self, table: TableKind, line: Ints, places: Floats) -> list[Column]:
         """Places of motions as columns of a table: what is swept, or the row and all coordinates that move."""
-        units, mechanism, poses = self.question.study.units, self.question.study.mechanism, self.question.poses
+        study, poses = self.question.study, self.question.poses
         if poses.swept is not None:
-            unit = units.label(mechanism.quantity(poses.swept))
-            return [table["<swept>"].column(self.shown(line, places), unit, swept=poses.swept)]
-        values = poses.along(line, places).values
-        return [
-            *table.columns({}, row=places),
-            *(GIVEN.column(values[c], units.label(mechanism.quantity(c)), coordinate=c) for c in poses.moving),
-        ]
+            return table.columns(of_swept(study, poses.swept, ""), **{"<swept>": self.shown(line, places)})
+        values, label, quantity = poses.along(line, places).values, study.units.label, study.mechanism.quantity
+        given = [GIVEN.column(values[name], label(quantity(name)), coordinate=name) for name in poses.moving]
+        return table.columns({}, row=places) + given
 
     def at(self, line: Ints, s: Floats) -> dict[str, Floats]:
         """Every function at places of lines."""
@@ -349,6 +347,12 @@ def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:
         return {OVER: POSES_ONLY}
     poses = [name for name in names if name not in along.functions.names]
     return {OVER: "over the motion" + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")}
+
+
+def of_swept(study: Study, swept: str | None, otherwise: str) -> dict[str, str]:
+    """For columns that hold what is swept: its name and unit; where nothing is, what they hold otherwise."""
+    unit = "" if swept is None else study.units.label(study.mechanism.quantity(swept))
+    return {"swept": swept or otherwise, "as what is swept": unit}
 
 
 # A group is singular where its conditioning is below this and turns back or ends.

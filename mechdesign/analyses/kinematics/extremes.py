@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.along import Along, of_swept, over
 from mechdesign.analyses.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.targets import totals
@@ -71,16 +71,11 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
         span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
-    words = {
-        "swept": swept or "place in rows (from 0)",
-        "as what is swept": study.units.label(mechanism.quantity(swept)) if swept is not None else "",
-    }
-    columns = EXTREMES.columns(
-        words, output=np.tile(np.array(list(curves)), poses.designs), min=low.T.ravel(), min_at=low_at.T.ravel(),
-        max=high.T.ravel(), max_at=high_at.T.ravel(), range=span.T.ravel(), time_ratio=ratio.T.ravel(),
-        unit=np.tile(np.array(units, dtype=str), poses.designs),
-    )  # fmt: skip
-    return EXTREMES.table(columns, **over(along, list(curves)))
+    return EXTREMES.table(EXTREMES.columns(
+        of_swept(study, swept, "place in rows (from 0)"), output=np.tile(np.array(list(curves)), poses.designs),
+        min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
+        range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
+    ), **over(along, list(curves)))  # fmt: skip
 
 
 def _between(
@@ -134,10 +129,7 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
             ])  # fmt: skip
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
     rms, mean, largest, where = numbers.reshape(4, -1)
-    words = {
-        "swept": swept or "row (from 0)",
-        "as what is swept": study.units.label(study.mechanism.quantity(swept)) if swept is not None else "",
-    }
+    words = of_swept(study, swept, "row (from 0)")
     units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
     outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
     columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.along import Along, of_swept, over
 from mechdesign.analyses.kinematics.columns import LOOPS, TOGGLES
 from mechdesign.analyses.kinematics.motion import MotionQuestion
 from mechdesign.analyses.poses import SolvedPoses, solve_poses
@@ -66,9 +66,7 @@ def loops_table(
     """
     study, poses = question.study, question.poses
     every = [loop for own in designs for loop in own]
-    words = {**study.units.labels, "swept": "row", "as what is swept": ""}
-    if along is not None and poses.swept is not None:
-        words |= {"swept": poses.swept, "as what is swept": study.units.label(study.mechanism.quantity(poses.swept))}
+    words = study.units.labels | of_swept(study, None if along is None else poses.swept, "row")
     columns = [
         *LOOPS.columns(words, kind=[loop.kind for loop in every]),
         *(LOOPS["<part>"].column([loop.links[k] for loop in every], part=part) for k, part in enumerate(ROLES)),
@@ -80,10 +78,8 @@ def loops_table(
     ]  # fmt: skip
     both = _at_poses(study, poses, loops) if along is None else _between(along, len(loops))
     for (values, places), end in zip(both, ("min", "max"), strict=True):
-        angles = values.T.ravel() / study.units.angle_factor
-        columns += LOOPS.columns(
-            words, **{f"transmission_{end}": angles, f"transmission_{end}_at": places.T.ravel()}
-        )  # fmt: skip
+        columns += LOOPS.columns(words, **{f"transmission_{end}": values.T.ravel() / study.units.angle_factor})
+        columns += LOOPS.columns(words, **{f"transmission_{end}_at": places.T.ravel()})
     return LOOPS.table(columns, **over(along, ()))
 
 

@@ -392,9 +392,8 @@ class Motion:
         study = self.question.study
         far = error.output in study.mechanism.points
         kind = MOTION["<point>_error" if far else "<output>_error"]
-        return kind.column(
-            error.values, study.units.label(error.quantity), point=error.output, output=error.output
-        )  # fmt: skip
+        words = {"point": error.output, "output": error.output}
+        return kind.column(error.values, study.units.label(error.quantity), **words)
 
 
 def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict[str, Value]:

@@ -22,27 +22,24 @@ def motion_table(motion: Motion) -> Table:
 
 def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
-    question = motion.question
+    question, derivative = motion.question, JACOBIAN["<output>_by_<drive>"]
     columns = motion.pose_columns()
     for output in question.listed:
         for drive in question.drives:
-            name = entry(output, drive)
-            columns.append(JACOBIAN["<output>_by_<drive>"].column(
-                motion.arrays[name], _per(question.study, output, drive), output=output.name, drive=drive.name
-            ))  # fmt: skip
+            values, unit = motion.arrays[entry(output, drive)], _per(question.study, output, drive)
+            columns.append(derivative.column(values, unit, output=output.name, drive=drive.name))
     return JACOBIAN.table([*columns, VALID.column(motion.valid)])
 
 
 def centres_table(motion: Motion) -> Table:
     """Instant centres of pairs of links, a row a pose."""
-    length, columns = motion.question.study.units.label("length"), motion.pose_columns()
+    columns = motion.pose_columns()
     for centre in motion.question.centres:
-        pair, kinds = {"a": centre.one, "b": centre.other}, INSTANT_CENTRES
-        for axis in "xy":
-            name = f"<a>.<b>.{axis}"
-            columns.append(kinds[name].column(motion.arrays[f"{centre.name}.{axis}"], length, name, **pair))
-        numbers = np.nan_to_num(motion.arrays[f"{centre.name}.motion"]).round().astype(int)
-        columns.append(kinds["<a>.<b>.motion"].column(np.array(MOTIONS)[numbers], **pair))
+        words = motion.question.study.units.labels | {"a": centre.one, "b": centre.other}
+        x, y, number = (motion.arrays[f"{centre.name}.{what}"] for what in ("x", "y", "motion"))
+        motions = np.array(MOTIONS)[np.nan_to_num(number).round().astype(int)]
+        values = {"<a>.<b>.x": x, "<a>.<b>.y": y, "<a>.<b>.motion": motions}
+        columns += INSTANT_CENTRES.columns(words, **values)
     return INSTANT_CENTRES.table([*columns, VALID.column(motion.valid)])
 
 

@@ -384,11 +384,10 @@ def growth_table(designs: Designs) -> Table:
     earlier = counts - counts // 10
     values = designs.values[rows] * signs_of(designs)
     volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
-    columns = HYPERVOLUME.columns(
+    return HYPERVOLUME.table(HYPERVOLUME.columns(
         {}, designs=counts, front=[len(front(values[: np.searchsorted(rows, number)])) for number in counts],
         hypervolume=volume, growth=np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0),
-    )  # fmt: skip
-    return HYPERVOLUME.table(columns)
+    ))  # fmt: skip
 
 
 def pareto_table(designs: Designs) -> Table:

@@ -243,14 +243,13 @@ def _allocation(last: _Round) -> Table:
     prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, each, strict=True)])
               for each in (given, sizes)]  # fmt: skip
     names = np.array([tolerance.grade(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)])
-    columns = ALLOCATION.columns(
+    return ALLOCATION.table(ALLOCATION.columns(
         {}, source=np.array([tolerance.name for tolerance in found]),
         kind=np.array([tolerance.kind for tolerance in found]), given=np.array(given), allocated=np.array(sizes),
         unit=np.array([tolerance.unit for tolerance in found]), **({"grade": names} if last.model.steps else {}),
         cost_given=prices[0], cost_allocated=prices[1],
         share=_shares(last.model, last.scales)[_worst(last.model.aim.level(last.analytic))[1]],
-    )  # fmt: skip
-    return ALLOCATION.table(columns)
+    ))  # fmt: skip
 
 
 def _confirmation(last: _Round) -> Table:
@@ -260,12 +259,12 @@ def _confirmation(last: _Round) -> Table:
     value, worst, best, analytic, target = (
         aim.shown(part[place]) for part in (said.value, said.worst, said.best, last.analytic, aim.measure(last.wanted))
     )
-    columns = CONFIRMATION.columns(
+    poses = at_poses(task, np.array([setting.pose for setting in task.settings]))
+    return CONFIRMATION.table(poses + CONFIRMATION.columns(
         {}, asked=aim.shown(np.full(len(value), aim.asked)), target=target, analytic=analytic, simulated=value,
         low=worst, high=best, method=np.full(len(value), last.method), evaluations=said.evaluations,
         met=np.logical_not(last.missed().any(axis=0)),
-    )  # fmt: skip
-    return CONFIRMATION.table([*at_poses(task, np.array([setting.pose for setting in task.settings])), *columns])
+    ))  # fmt: skip
 
 
 def _ends(last: _Round) -> list[str]:

@@ -66,13 +66,12 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
-    columns = MOMENTS.columns(
+    return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
         {}, method=np.array([each.method for each in known])[method], **_channels(task, channel), nominal=nominal,
         mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
         worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
         unit=task.labels[2][channel], valid=task.reason[pose] == 0,
-    )  # fmt: skip
-    return MOMENTS.table([*at_poses(task, pose), *columns])
+    ))  # fmt: skip
 
 
 def success(task: Task, found: Sequence[MethodResult]) -> Table:
@@ -154,14 +153,13 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
     )  # fmt: skip
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
-    columns = CAPABILITY.columns(
+    return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
         {}, method=np.array([each.method for each in known])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
         mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
         sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
         ppm_high=1e6 * most.ravel(), unit=unit[limit], valid=task.reason[pose] == 0,
-    )  # fmt: skip
-    return CAPABILITY.table([*at_poses(task, pose), *columns])
+    ))  # fmt: skip
 
 
 def _each_limit(task: Task, found: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
@@ -189,12 +187,11 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     below += [study.units.label("length")] * pins
     units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
     links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
-    columns = CONTRIBUTIONS.columns(
+    return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
         share=share.ravel(), **_index_values(indices, share.shape),
-    )  # fmt: skip
-    return CONTRIBUTIONS.table([*at_poses(task, pose), *columns])
+    ))  # fmt: skip
 
 
 def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
@@ -287,9 +284,8 @@ def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         columns.append(DENSITY["<output>_error"].column(errors.ravel(), task.labels[2][channel], output=names[k]))
     for axis, name, values in zip("xy", names, place, strict=True):
         columns += DENSITY.columns({"output": name}, **{axis: np.tile(values, len(rows))})
-    return DENSITY.table(
-        [*columns, *DENSITY.columns({}, normal=normal.ravel(), simulated=np.concatenate(simulated))]
-    )  # fmt: skip
+    columns += DENSITY.columns({}, normal=normal.ravel(), simulated=np.concatenate(simulated))
+    return DENSITY.table(columns)
 
 
 def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
@@ -316,11 +312,10 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         return None
     channel, samples = np.repeat(varying, _BINS), sums[row].kept.shape[1]
     low_, high_, count_, normal_ = np.concatenate(parts, axis=1)
-    columns = HISTOGRAM.columns(
+    return HISTOGRAM.table(at_poses(task, np.full(len(channel), row)) + HISTOGRAM.columns(
         {"samples": str(samples)}, **_channels(task, channel), low=low_, high=high_, count=count_.astype(np.int64),
         density=count_ / (samples * (high_ - low_)), normal=normal_, unit=units[channel],
-    )  # fmt: skip
-    return HISTOGRAM.table([*at_poses(task, np.full(len(channel), row)), *columns])
+    ))  # fmt: skip
 
 
 def _convergence(task: Task, row: int, sums: Sums) -> Table:
@@ -328,11 +323,10 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
     step, channel = (index.ravel() for index in np.indices(means.shape))
-    columns = CONVERGENCE.columns(
+    return CONVERGENCE.table(at_poses(task, np.full(len(step), row)) + CONVERGENCE.columns(
         {}, samples=trend[step, 1].astype(np.int64), **_channels(task, channel), mean=means.ravel(),
         unit=task.labels[2][channel],
-    )  # fmt: skip
-    return CONVERGENCE.table([*at_poses(task, np.full(len(step), row)), *columns])
+    ))  # fmt: skip
 
 
 def _estimate(task: Task, row: int, sums: Sums) -> Table:

@@ -62,24 +62,19 @@ def stiffness_table(
     study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: Value | None
 ) -> Table:
     """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
-    units, soft = study.units, held.compliance
-    size = soft.shape[1]
+    units, labels, soft = study.units, study.units.labels, held.compliance
     low, high, angle = principal(soft)
     with np.errstate(divide="ignore"):
-        direct = [1 / soft[:, k, k] for k in range(size)]
+        direct = {f"k_{axis}": 1 / soft[:, k, k] for k, axis in enumerate(("x", "y", "phi")[: soft.shape[1]])}
     columns = [
         *pose_columns(study, poses),
-        *STIFFNESS.columns(units.labels, **dict(zip(("k_x", "k_y", "k_phi"), direct, strict=False)), k_min=low,
-                           k_max=high, k_angle=angle / units.angle_factor),
-    ]  # fmt: skip
+        *STIFFNESS.columns(labels, **direct, k_min=low, k_max=high, k_angle=angle / units.angle_factor),
+    ]
     if direction is not None:
-        along = directional(soft, direction * units.angle_factor)
-        columns += STIFFNESS.columns(units.labels, k_direction=along)
+        columns += STIFFNESS.columns(labels, k_direction=directional(soft, direction * units.angle_factor))
     free = dict(zip(("free_x", "free_y", "free_phi"), held.free.T, strict=False))
     columns += _entries(study, STIFFNESS, "K", held.stiffness)
-    columns += STIFFNESS.columns(
-        units.labels, rank=held.rank, **free, valid=valid, method=np.full(poses.count, method)
-    )  # fmt: skip
+    columns += STIFFNESS.columns(labels, rank=held.rank, **free, valid=valid, method=np.full(poses.count, method))
     return STIFFNESS.table(columns)
 
 
@@ -101,9 +96,9 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Tabl
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
     dx, dy, turn = twists.reshape(-1, 3).T
-    columns = EIGEN.columns(study.units.labels, mode=np.tile([1, 2, 3], poses.count), stiffness=stiffness.ravel(),
-                            dx=dx, dy=dy, turn=turn)  # fmt: skip
-    return EIGEN.table([*pose_columns(study, poses, repeat), *columns])
+    return EIGEN.table(pose_columns(study, poses, repeat) + EIGEN.columns(
+        study.units.labels, mode=np.tile([1, 2, 3], poses.count), stiffness=stiffness.ravel(), dx=dx, dy=dy, turn=turn
+    ))  # fmt: skip
 
 
 def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
@@ -114,12 +109,11 @@ def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
 def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
     """``springs.csv``: a row a pose, leg and spring."""
     units = study.units
-    columns = SPRINGS.columns(
+    return SPRINGS.table(pose_columns(study, poses, springs.row) + SPRINGS.columns(
         units.labels | {"unit": units.label("rotational_stiffness")}, leg=np.array([*legs, ""])[springs.leg],
         stiffness=springs.stiffness, x=springs.place.real, y=springs.place.imag,
         angle=springs.angle / units.angle_factor,
-    )  # fmt: skip
-    return SPRINGS.table([*pose_columns(study, poses, springs.row), *columns])
+    ))  # fmt: skip
 
 
 def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
@@ -129,8 +123,7 @@ def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -
     repeat = np.repeat(np.arange(poses.count), loads.shape[1])
     names = (*("fx", "fy", "mz")[:size], *("dx", "dy", "dphi")[:size])
     values = (*loads.reshape(-1, 3).T[:size], *moved.T)
-    words = study.units.labels | {"as radians": "rad"}
-    columns = DEFLECTIONS.columns(words, **dict(zip(names, values, strict=True)))
+    columns = DEFLECTIONS.columns(study.units.labels | {"as radians": "rad"}, **dict(zip(names, values, strict=True)))
     return DEFLECTIONS.table([*pose_columns(study, poses, repeat), *columns])
 
 
@@ -154,12 +147,11 @@ def displacements_table(study: Study, poses: Poses, network: Network, effects: E
     count, number, loads = effects.moves.shape
     moved = effects.moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
-    columns = DISPLACEMENTS.columns(
+    return DISPLACEMENTS.table(_of_loads(study, poses, loads, number) + DISPLACEMENTS.columns(
         study.units.labels, link=np.tile([link for link, _, _ in points], count * loads),
         point=np.tile([point for _, point, _ in points], count * loads), x=places.real, y=places.imag, dx=moved.real,
         dy=moved.imag,
-    )  # fmt: skip
-    return DISPLACEMENTS.table([*_of_loads(study, poses, loads, number), *columns])
+    ))  # fmt: skip
 
 
 def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:

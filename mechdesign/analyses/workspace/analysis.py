@@ -266,9 +266,9 @@ def _reachable(study: Study, progress: Progress) -> Result:
         )
     values = {key: np.concatenate([given.values[key] for given in answers]) for key in OF_RANGE}
     area, error = values["area"], np.concatenate([given.errors["area"] for given in answers])
-    held = stacked([held_columns(study, question, 1) for question in asked])
+    coordinates = stacked([held_columns(study, question, 1) for question in asked])
     columns = RANGE_INDICES.columns(study.units.labels, **values, area_error=error)
-    indices = RANGE_INDICES.table([*held, *columns], held=name)
+    indices = RANGE_INDICES.table([*coordinates, *columns], held=name)
     tables = [
         indices,
         *_totals(indices, asked),
