@@ -16,7 +16,7 @@ import yaml
 from mechdesign.cautions import KINDS
 from mechdesign.reference import Entry, entries, tables
 from mechdesign.reference.messages import PART, messages
-from mechdesign.reference.tables import TableText
+from mechdesign.results import TableKind
 
 # Sections of the study with a page each, in the order of the format; keys that stand alone share one.
 ALONE = "study_file"
@@ -157,7 +157,7 @@ def listed(title: str, before: str, found: Iterable[Entry]) -> str:
     return _page(title, parts)
 
 
-def table_page(command: str, found: Iterable[TableText]) -> str:
+def table_page(command: str, found: Iterable[TableKind]) -> str:
     """The page of a command's tables, with every column."""
     parts = [
         f"What `mechdesign {command}` writes. `<names>` stand for those of a study. Lengths, angles, times and forces "
@@ -166,10 +166,14 @@ def table_page(command: str, found: Iterable[TableText]) -> str:
     for table in found:
         rows = [[code(column.name), markdown(column.meaning), markdown(column.unit.replace("_", " ")),
                  code(column.formula.replace("|", r"\|")) if column.formula else ""]
-                for column in table.columns]  # fmt: skip
+                for column in table.kinds]  # fmt: skip
         lines = ["| column | meaning | unit | formula |", "| --- | --- | --- | --- |",
                  *("| " + " | ".join(row) + " |" for row in rows)]  # fmt: skip
-        parts += [f"## {table.name}", f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.", "\n".join(lines)]
+        parts += [
+            f"## {table.name}.csv",
+            f"{markdown(table.meaning[0].upper() + table.meaning[1:])}.",
+            "\n".join(lines),
+        ]
     return _page(f"Tables of {command}", parts)
 
 
@@ -215,7 +219,7 @@ def pages() -> dict[str, str]:
         "stands for a name of yours or a place in a list: `mechanism.joints.*.angle`.",
         f"```{{toctree}}\n:maxdepth: 1\n\n{names}\n```",
     ])  # fmt: skip
-    commands = {name: list(found) for name, found in groupby(tables(), key=lambda table: table.command)}
+    commands = {name: [table for _, table in found] for name, found in groupby(tables(), key=lambda pair: pair[0])}
     text |= {f"reference/tables/{name}.md": table_page(name, found) for name, found in commands.items()}
     listing = "\n".join(commands)
     text["reference/tables/index.md"] = _page("Tables and columns", [

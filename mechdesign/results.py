@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
 from mechdesign.statistics import Asked, Course
@@ -38,6 +39,7 @@ class Column:
     values: NDArray[Any]  #: floats, integers, booleans (written as 1 and 0) or strings, one a row
     unit: str = ""  #: as the study declares it; empty for pure numbers and text
     meaning: str = ""  #: one line for the manifest
+    kind: ColumnKind | None = None  #: what it is; of columns that the reference does not have, None
 
     def __repr__(self) -> str:
         unit = f" in {self.unit}" if self.unit else ""
@@ -47,6 +49,78 @@ class Column:
     def numeric(self) -> bool:
         """Whether it holds numbers or booleans rather than words."""
         return self.values.dtype.kind in "fiub"
+
+
+# A place in a declared text at which a name of the study stands.
+PLACE = re.compile(r"<([^>]*)>")
+
+
+def _filled(text: str, words: Mapping[str, str]) -> str:
+    return PLACE.sub(lambda place: words[place[1]], text) if "<" in text else text
+
+
+@dataclass(frozen=True)
+class ColumnKind:
+    """What a column is, for the columns of answers and for the reference.
+
+    ``<places>`` in its name and its meaning stand for names of a study.
+
+    >>> import numpy as np
+    >>> from mechdesign.results import ColumnKind
+    >>> VELOCITY = ColumnKind("<output>_velocity", "velocity of <output>", "as the output, per time")
+    >>> VELOCITY.column(np.array([1.5, 2.5]), "mm/s", output="P.x")
+    <Column P.x_velocity in mm/s: 2 values>
+    """
+
+    name: str  #: header; several, separated by ``, ``, where columns differ in their names alone
+    meaning: str  #: one line
+    unit: str = ""  #: kind of quantity, several with ``or``, or, after ``as``, what has its unit; empty: none
+    formula: str = ""
+
+    @property
+    def names(self) -> list[str]:
+        """The headers."""
+        return self.name.split(", ")
+
+    def column(self, values: ArrayLike, unit: str = "", name: str = "", /, **words: str) -> Column:
+        """A column of this kind, with the words that stand at its places; `name` is one of several names."""
+        return Column(_filled(name or self.name, words), np.asarray(values), unit, _filled(self.meaning, words), self)
+
+
+@dataclass(frozen=True)
+class TableKind:
+    """What a table is, and the kinds of its columns."""
+
+    name: str
+    meaning: str  #: one line; ``<places>`` stand for words of an answer
+    kinds: tuple[ColumnKind, ...]
+
+    @classmethod
+    def of(cls, name: str, meaning: str, *kinds: ColumnKind | tuple[str, ...]) -> TableKind:
+        """A table of column kinds, or of their name, meaning, unit and formula."""
+        return cls(name, meaning, tuple(ColumnKind(*kind) if isinstance(kind, tuple) else kind for kind in kinds))
+
+    @cached_property
+    def _by_name(self) -> dict[str, ColumnKind]:
+        return {name: kind for kind in self.kinds for name in kind.names}
+
+    def __getitem__(self, name: str) -> ColumnKind:
+        return self._by_name[name]
+
+    def columns(self, words: Mapping[str, str], /, **values: ArrayLike) -> list[Column]:
+        """Columns by their declared names.
+
+        Parameters
+        ----------
+        words : mapping
+            Labels of units by their kinds, and what stands at the places.
+        """
+        units = {"": "", **words}
+        return [self[name].column(column, units[self[name].unit], name, **words) for name, column in values.items()]
+
+    def table(self, columns: Iterable[Column], /, **words: str) -> Table:
+        """The table of some columns, with the words that stand at the places of its meaning."""
+        return Table(self.name, tuple(columns), _filled(self.meaning, words))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +312,7 @@ class _LongColumn(Column):
     """A column of a `LongTable`."""
 
     def __init__(self, like: Column, values: Callable[[str], NDArray[Any]]) -> None:
-        told = {"name": like.name, "unit": like.unit, "meaning": like.meaning}
+        told = {"name": like.name, "unit": like.unit, "meaning": like.meaning, "kind": like.kind}
         self.__dict__.update(told, _numeric=like.numeric, _values=values)
 
     @property

@@ -1,44 +1,21 @@
-"""Columns that several tables have: the kind of quantity and the meaning of each are declared here alone."""
+"""Kinds of columns that tables of several questions have, and units of their numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from importlib import import_module
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from mechdesign.indices import REGIONAL
-from mechdesign.results import Column
+from mechdesign.results import ColumnKind, TableKind
 from mechdesign.study import Units
 
-# Kind of quantity in `mechdesign.study.text.units.KINDS`, and meaning.
-SHARED: Mapping[str, tuple[str, str]] = {
-    "valid": ("none", "1 where the pose is assembled and within its limits"),
-    "x": ("length", "place of the point"),
-    "y": ("length", "place of the point"),
-    "SUI": ("none", REGIONAL["SUI"].meaning),
-    "area": ("area", REGIONAL["area"].meaning),
-    "box_area": ("area", REGIONAL["box_area"].meaning),
-    "kind": ("none", "what ends the region: limit or singularity"),
-    "at": ("none", "which limit or singularity"),
-    "side": ("none", "which end of the ray's interval"),
-    "curve": ("none", "smooth part of the boundary"),
-    "piece": ("none", "piece of the region: 1 is the sketch's, or else the largest"),
-    "output": ("none", "coordinate"),
-    "order": ("none", "position, velocity or acceleration"),
-    "method": ("none", "how it was computed"),
-    "evaluations": ("none", "mechanisms that were solved for it"),
-    "score": ("none", "weighted sum of the normalised indices"),
-    "CPI": ("none", "sum of the normalised indices"),
-}
+DRIVE = ColumnKind("<drive>", "drive", "length or angle")
+GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
+VALID = ColumnKind("valid", "1 where the pose is assembled and within its limits")
 
 
-def shared(units: Units, **values: ArrayLike) -> list[Column]:
-    """Columns that `SHARED` declares, by their names."""
-    return [
-        Column(name, np.asarray(column), units.label(SHARED[name][0]), SHARED[name][1])
-        for name, column in values.items()
-    ]
+def tables_of(command: str) -> list[TableKind]:
+    """The tables of a question, as the `columns` of its folder declare them."""
+    declared = vars(import_module(f"mechdesign.analyses.{command}.columns"))
+    return [table for table in declared.values() if isinstance(table, TableKind)]
 
 
 def power_of_length(units: Units, power: int) -> str:

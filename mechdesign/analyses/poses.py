@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import GIVEN
 from mechdesign.cautions import Caution
 from mechdesign.curve.motion import Curve, drive_turns
 from mechdesign.errors import AssemblyError
@@ -225,7 +226,7 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
 def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
     """The coordinates that the study gives, as columns; of these rows of the poses."""
     return [
-        Column(name, values[rows], study.units.label(study.mechanism.quantity(name)), "given")
+        GIVEN.column(values[rows], study.units.label(study.mechanism.quantity(name)), coordinate=name)
         for name, values in poses.values.items()
     ]
 

@@ -79,7 +79,9 @@ class Group:
         counts = self.uneven.get(table.name)
         each = len(table) // len(self.ends)
         begin, number = (k * each, each) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
-        columns = tuple(Column(c.name, c.values[begin : begin + number], c.unit, c.meaning) for c in table.columns)
+        columns = tuple(
+            Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
+        )
         scope = table.scope and replace(table.scope, missing=end.missing, course=_course_of(table.scope, k))
         return Table(table.name, columns, table.meaning, scope)
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from mechdesign.cli.execution import Outcome
 from mechdesign.errors import printable, printable_lines
-from mechdesign.results import Column, Table
+from mechdesign.experiments.columns import SUMMARY
+from mechdesign.results import Table
 
 if TYPE_CHECKING:
     from junitparser import JUnitXml
@@ -35,25 +34,17 @@ def in_brief(given: Outcome) -> str:
 
 def summary(answers: Sequence[Outcome]) -> Table:
     """What became of the questions, a row each."""
-
-    def met(given: Outcome) -> str:
-        return f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
-
-    found: dict[str, tuple[type, Callable[[Outcome], str | int]]] = {
-        "study": (str, lambda given: given.study),
-        "command": (str, lambda given: given.command),
-        "outcome": (str, lambda given: given.shard or given.word + " (kept)" * given.kept),
-        "exit_code": (int, lambda given: given.exit_code),
-        "requirements": (str, met),
-        "rows": (int, lambda given: given.rows),
-        "warnings": (int, lambda given: len(given.warnings)),
-        "directory": (str, lambda given: str(given.directory) if given.rows else ""),
-    }
-    columns = (
-        Column(name, np.array([tell_of(given) for given in answers if given.command], dtype=kind))
-        for name, (kind, tell_of) in found.items()
-    )
-    return Table("summary", tuple(columns), meaning="what became of each question")
+    rows = [given for given in answers if given.command]
+    return SUMMARY.table(SUMMARY.columns(
+        {}, study=[given.study for given in rows], command=[given.command for given in rows],
+        outcome=[given.shard or given.word + " (kept)" * given.kept for given in rows],
+        exit_code=[given.exit_code for given in rows], requirements=[
+            f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
+            for given in rows
+        ],
+        rows=[given.rows for given in rows], warnings=[len(given.warnings) for given in rows],
+        directory=[str(given.directory) if given.rows else "" for given in rows],
+    ))  # fmt: skip
 
 
 def junit(answers: Sequence[Outcome]) -> str:

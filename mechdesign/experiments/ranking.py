@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.together import Group
+from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.wanted import Numbers, Wanted
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
@@ -86,8 +87,7 @@ class Ranking:
 
     def columns(self) -> Iterator[Column]:
         """The rank of each case, and whether it is on the front."""
-        yield Column(RANK, self.rank, "", "1 the best of the cases that meet every requirement; nan of others")
-        yield Column(FRONT, self.front, "", "1 where none of these cases is as good in every goal and better in one")
+        yield from SWEEP.columns({}, **{RANK: self.rank, FRONT: self.front})
 
 
 def _steps(values: Floats) -> Floats:

@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
+from mechdesign.experiments import columns
 from mechdesign.experiments.cases import Case, answers, foresee, seeded
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
@@ -20,8 +21,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Column, Result, Table
-from mechdesign.rows import IN_UNIT
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.sensitivities import Changed
 from mechdesign.study.schema.study_file import entry
@@ -190,25 +190,10 @@ def _table(rows: Sequence[Row], result_units: Sequence[str], numbers: Sequence[C
     def of(name: str) -> Floats:
         return np.array([getattr(row, name) for row in rows], dtype=float)
 
-    columns = (
-        Column("result", np.array([row.result for row in rows]), "", "result of the study"),
-        Column("parameter", np.array([row.parameter for row in rows]), "", "number of the study that changes"),
-        Column(
-            "derivative", of("derivative"), "",
-            f"of the result with respect to the parameter, {IN_UNIT}; nan at a kink and where it is not known",
-        ),
-        Column("error", of("error"), "", f"error estimate of the derivative, {IN_UNIT}"),
-        Column("unit", np.array(ratio), "", "unit of the derivative, as far as the study tells that of the parameter"),
-        Column(
-            "elasticity", of("elasticity"), "",
-            "change of the result, in % of its size, for 1 % of the parameter's size more; nan where either is 0",
-        ),
-        Column("below", of("below"), "", f"slope below a kink, {IN_UNIT}; else nan"),
-        Column("above", of("above"), "", f"slope above a kink, {IN_UNIT}; else nan"),
-        Column("value", of("value"), "", "the result, in its own unit"),
-        Column("value_unit", np.array(units), "", "unit of the result"),
-        Column("at", of("at"), "", "the parameter, in its own unit"),
-        Column("at_unit", np.array(by), "", "unit of the parameter; empty where the study does not tell it"),
-        Column("settled", np.array([not row.doubt for row in rows]), "", "1 where the differences agree"),
-    )  # fmt: skip
-    return Table("sensitivities", columns, "derivatives of results with respect to numbers of the study")
+    table = columns.SENSITIVITIES
+    return table.table(table.columns(
+        {}, result=np.array([row.result for row in rows]), parameter=np.array([row.parameter for row in rows]),
+        derivative=of("derivative"), error=of("error"), unit=np.array(ratio), elasticity=of("elasticity"),
+        below=of("below"), above=of("above"), value=of("value"), value_unit=np.array(units), at=of("at"),
+        at_unit=np.array(by), settled=np.array([not row.doubt for row in rows]),
+    ))  # fmt: skip

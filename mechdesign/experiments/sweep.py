@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError, counted
 from mechdesign.experiments.cases import answers, commands_of, foresee, seeded
+from mechdesign.experiments.columns import SWEEP
 from mechdesign.experiments.design import Design, Listed, cases_of
 from mechdesign.experiments.ranking import Ranking, goals_of
 from mechdesign.experiments.tally import Tally
@@ -24,7 +25,7 @@ from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
 from mechdesign.report.requirements import in_words
-from mechdesign.results import VARIED, Column, Result, Table
+from mechdesign.results import Column, Result
 from mechdesign.study import Study
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit
@@ -95,7 +96,7 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
         first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
         told = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
     part = f"{count} of {asked} cases were answered; this is what they are" if count < asked else ""
-    table = Table("sweep", tuple(_columns(study, cases, tally, wanted)), "what becomes of each case of the matrix")
+    table = SWEEP.table(_columns(study, cases, tally, wanted))
     ranked = None
     if goals := _goals(study):
         ranking = Ranking.of(goals, {name: table[name] for name in goals}, table["exit_code"] == 0)
@@ -127,21 +128,19 @@ def _goals(study: Study) -> dict[str, int]:
 def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
     """The number of the case and how it ended, what varies, the requirements, the results, and why it failed."""
     count, table = len(tally), tally.table
-    yield Column("case", np.arange(1, count + 1), "", "number of the case")
-    codes = table[:, 0].astype(np.intp)
-    yield Column("exit_code", codes, "", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure")
+    yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
     for place, name in enumerate(cases.names):
         values = cases.column(place, count, partial(_array, study.units))
-        yield Column(name, values, entry_unit(study, name), VARIED)
+        yield SWEEP["<entry>"].column(values, entry_unit(study, name), entry=name)
     for k, name in enumerate(requirement_names(study)):
         worst, met, unit = tally.required(k)
-        yield Column(name, worst, unit, f"worst row; required is {tally.worst[k].verdict.requirement}")
-        yield Column(f"{name}_met", met == 1, "", "1 where the requirement is met")
+        limit = str(tally.worst[k].verdict.requirement)
+        yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
+        yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
     for k, each in enumerate(wanted):
-        yield Column(each.title, *tally.result(k), "chosen result")
-    yield Column("warnings", table[:, 1].astype(np.intp), "", "number of warnings")
+        yield SWEEP["<result>"].column(*tally.result(k), result=each.title)
     reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
-    yield Column("reason", reasons, "", "why the case failed")
+    yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
 
 
 def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:

@@ -1,102 +1,39 @@
-"""Tables of results and their columns: what `tables.yaml` declares of them, as entries."""
+"""Tables of results and their columns, as entries: each is declared in `columns.py` beside what makes it."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 
-import yaml
-
+from mechdesign.analyses.columns import tables_of
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
+from mechdesign.experiments import columns
 from mechdesign.indices import REGIONAL, STATISTICS
 from mechdesign.reference.entries import Entry
-
-_PLACE = re.compile(r"<([^>]*)>")
-
-
-@dataclass(frozen=True)
-class ColumnText:
-    """What is said of a column; ``<names>`` in its name and its meaning stand for those of a study.
-
-    Parameters
-    ----------
-    unit : str
-        A kind of quantity, several with ``or``, or, after ``as``, what has its unit; empty: it has none.
-    """
-
-    name: str
-    meaning: str
-    unit: str = ""
-    formula: str = ""
-
-    def named(self, name: str) -> re.Match[str] | None:
-        """What the ``<names>`` are where a column of this name is this one; None where it is another."""
-        return next(filter(None, (re.fullmatch(_pattern(own), name) for own in self.name.split(", "))), None)
-
-    def says(self, name: str, meaning: str) -> bool:
-        """Whether a column of a manifest is this one, with this meaning."""
-        found = self.named(name)
-        if found is None:
-            return False
-        told = _PLACE.sub(lambda place: found.groupdict().get(_group(place[1]), place[0]), self.meaning)
-        return re.fullmatch(_pattern(told), meaning) is not None
-
-
-@dataclass(frozen=True)
-class TableText:
-    """What is said of a table."""
-
-    name: str
-    command: str
-    meaning: str
-    columns: tuple[ColumnText, ...]
-
-    def says(self, meaning: str) -> bool:
-        """Whether a table of a manifest with the same name is this one."""
-        return re.fullmatch(_pattern(self.meaning), meaning) is not None
-
-
-def _group(name: str) -> str:
-    return re.sub(r"\W", "_", name)
-
-
-def _pattern(text: str) -> str:
-    """The regular expression of a text with ``<names>``."""
-    seen: set[str] = set()
-    parts = _PLACE.split(text)
-    for k in range(1, len(parts), 2):
-        group = _group(parts[k])
-        parts[k] = f"(?P={group})" if group in seen else f"(?P<{group}>.+)"
-        seen.add(group)
-    return "".join(part if k % 2 else re.escape(part) for k, part in enumerate(parts))
+from mechdesign.results import PLACE, ColumnKind, TableKind
 
 
 @cache
-def tables() -> tuple[TableText, ...]:
-    """All tables, a command's together."""
-    told = yaml.safe_load(files(__package__).joinpath("tables.yaml").read_text(encoding="utf-8"))
-    return tuple(
-        TableText(each["table"], each["command"], each["meaning"], tuple(ColumnText(*row) for row in each["columns"]))
-        for each in told
-    )
+def tables() -> tuple[tuple[str, TableKind], ...]:
+    """All tables with the command that writes each, a command's together."""
+    cases = (("run", columns.SUMMARY), (SWEEP.name, columns.SWEEP), (SENSITIVITIES.name, columns.SENSITIVITIES))
+    return (*((name, table) for name in COMMANDS for table in tables_of(name)), *cases)
 
 
 def entries() -> Iterator[Entry]:
     """An entry for each table, and one for each column that has a name of its own, with the tables that have it."""
-    where: dict[tuple[str, ColumnText], list[str]] = {}
-    for table in tables():
-        columns = tuple((column.name, column.meaning) for column in table.columns)
-        yield Entry(table.name, "table", f"{table.meaning}; mechdesign {table.command} writes it", words=columns)
-        for column in table.columns:
-            for name in column.name.split(", "):
-                where.setdefault((name, column), []).append(table.name)
-    for (name, column), found in where.items():
-        word = _PLACE.sub("*", name)
+    where: dict[tuple[str, ColumnKind], list[str]] = {}
+    for command, table in tables():
+        words = tuple((kind.name, kind.meaning) for kind in table.kinds)
+        yield Entry(f"{table.name}.csv", "table", f"{table.meaning}; mechdesign {command} writes it", words=words)
+        for kind in table.kinds:
+            for name in kind.names:
+                where.setdefault((name, kind), []).append(f"{table.name}.csv")
+    for (name, kind), files in where.items():
+        word = PLACE.sub("*", name)
         # Numbers of a workspace are results that have entries of their own.
         if word.strip("*") and word not in REGIONAL and word.removeprefix("*_") not in STATISTICS:
             takes = name if word != name else ""
-            unit, formula = column.unit.replace("_", " "), column.formula
-            yield Entry(word, "column", column.meaning, takes, unit=unit, formula=formula,
-                        where=tuple(dict.fromkeys(found)))  # fmt: skip
+            unit, formula = kind.unit.replace("_", " "), kind.formula
+            yield Entry(word, "column", kind.meaning, takes, unit=unit, formula=formula,
+                        where=tuple(dict.fromkeys(files)))  # fmt: skip

@@ -4,22 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechdesign.commands import SENSITIVITIES, SWEEP
+from mechdesign.analyses.columns import tables_of
+from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.indices import INDEX_NAMES
 
 MECHANISM = "mechanism"
 ANIMATION = "motion.gif"
 
-_TABLES = {
-    "kinematics": "motion instant_centres extremes jacobian limits loops toggles targets modes",
-    "workspace": "indices path totals pieces boundary local singularities",
-    "optimize": "optimum designs bounds best sensitivity pareto hypervolume nearest",
-    "reliability": "moments reliability capability contributions density histogram convergence estimate allocation "
-    "confirmation",
-    "stiffness": "stiffness compliance eigen springs deflections displacements forces",
-    SWEEP.name: "sweep",
-    SENSITIVITIES.name: "sensitivities",
-}
 _PICTURES = {
     "kinematics": "motion paths poses transmission modes",
     "workspace": "workspace range path speed_ratio ellipses inscribed drives",
@@ -39,7 +30,9 @@ _STUDIES = {
 
 def names(command: str, formats: str = "", *, animate: bool = False) -> Iterator[str]:
     """Patterns of the names of a command's tables and studies, and of its pictures in these formats."""
-    yield from (f"{table}.csv" for table in _TABLES[command].split())
+    # The one table of cases is named as its command.
+    tables = [table.name for table in tables_of(command)] if command in COMMANDS else [command]
+    yield from (f"{table}.csv" for table in tables)
     yield from _STUDIES.get(command, "").split()
     pictures = (MECHANISM, *_PICTURES[command].split(), *(INDEX_NAMES if command == "workspace" else ()))
     yield from (f"{name}.{kind}" for kind in formats.split(",") for name in pictures)

@@ -83,7 +83,7 @@ def _lines(columns: Sequence[NDArray[Any]]) -> str:
     return line * len(columns[0]) % tuple(flat)
 
 
-def from_csv(text: str, name: str, columns: Sequence[Mapping[str, str]], meaning: str = "") -> Table:
+def from_csv(text: str, name: str, columns: Sequence[Mapping[str, Any]], meaning: str = "") -> Table:
     """The table that `to_csv` wrote, to its digits; `name`, `unit` and `meaning` of the columns are the manifest's."""
     _, *rows = csv.reader(io.StringIO(text))
     texts = zip(*rows, strict=True) if rows else [()] * len(columns)

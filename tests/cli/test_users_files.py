@@ -207,7 +207,7 @@ def test_no_study_has_the_name_of_a_file_about_all(folder, analysis, invoke, lab
 
 def test_names_of_files_are_foreseen():
     """Every table of the reference, and every file of the shipped results, is one that its command may write."""
-    listed = [(each.command, each.name) for each in tables() if each.command in QUESTIONS]
+    listed = [(command, f"{table.name}.csv") for command, table in tables() if command in QUESTIONS]
     for path in (ROOT / "results").rglob("manifest.json"):
         content = json.loads(path.read_text(encoding="utf-8"))
         listed += [(content["command"], name) for name in content["files"]]

@@ -8,6 +8,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from mechdesign.analyses.columns import GIVEN, VALID
+from mechdesign.analyses.kinematics.columns import MOTION
+from mechdesign.analyses.reliability.columns import RELIABILITY
+from mechdesign.analyses.stiffness.columns import STIFFNESS
 from mechdesign.report.figures import style
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
@@ -96,37 +100,48 @@ def table(name: str, **columns: tuple[list[object], str, str]) -> Table:
 
 def test_headlines_name_the_extreme_row_with_its_unit_and_pose() -> None:
     nothing = float("nan")
-    result = Result("stiffness", {"stiffness": table(
-        "stiffness", theta=([0.0, 5.0, 10.0], "deg", "given"), k_min=([7.0, 4.0, nothing], "N/mm", "softest"),
-    )})  # fmt: skip
+    columns = [
+        GIVEN.column([0.0, 5.0, 10.0], "deg", coordinate="theta"),
+        *STIFFNESS.columns({"stiffness": "N/mm"}, k_min=[7.0, 4.0, nothing]),
+    ]
+    result = Result("stiffness", {"stiffness": STIFFNESS.table(columns)})
     (found,) = headlines(result)
     assert (found.label, found.value, found.unit) == ("smallest stiffness", "4", "N/mm")
     assert found.note.replace("\N{NO-BREAK SPACE}", " ") == "at theta = 5 deg"
 
 
 def test_what_stands_still_but_for_rounding_has_no_largest_velocity() -> None:
-    result = Result("kinematics", {"motion": table(
-        "motion",
-        **{"P.x_velocity": ([0.1, -0.3, 9.0], "m/s", "velocity of P.x"),
-           "P.y_velocity": ([1e-17, 0.0, 9.0], "m/s", "velocity of P.y"),
-           "valid": ([True, True, False], "", "")},
-    )})  # fmt: skip
+    columns = [
+        MOTION["<output>_velocity"].column([0.1, -0.3, 9.0], "m/s", output="P.x"),
+        MOTION["<output>_velocity"].column([1e-17, 0.0, 9.0], "m/s", output="P.y"),
+        VALID.column([True, True, False]),
+    ]
+    result = Result("kinematics", {"motion": MOTION.table(columns)})
     assert [(each.label, each.value) for each in headlines(result)] == [("largest velocity of P.x", "0.3")]
 
 
 def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None:
-    result = Result("reliability", {"reliability": table(
-        "reliability",
-        theta=([0.0, 5.0, 0.0, 5.0], "deg", "given"),
-        method=(["analytic", "analytic", "auto", "auto"], "", ""),
-        failure=([0.01, 0.03, 0.02, 0.01], "", ""),
-        failure_low=([0.01, 0.03, 0.015, 0.01], "", ""),
-        failure_high=([0.01, 0.03, 0.025, 0.01], "", ""),
-    )})  # fmt: skip
+    columns = RELIABILITY.columns(
+        {"kind of interval": "99.7 %"},
+        method=["analytic", "analytic", "auto", "auto"],
+        failure=[0.01, 0.03, 0.02, 0.01],
+        failure_low=[0.01, 0.03, 0.015, 0.01],
+        failure_high=[0.01, 0.03, 0.025, 0.01],
+    )
+    poses = GIVEN.column([0.0, 5.0, 0.0, 5.0], "deg", coordinate="theta")
+    result = Result("reliability", {"reliability": RELIABILITY.table([poses, *columns])})
     one, other = headlines(result)
     assert (one.label, one.value) == ("failure probability, analytic", "0.03")
     assert (other.label, other.value) == ("failure probability, auto", "0.02")
     assert other.note.startswith("99.7 % between 0.015 and 0.025; at theta")
+
+
+def test_headlines_know_a_column_by_its_kind_whatever_its_name_and_its_meaning() -> None:
+    speed, alike = "velocity of P.x", Column("Q.x_velocity", np.array([5.0]), "m/s", "velocity of Q.x")
+    kind = MOTION["<output>_velocity"]
+    named = Column("speed", np.array([2.0]), "m/s", speed, kind)
+    result = Result("kinematics", {"motion": MOTION.table([named, alike])})
+    assert [(each.label, each.value) for each in headlines(result)] == [("largest velocity of P.x", "2")]
 
 
 @pytest.mark.parametrize(

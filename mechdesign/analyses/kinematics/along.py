@@ -8,7 +8,9 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from mechdesign.analyses.columns import GIVEN
 from mechdesign.analyses.kinematics import targets
+from mechdesign.analyses.kinematics.columns import OVER
 from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, rates_of_advantage
 from mechdesign.analyses.poses import SolvedPoses
 from mechdesign.curve.ends import End, Ends
@@ -22,8 +24,9 @@ from mechdesign.mechanism.derivatives import Jacobian, Linearization
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.results import POSES_ONLY, Column
+from mechdesign.results import POSES_ONLY, Column, TableKind
 from mechdesign.statistics import Asked, Part
+from mechdesign.study import Study
 
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
@@ -224,17 +227,14 @@ class Along:
             places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))
         return np.where(known, places, np.nan)
 
-    def place_columns(self, line: Ints, places: Floats, meaning: str) -> list[Column]:
-        """Places of motions as columns: what is swept, or the row and all coordinates that move."""
+    def place_columns(self, table: TableKind, line: Ints, places: Floats) -> list[Column]:
+        """Places of motions as columns of a table: what is swept, or the row and all coordinates that move."""
         study, poses = self.question.study, self.question.poses
         if poses.swept is not None:
-            unit = study.units.label(study.mechanism.quantity(poses.swept))
-            return [Column(poses.swept, self.shown(line, places), unit, meaning)]
-        values = poses.along(line, places).values
-        return [
-            Column("row", places, "", f"place along the path in rows from 0: {meaning}"),
-            *(Column(c, values[c], study.units.label(study.mechanism.quantity(c)), "given") for c in poses.moving),
-        ]
+            return table.columns(of_swept(study, poses.swept, ""), **{"<swept>": self.shown(line, places)})
+        values, label, quantity = poses.along(line, places).values, study.units.label, study.mechanism.quantity
+        given = [GIVEN.column(values[name], label(quantity(name)), coordinate=name) for name in poses.moving]
+        return table.columns({}, row=places) + given
 
     def at(self, line: Ints, s: Floats) -> dict[str, Floats]:
         """Every function at places of lines."""
@@ -341,12 +341,18 @@ class Along:
         return sorted(found, key=lambda passage: passage[:2])
 
 
-def over(what: str, along: Along | None, names: Sequence[str]) -> str:
-    """The meaning of a table whose rows are numbers of some functions over a motion: what is of the poses only."""
+def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:
+    """For the meaning of a table of numbers of some functions over a motion: which of them are of the poses only."""
     if along is None or along.curve.spent.any() or along.functions.unresolved.any():
-        return f"{what} {POSES_ONLY}"
+        return {OVER: POSES_ONLY}
     poses = [name for name in names if name not in along.functions.names]
-    return f"{what} over the motion" + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")
+    return {OVER: "over the motion" + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")}
+
+
+def of_swept(study: Study, swept: str | None, otherwise: str) -> dict[str, str]:
+    """For columns that hold what is swept: its name and unit; where nothing is, what they hold otherwise."""
+    unit = "" if swept is None else study.units.label(study.mechanism.quantity(swept))
+    return {"swept": swept or otherwise, "as what is swept": unit}
 
 
 # A group is singular where its conditioning is below this and turns back or ends.

@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from mechdesign.analyses.kinematics.answers import answers_of
+from mechdesign.analyses.kinematics.columns import MODES
 from mechdesign.analyses.kinematics.motion import Motion, motion_question
 from mechdesign.analyses.kinematics.passage import Passage, pass_over
 from mechdesign.analyses.kinematics.remarks import marks_of
@@ -20,7 +21,7 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Column, LongTable, Result, Table
+from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -106,5 +107,4 @@ def _modes(
 def _mode(label: str, motion: Motion) -> Table:
     """The motion of one assembly."""
     labels = np.full(len(motion.reason), label)
-    column = Column("mode", labels, "", "assembly: the joints that choose it and their sides")
-    return Table("modes", (column, *motion.columns()), "the motion of every assembly mode")
+    return MODES.table([*MODES.columns({}, mode=labels), *motion.columns()])

@@ -6,11 +6,12 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.along import Along, of_swept, over
+from mechdesign.analyses.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.targets import totals
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 # A range below this part of a function's size is rounding.
 STILL = 1e-12
@@ -70,27 +71,11 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
         span = high - low
     ratio[~np.isfinite(ratio)] = np.nan
-    where = f"{swept or 'place in rows (from 0)'} at the"
-    unit = study.units.label(mechanism.quantity(swept)) if swept is not None else ""
-    return Table(
-        "extremes",
-        (
-            Column(
-                "output",
-                np.tile(np.array(list(curves)), poses.designs),
-                "",
-                "output, error, effort, mechanical advantage, velocity or acceleration, in its own unit",
-            ),
-            Column("min", low.T.ravel(), "", "smallest value over the motion, in `unit`"),
-            Column("min_at", low_at.T.ravel(), unit, f"{where} smallest value"),
-            Column("max", high.T.ravel(), "", "largest value over the motion, in `unit`"),
-            Column("max_at", high_at.T.ravel(), unit, f"{where} largest value"),
-            Column("range", span.T.ravel(), "", "max - min, in `unit`"),
-            Column("time_ratio", ratio.T.ravel(), "", "longer over shorter time between the extremes, constant speed"),
-            Column("unit", np.tile(np.array(units, dtype=str), poses.designs), "", "unit of min, max and range"),
-        ),
-        over("extremes of the outputs", along, list(curves)),
-    )
+    return EXTREMES.table(EXTREMES.columns(
+        of_swept(study, swept, "place in rows (from 0)"), output=np.tile(np.array(list(curves)), poses.designs),
+        min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
+        range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
+    ), **over(along, list(curves)))  # fmt: skip
 
 
 def _between(
@@ -144,18 +129,8 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
             ])  # fmt: skip
             numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
     rms, mean, largest, where = numbers.reshape(4, -1)
-    unit = study.units.label(study.mechanism.quantity(swept)) if swept is not None else ""
+    words = of_swept(study, swept, "row (from 0)")
     units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
     outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
-    return Table(
-        "targets",
-        (
-            Column("output", outputs, "", "what has a target"),
-            Column("rms", rms, "", "root of the mean square of the error (of a point: of its distance), in `unit`"),
-            Column("mean", mean, "", "mean error, in `unit`"),
-            Column("max_abs", largest, "", "largest absolute error, in `unit`"),
-            Column("at", where, unit, f"{swept or 'row (from 0)'} at the largest error"),
-            Column("unit", units, "", "unit of its errors"),
-        ),
-        over("errors of the outputs against their targets", along, [error.name for error in errors]),
-    )
+    columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)
+    return TARGETS.table(columns, **over(along, [error.name for error in errors]))

@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.columns import LIMITS
 from mechdesign.analyses.poses import pose_in_words
 from mechdesign.cautions import Caution
 from mechdesign.curve.ends import Change, End
 from mechdesign.mechanism.margins import Cause
 from mechdesign.numerics.arrays import Flags
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 # Places that a warning names.
 MOST_NAMED = 4
@@ -49,10 +50,9 @@ def limits_table(limits: Sequence[Limit], along: Along) -> Table:
     study, outputs, swept = along.question.study, along.question.outputs, along.question.poses.swept
     line, place = np.array([limit.line for limit in limits], dtype=np.intp), np.array([limit.place for limit in limits])
     columns = [
-        *along.place_columns(line, place, "value at the limit of motion"),
-        Column("kind", np.array([limit.cause.kind for limit in limits], dtype=str), "",
-               "what ends the motion, such as a dead centre, a singularity or a limit"),
-        Column("joint", np.array([limit.cause.joint for limit in limits], dtype=str), "", "where"),
+        *along.place_columns(LIMITS, line, place),
+        *LIMITS.columns({}, kind=np.array([limit.cause.kind for limit in limits], dtype=str),
+                        joint=np.array([limit.cause.joint for limit in limits], dtype=str)),
     ]  # fmt: skip
     named = {column.name for column in columns}
     shown = [output for output in outputs if output.name != swept and output.name not in named]
@@ -64,8 +64,8 @@ def limits_table(limits: Sequence[Limit], along: Along) -> Table:
     if not passing.all():
         values[:, ~passing] = along.at_ends([limit.end for limit in limits if limit.end is not None], names)
     for output, column in zip(shown, values, strict=True):
-        columns.append(Column(output.name, column, study.units.label(output.quantity), f"{output.name} at the limit"))
-    return Table("limits", tuple(columns), "limits of motion and singularities found along it")
+        columns.append(LIMITS["<output>"].column(column, study.units.label(output.quantity), output=output.name))
+    return LIMITS.table(columns)
 
 
 def place_in_words(along: Along, line: int, place: float) -> str:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along, over
+from mechdesign.analyses.kinematics.along import Along, of_swept, over
+from mechdesign.analyses.kinematics.columns import LOOPS, TOGGLES
 from mechdesign.analyses.kinematics.motion import MotionQuestion
 from mechdesign.analyses.poses import SolvedPoses, solve_poses
 from mechdesign.curve.functions import Zeros
@@ -15,7 +16,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -65,33 +66,21 @@ def loops_table(
     """
     study, poses = question.study, question.poses
     every = [loop for own in designs for loop in own]
-    length, angle = study.units.label("length"), study.units.label("angle")
+    words = study.units.labels | of_swept(study, None if along is None else poses.swept, "row")
     columns = [
-        Column("kind", np.array([loop.kind for loop in every]), "", "what the four bodies and their joints are"),
-        *(Column(part, np.array([loop.links[k] for loop in every]), "", f"the {part} link")
+        *LOOPS.columns(words, kind=[loop.kind for loop in every]),
+        *(LOOPS["<part>"].column([loop.links[k] for loop in every], part=part) for k, part in enumerate(ROLES)),
+        *LOOPS.columns(words, joints=[" ".join(joint.name for joint in loop.joints) for loop in every]),
+        *(LOOPS["<part>_length"].column([loop.lengths[k] for loop in every], words["length"], part=part)
           for k, part in enumerate(ROLES)),
-        Column("joints", np.array([" ".join(joint.name for joint in loop.joints) for loop in every]), "",
-               "joints from the frame round"),
-        *(Column(f"{part}_length", np.array([loop.lengths[k] for loop in every]), length, f"length of the {part}")
-          for k, part in enumerate(ROLES)),
-        Column("offset", np.array([loop.offset for loop in every]), length, "offset of the slide"),
-        Column("class", np.array([loop.type for loop in every]), "",
-               "Grashof's class, or the kind of slider-crank"),
-        Column("excess", np.array([loop.excess for loop in every]), length,
-               "p + q - s - l; rod - crank - offset; |crank - frame| - offset: a link turns fully where positive"),
+        *LOOPS.columns(words, offset=[loop.offset for loop in every], **{"class": [loop.type for loop in every]},
+                       excess=[loop.excess for loop in every]),
     ]  # fmt: skip
-    at_unit, where = "", "row at the"
-    if along is not None and poses.swept is not None:
-        at_unit, where = study.units.label(study.mechanism.quantity(poses.swept)), f"{poses.swept} at the"
     both = _at_poses(study, poses, loops) if along is None else _between(along, len(loops))
-    for (values, places), end, which in zip(both, ("min", "max"), ("smallest", "largest"), strict=True):
-        name = f"transmission_{end}"
-        meaning = f"{which} angle between coupler and output, up to 90 deg"
-        columns += [
-            Column(name, values.T.ravel() / study.units.angle_factor, angle, meaning),
-            Column(f"{name}_at", places.T.ravel(), at_unit, f"{where} {which} value"),
-        ]
-    return Table("loops", tuple(columns), over("four-bars and slider-cranks, and how well they transmit", along, ()))
+    for (values, places), end in zip(both, ("min", "max"), strict=True):
+        columns += LOOPS.columns(words, **{f"transmission_{end}": values.T.ravel() / study.units.angle_factor})
+        columns += LOOPS.columns(words, **{f"transmission_{end}_at": places.T.ravel()})
+    return LOOPS.table(columns, **over(along, ()))
 
 
 @quiet
@@ -156,16 +145,9 @@ def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
     """Every place at which the coupler of a loop comes into line with its input or its output."""
     line, place = (np.array([getattr(toggle, name) for toggle in toggles], dtype=kind)
                    for name, kind in (("line", np.intp), ("place", float)))  # fmt: skip
-    meanings = {
-        "links": "the two links in line", "state": "extended, folded, or perpendicular to the slide",
-        "joints": "joints of the two links", "effect": "what it does", "loop": "the four-bar or slider-crank",
-    }  # fmt: skip
-    words = [
-        Column(name, np.array([getattr(toggle, name) for toggle in toggles], dtype=str), "", meaning)
-        for name, meaning in meanings.items()
-    ]
-    columns = [*along.place_columns(line, place, "value at which the links are in line"), *words]
-    return Table("toggles", tuple(columns), "links of four-bars and slider-cranks that come into line")
+    words = {name: np.array([getattr(toggle, name) for toggle in toggles], dtype=str)
+             for name in ("links", "state", "joints", "effect", "loop")}  # fmt: skip
+    return TOGGLES.table([*along.place_columns(TOGGLES, line, place), *TOGGLES.columns({}, **words)])
 
 
 def _once(zeros: Zeros, position: Floats) -> Ints:

@@ -12,7 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import power_of_length, shared
+from mechdesign.analyses.columns import DRIVE, VALID, power_of_length
+from mechdesign.analyses.kinematics.columns import MOTION
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.rates import drive_rates, of_given
 from mechdesign.analyses.kinematics.targets import Error, errors, needed
@@ -74,11 +75,12 @@ def characteristic_length(study: Study) -> float | None:
 
 @dataclass(frozen=True)
 class Static:
-    """A drive's effort or a mechanical advantage: the name of its column, its unit and its meaning."""
+    """A drive's effort or a mechanical advantage: the name of its column, its unit, and how it is declared."""
 
     name: str
     unit: str
-    meaning: str
+    kind: str
+    words: Mapping[str, str]  # at the places of the kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,13 +126,13 @@ class MotionQuestion:
         label, found = self.study.units.label, []
         for drive in self.drives if self.section.loads else ():
             unit = label("moment" if drive.quantity == "angle" else "force")
-            found.append(Static(f"{drive.name}_effort", unit, "drive effort that balances the loads"))
+            found.append(Static(f"{drive.name}_effort", unit, "<drive>_effort", {"drive": drive.name}))
         for name, given in self.section.mechanical_advantage.items():
             units = {"length": label("length"), "angle": ""}
             above, below = (units[self.study.mechanism.quantity(each)] for each in (given, name))
             unit = "" if above == below else above or f"1/{below}"
-            meaning = f"force or moment of {name} over that put in at {given}, without friction"
-            found.append(Static(f"{name}_advantage", unit, meaning))
+            words = {"output": name, "input": given}
+            found.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
         return found
 
     @property
@@ -360,31 +362,26 @@ class Motion:
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
         for name, output in ((drives if question.of_given else {}) | shown).items():
             if name not in drives:
-                columns.append(Column(name, arrays[name], label(output.quantity), f"value of {name}"))
+                columns.append(MOTION["<output>"].column(arrays[name], label(output.quantity), output=name))
             for order in ("velocity", "acceleration"):
                 rate = f"{name}_{order}"
                 if rate in rates:
-                    columns.append(Column(rate, arrays[rate], rates[rate], f"{order} of {name}"))
+                    columns.append(MOTION[f"<output>_{order}"].column(arrays[rate], rates[rate], output=name))
             point, _, axis = name.rpartition(".")
             columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
         rows = ", ".join(output.name for output in question.listed)
         lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
         area = power_of_length(question.study.units, lengths[0] - lengths[1])
-        for name, unit, meaning in (
-            ("det_J", area, f"determinant of the Jacobian of {rows} by the drives, per radian"),
-            ("inverse_condition", "", f"smallest over largest singular value of the Jacobian of {rows} by the drives"),
-            ("conditioning", "", "how far the drives are from a singularity: 0 at one, at most 1; the sine of the "
-             "angle between two links that meet"),
-        ):  # fmt: skip
-            if name in arrays:
-                columns.append(Column(name, arrays[name], unit, meaning))
-        columns += [Column(s.name, arrays[s.name], s.unit, s.meaning) for s in question.statics]
-        return [*columns, *shared(self.question.study.units, valid=self.valid)]
+        words = {"outputs": rows, "as its outputs over the drives, multiplied": area}
+        names = ("det_J", "inverse_condition", "conditioning")
+        columns += MOTION.columns(words, **{name: arrays[name] for name in names if name in arrays})
+        columns += [MOTION[s.kind].column(arrays[s.name], s.unit, **s.words) for s in question.statics]
+        return [*columns, VALID.column(self.valid)]
 
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
         question, units = self.question, self.question.study.units
-        columns = [Column(c.name, self.arrays[c.name], units.label(c.quantity), "drive") for c in question.drives]
+        columns = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
         named = {column.name for column in columns}
         for column in pose_columns(question.study, question.poses):
             if column.name not in named:
@@ -394,8 +391,9 @@ class Motion:
     def _error(self, error: Error) -> Column:
         study = self.question.study
         far = error.output in study.mechanism.points
-        meaning = f"distance of {error.output} from its target" if far else f"{error.output} less its target"
-        return Column(error.name, error.values, study.units.label(error.quantity), meaning)
+        kind = MOTION["<point>_error" if far else "<output>_error"]
+        words = {"point": error.output, "output": error.output}
+        return kind.column(error.values, study.units.label(error.quantity), **words)
 
 
 def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict[str, Value]:

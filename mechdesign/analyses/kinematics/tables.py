@@ -6,45 +6,41 @@ from collections.abc import Collection
 
 import numpy as np
 
-from mechdesign.analyses.columns import shared
+from mechdesign.analyses.columns import VALID
+from mechdesign.analyses.kinematics.columns import INSTANT_CENTRES, JACOBIAN, MOTION
 from mechdesign.analyses.kinematics.instant_centres import MOTIONS
 from mechdesign.analyses.kinematics.motion import Motion, entry
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 
 def motion_table(motion: Motion) -> Table:
     """Every pose with all outputs."""
-    return Table("motion", tuple(motion.columns()), "positions, velocities and accelerations per pose")
+    return MOTION.table(motion.columns())
 
 
 def jacobian_table(motion: Motion) -> Table:
     """Every entry of the Jacobian, a row a pose."""
-    question = motion.question
+    question, derivative = motion.question, JACOBIAN["<output>_by_<drive>"]
     columns = motion.pose_columns()
     for output in question.listed:
         for drive in question.drives:
-            name = entry(output, drive)
-            meaning = f"derivative of {output.name} by {drive.name}, angles in radians"
-            columns.append(Column(name, motion.arrays[name], _per(question.study, output, drive), meaning))
-    columns += shared(question.study.units, valid=motion.valid)
-    return Table("jacobian", tuple(columns), "derivatives of outputs by the drives, per radian")
+            values, unit = motion.arrays[entry(output, drive)], _per(question.study, output, drive)
+            columns.append(derivative.column(values, unit, output=output.name, drive=drive.name))
+    return JACOBIAN.table([*columns, VALID.column(motion.valid)])
 
 
 def centres_table(motion: Motion) -> Table:
     """Instant centres of pairs of links, a row a pose."""
-    length, columns = motion.question.study.units.label("length"), motion.pose_columns()
+    columns = motion.pose_columns()
     for centre in motion.question.centres:
-        pair = f"{centre.one} and {centre.other}"
-        for axis in "xy":
-            meaning = f"place of the instant centre of {pair}; inf where one translates against the other"
-            columns.append(Column(f"{centre.name}.{axis}", motion.arrays[f"{centre.name}.{axis}"], length, meaning))
-        numbers = np.nan_to_num(motion.arrays[f"{centre.name}.motion"]).round().astype(int)
-        meaning = f"how {centre.one} moves against {centre.other}: rotation, translation or rest"
-        columns.append(Column(f"{centre.name}.motion", np.array(MOTIONS)[numbers], "", meaning))
-    columns += shared(motion.question.study.units, valid=motion.valid)
-    return Table("instant_centres", tuple(columns), "instant centres of velocity of pairs of links")
+        words = motion.question.study.units.labels | {"a": centre.one, "b": centre.other}
+        x, y, number = (motion.arrays[f"{centre.name}.{what}"] for what in ("x", "y", "motion"))
+        motions = np.array(MOTIONS)[np.nan_to_num(number).round().astype(int)]
+        values = {"<a>.<b>.x": x, "<a>.<b>.y": y, "<a>.<b>.motion": motions}
+        columns += INSTANT_CENTRES.columns(words, **values)
+    return INSTANT_CENTRES.table([*columns, VALID.column(motion.valid)])
 
 
 def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:

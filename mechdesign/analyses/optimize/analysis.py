@@ -29,7 +29,7 @@ from mechdesign.analyses.optimize.tables import (
 from mechdesign.analyses.optimize.variables import Design, check_choices, grid, in_words, parted, snapped, study_of
 from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.region.rays import SINGLE
-from mechdesign.analyses.workspace.analysis import index_meanings, workspace
+from mechdesign.analyses.workspace.analysis import index_columns, workspace
 from mechdesign.analyses.workspace.contained import Shape, fitting_scale
 from mechdesign.analyses.workspace.question import answer, questions, split
 from mechdesign.cautions import Caution
@@ -254,7 +254,8 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
     if not evaluator.questions:
         return {}
     assert study.workspace is not None
-    found = index_meanings(study, evaluator.questions[0])
+    columns = index_columns(study, evaluator.questions[0])
+    found = {name: (column.unit, column.meaning) for name, column in columns.items()}
     for each in evaluator.goals:
         if each.outline is not None:
             shape = each.column.removeprefix("scale of ")

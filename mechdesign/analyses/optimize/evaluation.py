@@ -19,7 +19,7 @@ from mechdesign.analyses.optimize.stacked import grouped
 from mechdesign.analyses.optimize.variables import entry_of, shown
 from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.analysis import index_meanings
+from mechdesign.analyses.workspace.analysis import index_columns
 from mechdesign.analyses.workspace.contained import fitting_scale
 from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, shared, split
 from mechdesign.analyses.workspace.tables import where
@@ -125,8 +125,8 @@ class Evaluator:
 
     def _misfits(self) -> Iterator[Problem]:
         """Bounds that are of another kind than the number of the workspace, or the expression, that they bound."""
-        meanings = index_meanings(self.study, self.questions[0]) if self.questions else {}
-        units = {each: meanings[each.column][0] for each in self._regional if each.column in meanings}
+        columns = index_columns(self.study, self.questions[0]) if self.questions else {}
+        units = {each: columns[each.column].unit for each in self._regional if each.column in columns}
         units |= {each: unit for each in self.goals if each.expression and (unit := unit_of(self.study, each.column))}
         for each, unit in units.items():
             try:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.optimize.batch import Evaluated
+from mechdesign.analyses.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Known, Part
 from mechdesign.analyses.optimize.goals import Goal, goals_of, unit_of
@@ -22,7 +22,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
-from mechdesign.results import Column
+from mechdesign.results import Column, ColumnKind
 from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
@@ -174,35 +174,39 @@ class Designs:
         """Unit of a goal or a variable, where it is known."""
         for each in self.goals:
             if each.name == name:
-                return self._unit_and_meaning(each)[0]
+                return self._kind(each)[1]
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
         """Unit of what a condition bounds; none of the scale of a shape."""
-        return "" if condition.outline is not None else self._unit_and_meaning(condition)[0]
+        return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
         for name in self.variables:
-            yield Column(name, self.shown(name)[rows], self.unit_of(name), "design variable")
+            yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
         for each in self.goals:
             # A parameter that varies is a goal and a variable at once.
             if each.name not in self.variables:
-                yield Column(each.name, self.found[each][rows], *self._unit_and_meaning(each))
+                kind, unit, meaning = self._kind(each)
+                words = {"parameter": each.name, "result": each.name, "meaning of the result": meaning}
+                yield kind.column(self.found[each][rows], unit, **words)
         for each, error in self.errors.items() if errors else ():
             if each in self.goals:
-                meaning = f"estimated error of {each.name}"
-                yield Column(f"{each.name}_error", error[rows], self._unit_and_meaning(each)[0], meaning)
+                yield DESIGNS["<result>_error"].column(error[rows], self._kind(each)[1], result=each.name)
         for each in self.conditions:
             if each.outline is not None:
-                yield Column(each.column, self.found[each][rows], "", self.meanings[each.column][1])
-        yield from shared(self.study.units, CPI=self.cpi[rows])
+                words = {"result": each.column, "meaning of the result": self.meanings[each.column][1]}
+                yield RESULT.column(self.found[each][rows], **words)
+        yield CPI.column(self.cpi[rows])
 
-    def _unit_and_meaning(self, judged: Goal) -> tuple[str, str]:
-        if judged.expression is not None:
-            return unit_of(self.study, judged.column), "expression over parameters"
-        worst = (self._coordinate_unit(judged), f"worst row of {judged.name}")
-        return self.meanings.get(judged.column, worst) if judged.regional else worst
+    def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
+        """Kind of a goal's column, its unit, and the meaning of a number of the workspace."""
+        if goal.expression is not None:
+            return EXPRESSION, unit_of(self.study, goal.column), ""
+        if goal.regional and goal.column in self.meanings:
+            return RESULT, *self.meanings[goal.column]
+        return WORST_ROW, self._coordinate_unit(goal), ""
 
     def _coordinate_unit(self, judged: Goal) -> str:
         """Unit of a coordinate, its rates and its error; none where a goal is something else."""

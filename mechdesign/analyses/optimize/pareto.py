@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mechdesign.analyses.optimize.columns import HYPERVOLUME, PARETO
 from mechdesign.analyses.optimize.descent import descend
 from mechdesign.analyses.optimize.explorer import Explorer, Known, Spent
 from mechdesign.analyses.optimize.judge import Designs
@@ -19,7 +20,7 @@ from mechdesign.analyses.optimize.search import sample, search
 from mechdesign.cautions import Caution
 from mechdesign.numerics import fronts
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 
 # Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
@@ -388,26 +389,14 @@ def growth_table(designs: Designs) -> Table:
     earlier = counts - counts // 10
     values = designs.values[rows] * signs_of(designs)
     volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
-    columns = (
-        Column("designs", counts, "", "designs that were evaluated until then"),
-        Column("front", np.array([len(front(values[: np.searchsorted(rows, number)])) for number in counts]), "",
-               "how many of them no other surpassed"),
-        Column("hypervolume", volume, "", "of their front, in boxes between the last front's best and worst values, "
-               "up to a tenth beyond"),
-        Column("growth", np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0), "",
-               "part of the hypervolume that the last tenth of these designs brought"),
-    )  # fmt: skip
-    return Table("hypervolume", columns, "how the front grew, and whether it still does")
+    return HYPERVOLUME.table(HYPERVOLUME.columns(
+        {}, designs=counts, front=[len(front(values[: np.searchsorted(rows, number)])) for number in counts],
+        hypervolume=volume, growth=np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0),
+    ))  # fmt: skip
 
 
 def pareto_table(designs: Designs) -> Table:
     """The designs on the front."""
     found = front_of(designs)
-    columns = (
-        *designs.columns(found.rows),
-        Column(
-            "knee", found.rows == found.knee, "", "1 at the design farthest from the plane through the front's ends"
-        ),
-        Column("crowding", crowding(found.values), "", "gap between the neighbours on the front; inf at its ends"),
-    )
-    return Table("pareto", columns, "designs none of which is surpassed in every goal at once")
+    marks = PARETO.columns({}, knee=found.rows == found.knee, crowding=crowding(found.values))
+    return PARETO.table([*designs.columns(found.rows), *marks])

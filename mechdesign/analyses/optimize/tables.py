@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
+from mechdesign.analyses.optimize.columns import BEST, BOUNDS, DESIGNS, NEAREST, OPTIMUM, SENSITIVITY
 from mechdesign.analyses.optimize.judge import Designs, Judge
 from mechdesign.analyses.optimize.variables import BOUND_ROUNDING, Batch, bounds, ranges, steps
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
-from mechdesign.results import Column, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Best designs that are listed for each row of weights, and how far apart they are in parts of each variable's range.
@@ -33,27 +33,19 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
         for name, value in study.parameters.values(parameters).items()
         if name not in variables and np.ndim(value) and all(name != each.name for each in designs.goals)
     }
-    weights = zip(designs.goals, designs.weights.T, strict=True)
-    marks = (Column("what", np.array(designs.marks, dtype=object), "", "what the design is on the Pareto front"),)
-    columns = (
-        *(marks if designs.marks else ()),
-        *(Column(f"w_{each.name}", column, "", f"weight of {each.name}") for each, column in weights),
+    marks = {"what": np.array(designs.marks, dtype=object)} if designs.marks else {}
+    weights, length = zip(designs.goals, designs.weights.T, strict=True), study.units.label("length")
+    centre_of, parameter = OPTIMUM["x of <shape>"], OPTIMUM["<parameter>"]
+    return OPTIMUM.table([
+        *OPTIMUM.columns({}, **marks),
+        *(OPTIMUM["w_<goal>"].column(column, goal=each.name) for each, column in weights),
         *designs.columns(rows),
-        *(
-            Column(
-                f"{axis} of {name}",
-                _settled(study, part(centre)),
-                study.units.label("length"),
-                f"where the centre of {name} fits best",
-            )
-            for name, centre in places.items()
-            for axis, part in (("x", np.real), ("y", np.imag))
-        ),
-        *shared(study.units, score=scores),
-        *(Column(name, value, "", "parameter that follows from the variables") for name, value in following.items()),
-        Column("active", _active(designs), "", "bounds and conditions that the optimum lies at"),
-    )
-    return Table("optimum", columns, "the best design for each set of weights")
+        *(centre_of.column(_settled(study, part(centre)), length, f"{axis} of <shape>", shape=name)
+          for name, centre in places.items() for axis, part in (("x", np.real), ("y", np.imag))),
+        *OPTIMUM.columns({}, score=scores),
+        *(parameter.column(value, parameter=name) for name, value in following.items()),
+        *OPTIMUM.columns({}, active=_active(designs)),
+    ])  # fmt: skip
 
 
 def _settled(study: Study, places: Floats) -> Floats:
@@ -63,12 +55,8 @@ def _settled(study: Study, places: Floats) -> Floats:
 
 def designs_table(designs: Designs) -> Table:
     """Every design that was evaluated."""
-    columns = (
-        *designs.columns(slice(None), errors=True),
-        Column("feasible", designs.feasible, "", "1 where the design can be built and meets every requirement"),
-        Column("reason", designs.reasons, "", "why it is not feasible"),
-    )
-    return Table("designs", columns, "every design that was evaluated")
+    ends = DESIGNS.columns({}, feasible=designs.feasible, reason=designs.reasons)
+    return DESIGNS.table([*designs.columns(slice(None), errors=True), *ends])
 
 
 def nearest_table(designs: Designs, row: int) -> Table:
@@ -81,14 +69,10 @@ def nearest_table(designs: Designs, row: int) -> Table:
             for each, unit in zip(designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True)
         ]
     names, values, bounds_of, missing, units = zip(*found, strict=True)
-    columns = (
-        Column("condition", np.array(names, dtype=object), "", "what is asked, or why it cannot be built"),
-        Column("value", np.array(values), "", "what the design has, in `unit`"),
-        Column("bound", np.array(bounds_of), "", "what is asked for, in `unit`"),
-        Column("missing", np.array(missing), "", "by how much the bound is missed, in `unit`; 0 where it is met"),
-        Column("unit", np.array(units, dtype=object), "", "unit of the three columns before"),
-    )
-    return Table("nearest", columns, "conditions of the design that is nearest to a feasible one")
+    return NEAREST.table(NEAREST.columns(
+        {}, condition=np.array(names, dtype=object), value=np.array(values), bound=np.array(bounds_of),
+        missing=np.array(missing), unit=np.array(units, dtype=object),
+    ))  # fmt: skip
 
 
 def bounds_table(designs: Designs) -> Table:
@@ -96,18 +80,13 @@ def bounds_table(designs: Designs) -> Table:
     names = [*(each.name for each in designs.goals), "CPI"]
     values = np.where(designs.feasible[:, None], np.column_stack([designs.values, designs.cpi]), np.nan)
     low, high = np.nanargmin(values, axis=0), np.nanargmax(values, axis=0)
-    columns = [
-        Column("index", np.array(names), "", "index"),
-        Column("min", values[low, np.arange(len(names))], "", "smallest value"),
-        Column("max", values[high, np.arange(len(names))], "", "largest value"),
-    ]
+    numbers = np.arange(len(names))
+    columns = BOUNDS.columns({}, index=np.array(names), min=values[low, numbers], max=values[high, numbers])
     for name in designs.variables:
         unit, column = designs.unit_of(name), designs.shown(name)
-        columns += [
-            Column(f"{name}_at_min", column[low], unit, f"{name} of the design with the smallest value"),
-            Column(f"{name}_at_max", column[high], unit, f"{name} of the design with the largest value"),
-        ]
-    return Table("bounds", tuple(columns), "extremes of each index over the feasible designs")
+        for end, rows in (("min", low), ("max", high)):
+            columns.append(BOUNDS[f"<variable>_at_{end}"].column(column[rows], unit, variable=name))
+    return BOUNDS.table(columns)
 
 
 def best_table(designs: Designs) -> Table:
@@ -132,13 +111,9 @@ def best_table(designs: Designs) -> Table:
                 near &= np.abs(column - column[k]) <= apart
             score[near] = -np.inf
     row_numbers, ranks, picked, scores = (np.array(column) for column in zip(*chosen, strict=True))
-    columns = (
-        Column("optimum", row_numbers, "", "row of optimum.csv whose weights are taken"),
-        Column("rank", ranks, "", "1 is the optimum"),
-        *designs.columns(picked),
-        *shared(designs.study.units, score=scores),
-    )
-    return Table("best", columns, "the best designs for each set of weights, none of them next to a better one")
+    return BEST.table([
+        *BEST.columns({}, optimum=row_numbers, rank=ranks), *designs.columns(picked), *BEST.columns({}, score=scores)
+    ])  # fmt: skip
 
 
 def _active(designs: Designs) -> NDArray[np.object_]:
@@ -192,22 +167,11 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
         gained = designs.score_of(values, weights) - designs.score_of(designs.values[[winner]], weights)
         changes[row] = np.append(np.where(feasible, gained, np.nan), np.nan)[which[row]]
     down, up = changes.reshape(-1, 2).T
-    meaning = "change of the score one step {}, nan where that leaves the bounds or is infeasible"
-    columns = (
-        Column("optimum", np.repeat(np.arange(len(optima)) + 1, len(names)), "", "row of optimum.csv"),
-        Column("variable", np.array(names * len(optima)), "", "design variable that has a range; the others are held"),
-        Column("value", optima[:, ranged].ravel(), "", "at the optimum, in `unit`"),
-        Column("step", step.ravel(), "", "the variable's own, else a hundredth of the range, in `unit`"),
-        Column(
-            "unit",
-            np.array([designs.unit_of(name) for name in names] * len(optima)),
-            "",
-            "unit of the two columns before",
-        ),
-        Column("score_down", down, "", meaning.format("down")),
-        Column("score_up", up, "", meaning.format("up")),
-    )
-    return Table("sensitivity", columns, "how the score changes a step from each optimum")
+    return SENSITIVITY.table(SENSITIVITY.columns(
+        {}, optimum=np.repeat(np.arange(len(optima)) + 1, len(names)), variable=np.array(names * len(optima)),
+        value=optima[:, ranged].ravel(), step=step.ravel(),
+        unit=np.array([designs.unit_of(name) for name in names] * len(optima)), score_down=down, score_up=up,
+    ))  # fmt: skip
 
 
 def _inside(study: Study, designs: Batch) -> Flags:

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.reliability.aims import Simulated, aim_of
 from mechdesign.analyses.reliability.allocated import allocated_data
 from mechdesign.analyses.reliability.cheapest import TIGHTEST, WIDEST, ToleranceModel, cheapest, tolerances
+from mechdesign.analyses.reliability.columns import ALLOCATION, CONFIRMATION
 from mechdesign.analyses.reliability.grades import graded
 from mechdesign.analyses.reliability.tables import at_poses
 from mechdesign.analyses.reliability.task import Partial, Task
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study.schema.reliability import Precision, ReliabilitySection
 from mechdesign.study.variants import rewritten
 
@@ -247,23 +247,13 @@ def _allocation(last: _Round) -> Table:
     prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, each, strict=True)])
               for each in (given, sizes)]  # fmt: skip
     names = np.array([tolerance.grade(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)])
-    meaning = "standard grade of ISO 286-1 that it is, half to either side; empty where it is held"
-    grades = [Column("grade", names, meaning=meaning)] if last.model.steps else []
-    columns = (
-        Column("source", np.array([tolerance.name for tolerance in found]), meaning="what varies"),
-        Column("kind", np.array([tolerance.kind for tolerance in found]),
-               meaning="tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one"),
-        Column("given", np.array(given), meaning="as the study gives it, in `unit`"),
-        Column("allocated", np.array(sizes), meaning="the cheapest, in `unit`"),
-        Column("unit", np.array([tolerance.unit for tolerance in found]), meaning="unit of the two columns before"),
-        *grades,
-        Column("cost_given", prices[0], meaning="a/T^exponent; nan where it is held"),
-        Column("cost_allocated", prices[1], meaning="a/T^exponent; nan where it is held"),
-        Column("share", _shares(last.model, last.scales)[_worst(last.model.aim.level(last.analytic))[1]],
-               meaning="share of the limited errors' variance (over the square of each limit) with the "
-               "allocated tolerances, at the pose that fails most often"),
-    )  # fmt: skip
-    return Table("allocation", columns, "the cheapest tolerances that reach what is asked")
+    return ALLOCATION.table(ALLOCATION.columns(
+        {}, source=np.array([tolerance.name for tolerance in found]),
+        kind=np.array([tolerance.kind for tolerance in found]), given=np.array(given), allocated=np.array(sizes),
+        unit=np.array([tolerance.unit for tolerance in found]), **({"grade": names} if last.model.steps else {}),
+        cost_given=prices[0], cost_allocated=prices[1],
+        share=_shares(last.model, last.scales)[_worst(last.model.aim.level(last.analytic))[1]],
+    ))  # fmt: skip
 
 
 def _confirmation(last: _Round) -> Table:
@@ -273,20 +263,12 @@ def _confirmation(last: _Round) -> Table:
     value, worst, best, analytic, target = (
         aim.shown(part[place]) for part in (said.value, said.worst, said.best, last.analytic, aim.measure(last.wanted))
     )
-    columns = [
-        *at_poses(task, np.array([setting.pose for setting in task.settings])),
-        Column("asked", aim.shown(np.full(len(value), aim.asked)), meaning="reliability, or Cpk, asked for"),
-        Column("target", target, meaning="what the analytic model had to reach for it"),
-        Column("analytic", analytic, meaning="reliability, or least Cpk of any limit, by the first-order model"),
-        Column("simulated", value, meaning="the same by simulation"),
-        Column("low", worst, meaning="lower end of its interval, 99.7 %"),
-        Column("high", best, meaning="upper end of its interval, 99.7 %"),
-        Column("method", np.full(len(value), last.method), meaning="how it was simulated"),
-        *shared(task.study.units, evaluations=said.evaluations),
-        Column("met", np.logical_not(last.missed().any(axis=0)),
-               meaning="1 where the interval holds what is asked, or all of it is above"),
-    ]  # fmt: skip
-    return Table("confirmation", tuple(columns), "reliability, or Cpk, of the allocated tolerances")
+    poses = at_poses(task, np.array([setting.pose for setting in task.settings]))
+    return CONFIRMATION.table(poses + CONFIRMATION.columns(
+        {}, asked=aim.shown(np.full(len(value), aim.asked)), target=target, analytic=analytic, simulated=value,
+        low=worst, high=best, method=np.full(len(value), last.method), evaluations=said.evaluations,
+        met=np.logical_not(last.missed().any(axis=0)),
+    ))  # fmt: skip
 
 
 def _ends(last: _Round) -> list[Caution]:

@@ -7,9 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
 from mechdesign.analyses.reliability import methods
+from mechdesign.analyses.reliability.columns import (
+    CAPABILITY,
+    CONTRIBUTIONS,
+    CONVERGENCE,
+    DENSITY,
+    ESTIMATE,
+    HISTOGRAM,
+    MOMENTS,
+    RELIABILITY,
+)
 from mechdesign.analyses.reliability.engine.problem import Estimate, binomial, counted
 from mechdesign.analyses.reliability.first_order import correlation
 from mechdesign.analyses.reliability.question import ReliabilityQuestion, holders
@@ -25,8 +34,6 @@ _BINS = 60
 _FARTHEST = 6.0
 # Standard deviation, as a part of the size, up to which an error does not vary.
 _CONSTANT = 1e-12
-# What a sigma level is.
-_LEVEL = "quantile of the standard normal law, without a shift of 1.5 sigma,"
 # Where nothing was computed.
 _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
@@ -36,10 +43,10 @@ def at_poses(task: Task, rows: Ints) -> list[Column]:
     return pose_columns(task.study, task.poses, rows)
 
 
-def of_channels(task: Task, channels: Ints) -> list[Column]:
-    """Columns of the names of these channels."""
+def _channels(task: Task, channels: Ints) -> dict[str, Strings]:
+    """Names of these channels, by columns."""
     output, order, _ = task.labels
-    return shared(task.study.units, output=output[channels], order=order[channels])
+    return {"output": output[channels], "order": order[channels]}
 
 
 def _with_moments(task: Task, found: Sequence[MethodResult]) -> Sequence[MethodResult]:
@@ -59,22 +66,12 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
-    columns = [
-        *at_poses(task, pose),
-        *shared(task.study.units, method=np.array([each.method for each in known])[method]),
-        *of_channels(task, channel),
-        Column("nominal", nominal, meaning="value of the nominal mechanism, in `unit`"),
-        Column("mean", nominal + mean, meaning="mean over made mechanisms, in `unit`"),
-        Column("sigma", sigma, meaning="standard deviation of the error, in `unit`"),
-        Column("worst_case", (linear.worst_case() * scale)[channel, pose],
-               meaning="sum of |sensitivity| times the larger end of the tolerance, in `unit`"),
-        Column("worst_low", (low * scale)[channel, pose], meaning="lowest error that the tolerances allow, in `unit`"),
-        Column("worst_high", (high * scale)[channel, pose],
-               meaning="highest error that the tolerances allow, in `unit`"),
-        Column("unit", task.labels[2][channel], meaning="unit of the six columns before"),
-        *shared(task.study.units, valid=task.reason[pose] == 0),
-    ]  # fmt: skip
-    return Table("moments", tuple(columns), "mean and standard deviation of outputs per pose and method")
+    return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
+        {}, method=np.array([each.method for each in known])[method], **_channels(task, channel), nominal=nominal,
+        mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
+        worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
+        unit=task.labels[2][channel], valid=task.reason[pose] == 0,
+    ))  # fmt: skip
 
 
 def success(task: Task, found: Sequence[MethodResult]) -> Table:
@@ -96,37 +93,24 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
         np.array([getattr(e, name) for e in estimates], dtype=np.int64)
         for name in ("samples", "invalid", "evaluations")
     )
-    kind = "99.7 %; of counted failures Clopper-Pearson"
     columns = [
-        Column("scope", np.where(whole, "cycle", "pose"),
-               meaning="a pose by itself, or one made mechanism at all poses, the steps between unseen"),
+        *RELIABILITY.columns({}, scope=np.where(whole, "cycle", "pose")),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
-        *shared(task.study.units, method=[each.method for each in methods_of]),
-        Column("reliability", 1.0 - failure, meaning="probability that every limit is kept"),
-        Column("low", 1.0 - high, meaning=f"lower end of its interval, {kind}"),
-        Column("high", 1.0 - low, meaning=f"upper end of its interval, {kind}"),
-        Column("failure", failure, meaning="1 - reliability, without loss of digits; 0 where no failure was seen, and "
-               "failure_high bounds it"),
-        Column("failure_low", low, meaning=f"lower end of its interval, {kind}; of a cycle's bounds the worst pose's"),
-        Column("failure_high", high, meaning=f"upper end of its interval, {kind}; of a cycle's bounds the poses' sum"),
-        Column("error", error,
-               meaning="3 sqrt(p (1 - p)/N) of the simulation [S2, eq. 16]; else half the interval"),
-        Column("samples", samples, meaning="samples that the value is taken from; 0: none"),
-        Column("invalid", invalid, meaning="samples that cannot be assembled; they are failures"),
-        *shared(task.study.units, evaluations=evaluations),
-        Column("used", np.array(used), meaning="where the value comes from: of auto, the method it used"),
-        Column("sigma_level", _sigma_level(failure), meaning=f"{_LEVEL} of the reliability"),
-        Column("ppm", 1e6 * failure, meaning="failures in a million"),
+        *RELIABILITY.columns(
+            {"kind of interval": "99.7 %; of counted failures Clopper-Pearson"},
+            method=[each.method for each in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
+            failure=failure, failure_low=low, failure_high=high, error=error, samples=samples, invalid=invalid,
+            evaluations=evaluations, used=np.array(used), sigma_level=_sigma_level(failure), ppm=1e6 * failure,
+        ),
     ]  # fmt: skip
     if task.question.pair is not None:
         pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
         values = np.full(len(whole), np.nan)
         values[~whole] = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1).ravel()
-        columns.append(Column("rho", values, meaning="correlation of the two outputs"))
+        columns += RELIABILITY.columns({}, rho=values)
     all_valid = (task.reason == 0).reshape(task.poses.designs, -1).all(axis=1)
     valid = np.where(whole, all_valid[pose // length], task.reason[pose] == 0)
-    columns.append(Column("valid", valid, meaning="1 where the nominal pose (all, of a cycle) is valid"))
-    return Table("reliability", tuple(columns), "probability that the errors keep their limits")
+    return RELIABILITY.table([*columns, *RELIABILITY.columns({}, valid=valid)])
 
 
 def _sigma_level(failure: Floats) -> Floats:
@@ -169,28 +153,13 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
     )  # fmt: skip
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
-    interval = "end of its interval, 99.7 %, where samples are counted"
-    columns = [
-        *at_poses(task, pose),
-        *shared(task.study.units, method=np.array([each.method for each in known])[method]),
-        *shared(task.study.units, output=output[limit], order=order[limit]),
-        Column("lsl", np.where(np.isfinite(low), nominal + low, np.nan).ravel(),
-               meaning="lower specification limit of the value, in `unit`; nan: none"),
-        Column("usl", upper.ravel(),
-               meaning="upper specification limit of the value, of a point the radius of its error, in `unit`"),
-        Column("nominal", nominal.ravel(), meaning="value of the nominal mechanism, in `unit`; nan of a point"),
-        Column("mean", (nominal + mean).ravel(), meaning="mean over made mechanisms, in `unit`"),
-        Column("sigma", sigma.ravel(), meaning="standard deviation of the value, in `unit`"),
-        Column("cp", cp.ravel(), meaning="(USL - LSL)/(6 sigma); nan of a single limit"),
-        Column("cpk", cpk.ravel(), meaning="distance of the mean from the nearer limit over 3 sigma"),
-        Column("sigma_level", _sigma_level(failure).ravel(), meaning=f"{_LEVEL} of the share within the limits"),
-        Column("ppm", 1e6 * failure.ravel(), meaning="values in a million outside these limits"),
-        Column("ppm_low", 1e6 * least.ravel(), meaning=f"lower {interval}"),
-        Column("ppm_high", 1e6 * most.ravel(), meaning=f"upper {interval}"),
-        Column("unit", unit[limit], meaning="unit of the five columns from lsl to sigma"),
-        *shared(task.study.units, valid=task.reason[pose] == 0),
-    ]  # fmt: skip
-    return Table("capability", tuple(columns), "process capability of each limited output")
+    return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
+        {}, method=np.array([each.method for each in known])[method], output=output[limit], order=order[limit],
+        lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
+        mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
+        sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
+        ppm_high=1e6 * most.ravel(), unit=unit[limit], valid=task.reason[pose] == 0,
+    ))  # fmt: skip
 
 
 def _each_limit(task: Task, found: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
@@ -218,36 +187,21 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     below += [study.units.label("length")] * pins
     units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
     links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
-    columns = [
-        *at_poses(task, pose),
-        Column("source", names[source], meaning="parameter, dimension, drive, or joint's clearance"),
-        *of_channels(task, channel),
-        Column("on", links[channel],
-               meaning="links whose point the output is, where its pin has a clearance or gives; of several, midway"),
-        Column("sensitivity", sensitivity.ravel(),
-               meaning="derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)"),
-        Column("derivative", (sensitivity * task.scale[:, None] * factors).ravel(),
-               meaning="the same for one unit of the source as the study counts it, in `unit`"),
-        Column("unit", units[channel, source], meaning="unit of `derivative`: the output's over the source's"),
-        Column("share", share.ravel(), meaning="share of the output's variance, to the first order"),
-        *_index_columns(indices, share.shape),
-    ]  # fmt: skip
-    return Table("contributions", tuple(columns), "what the errors come from")
+    return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
+        {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
+        derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
+        share=share.ravel(), **_index_values(indices, share.shape),
+    ))  # fmt: skip
 
 
-def _index_columns(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> list[Column]:
-    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; nan where not asked."""
-    ends = {"": "", "_low": ", lower end of its interval, 99.7 %", "_high": ", upper end of its interval, 99.7 %"}
-    columns: list[Column] = []
-    for kind, meaning in (
-        ("first", "share of the output's variance that the source causes by itself [Sobol, 1993]"),
-        ("total", "share that the source causes by itself and together with others"),
-    ):
+def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
+    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; none where not asked."""
+    columns: dict[str, Floats] = {}
+    for kind in ("first", "total") if found else ():
         values = np.full((3, *shape), np.nan)
         for pose, each in found.items():
             values[:, pose] = getattr(each, kind)
-        columns += [Column(f"sobol_{kind}{end}", part.ravel(), meaning=meaning + more)
-                    for (end, more), part in zip(ends.items(), values, strict=True) if found]  # fmt: skip
+        columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
     return columns
 
 
@@ -327,15 +281,11 @@ def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
     for k, channel in enumerate(pair):
         sigma, mean = np.sqrt(blocks[:, k, k]) * task.scale[channel], shift[channel, rows] * task.scale[channel]
         errors = mean[:, None] + np.outer(sigma, place[k])
-        columns.append(Column(f"{names[k]}_error", errors.ravel(), task.labels[2][channel], "centre of the cell"))
+        columns.append(DENSITY["<output>_error"].column(errors.ravel(), task.labels[2][channel], output=names[k]))
     for axis, name, values in zip("xy", names, place, strict=True):
-        meaning = f"error of {name} about its mean, in deviations of the first order"
-        columns.append(Column(axis, np.tile(values, len(rows)), meaning=meaning))
-    columns += [
-        Column("normal", normal.ravel(), meaning="bivariate normal density, standardised"),
-        Column("simulated", np.concatenate(simulated), meaning="density of the samples, standardised"),
-    ]
-    return Table("density", tuple(columns), "density of two errors: bivariate normal and simulation [S2, Figs. 4, 5]")
+        columns += DENSITY.columns({"output": name}, **{axis: np.tile(values, len(rows))})
+    columns += DENSITY.columns({}, normal=normal.ravel(), simulated=np.concatenate(simulated))
+    return DENSITY.table(columns)
 
 
 def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
@@ -362,17 +312,10 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
         return None
     channel, samples = np.repeat(varying, _BINS), sums[row].kept.shape[1]
     low_, high_, count_, normal_ = np.concatenate(parts, axis=1)
-    columns = [
-        *at_poses(task, np.full(len(channel), row)),
-        *of_channels(task, channel),
-        Column("low", low_, meaning="begin of the bin of errors, in `unit`"),
-        Column("high", high_, meaning="end of the bin, in `unit`"),
-        Column("count", count_.astype(np.int64), meaning=f"samples in the bin, of {samples}"),
-        Column("density", count_ / (samples * (high_ - low_)), meaning="their density, in 1/`unit`"),
-        Column("normal", normal_, meaning="density of the normal law of the samples' mean and deviation, in 1/`unit`"),
-        Column("unit", units[channel], meaning="unit of the error"),
-    ]
-    return Table("histogram", tuple(columns), "errors drawn at the pose that is shown, and their normal fit")
+    return HISTOGRAM.table(at_poses(task, np.full(len(channel), row)) + HISTOGRAM.columns(
+        {"samples": str(samples)}, **_channels(task, channel), low=low_, high=high_, count=count_.astype(np.int64),
+        density=count_ / (samples * (high_ - low_)), normal=normal_, unit=units[channel],
+    ))  # fmt: skip
 
 
 def _convergence(task: Task, row: int, sums: Sums) -> Table:
@@ -380,25 +323,17 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
     step, channel = (index.ravel() for index in np.indices(means.shape))
-    columns = [
-        *at_poses(task, np.full(len(step), row)),
-        Column("samples", trend[step, 1].astype(np.int64), meaning="valid samples so far"),
-        *of_channels(task, channel),
-        Column("mean", means.ravel(), meaning="their mean, in `unit`"),
-        Column("unit", task.labels[2][channel], meaning="unit of the mean"),
-    ]
-    return Table("convergence", tuple(columns), "trend of the means with the number of samples [S3, Fig. 4]")
+    return CONVERGENCE.table(at_poses(task, np.full(len(step), row)) + CONVERGENCE.columns(
+        {}, samples=trend[step, 1].astype(np.int64), **_channels(task, channel), mean=means.ravel(),
+        unit=task.labels[2][channel],
+    ))  # fmt: skip
 
 
 def _estimate(task: Task, row: int, sums: Sums) -> Table:
     """Share of failures after so many samples, with its interval, at the pose that is shown."""
     samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
     interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
-    columns = [
-        *at_poses(task, np.full(len(samples), row)),
-        Column("samples", samples, meaning="samples so far"),
-        Column("failure", failures / samples, meaning="share of them that broke a limit or cannot be assembled"),
-        Column("failure_low", interval[:, 0], meaning="lower end of its interval, 99.7 %, Clopper-Pearson"),
-        Column("failure_high", interval[:, 1], meaning="upper end of its interval, 99.7 %, Clopper-Pearson"),
-    ]
-    return Table("estimate", tuple(columns), "probability of failure with the number of samples")
+    columns = ESTIMATE.columns(
+        {}, samples=samples, failure=failures / samples, failure_low=interval[:, 0], failure_high=interval[:, 1]
+    )
+    return ESTIMATE.table([*at_poses(task, np.full(len(samples), row)), *columns])

@@ -7,15 +7,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import pose_columns
+from mechdesign.analyses.stiffness.columns import (
+    COMPLIANCE,
+    DEFLECTIONS,
+    DISPLACEMENTS,
+    EIGEN,
+    FORCES,
+    LOAD,
+    SPRINGS,
+    STIFFNESS,
+)
 from mechdesign.analyses.stiffness.compliance import Held, directional, scales
 from mechdesign.analyses.stiffness.force_method import Effects, joints_of, points_of
 from mechdesign.analyses.stiffness.network import Network
 from mechdesign.analyses.stiffness.screws import principal
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, Lanes
-from mechdesign.results import Column, Table
+from mechdesign.results import Column, Table, TableKind
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -42,48 +51,31 @@ class Springs(Lanes):
         return np.bincount(self.row // poses, minlength=designs)
 
 
-def _entries(study: Study, letter: str, matrix: Floats, what: str, meaning: str) -> list[Column]:
+def _entries(study: Study, table: TableKind, letter: str, matrix: Floats) -> list[Column]:
     """Columns of the upper triangle of stiffness or compliance matrices."""
-    prefix = ("", "coupling_", "rotational_")
-    return [
-        Column(
-            f"{letter}{i + 1}{j + 1}", matrix[:, i, j], study.units.label(prefix[(i == 2) + (j == 2)] + what), meaning
-        )
-        for i in range(matrix.shape[1])
-        for j in range(i, matrix.shape[1])
-    ]
+    size = range(matrix.shape[1])
+    entries = {f"{letter}{i + 1}{j + 1}": matrix[:, i, j] for i in size for j in size if i <= j}
+    return table.columns(study.units.labels, **entries)
 
 
 def stiffness_table(
     study: Study, poses: Poses, held: Held, valid: Flags, method: str, direction: Value | None
 ) -> Table:
-    """``stiffness.csv``; `direction` is in the study's units, one for all poses or each."""
-    units, soft = study.units, held.compliance
-    size = soft.shape[1]
+    """``stiffness.csv``; `direction` in the study's units, of all poses or of each."""
+    units, labels, soft = study.units, study.units.labels, held.compliance
     low, high, angle = principal(soft)
     with np.errstate(divide="ignore"):
-        direct = [1 / soft[:, k, k] for k in range(size)]
-    columns = pose_columns(study, poses)
-    unit, turning = units.label("stiffness"), units.label("rotational_stiffness")
-    for name, values, per in zip(("k_x", "k_y", "k_phi"), direct, (unit, unit, turning), strict=False):
-        columns.append(Column(name, values, per, "load over its own displacement, the others free"))
-    columns += [
-        Column("k_min", low, unit, "stiffness to a force in the softest direction, the body free to turn"),
-        Column("k_max", high, unit, "stiffness to a force in the stiffest direction, the body free to turn"),
-        Column("k_angle", angle / units.angle_factor, units.label("angle"), "angle of the stiffest direction"),
+        direct = {f"k_{axis}": 1 / soft[:, k, k] for k, axis in enumerate(("x", "y", "phi")[: soft.shape[1]])}
+    columns = [
+        *pose_columns(study, poses),
+        *STIFFNESS.columns(labels, **direct, k_min=low, k_max=high, k_angle=angle / units.angle_factor),
     ]
     if direction is not None:
-        along = directional(soft, direction * units.angle_factor)
-        columns.append(Column("k_direction", along, unit, "force in the asked direction over displacement along it"))
-    columns += _entries(study, "K", held.stiffness, "stiffness", "stiffness matrix at the asked point; nan where rigid")
-    columns.append(Column("rank", held.rank, "", "number of independent wrenches that hold the body"))
-    free = zip(("free_x", "free_y", "free_phi"), held.free.T, (units.label("length"),) * 2 + ("",), strict=False)
-    for name, values, per in free:
-        columns.append(Column(name, values, per, "the free twist, per radian where it turns; nan where none is free"))
-    how = "serial legs: reciprocal screws [S4]; force method: any other"
-    columns += shared(units, valid=valid)
-    columns.append(Column("method", np.full(poses.count, method), "", how))
-    return Table("stiffness", tuple(columns), "stiffness at the asked point per pose, axes of the world, per radian")
+        columns += STIFFNESS.columns(labels, k_direction=directional(soft, direction * units.angle_factor))
+    free = dict(zip(("free_x", "free_y", "free_phi"), held.free.T, strict=False))
+    columns += _entries(study, STIFFNESS, "K", held.stiffness)
+    columns += STIFFNESS.columns(labels, rank=held.rank, **free, valid=valid, method=np.full(poses.count, method))
+    return STIFFNESS.table(columns)
 
 
 def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Table:
@@ -104,79 +96,50 @@ def eigen_table(study: Study, poses: Poses, soft: Floats, length: Value) -> Tabl
     lead = np.argmax(np.abs(twists) > 1e-9, axis=2)
     twists = twists * np.where(np.take_along_axis(twists, lead[:, :, None], axis=2) < 0, -1.0, 1.0)
     repeat = np.repeat(np.arange(poses.count), 3)
-    units = study.units
-    columns = pose_columns(study, poses, repeat)
-    columns += [
-        Column("mode", np.tile([1, 2, 3], poses.count), "", "softest first"),
-        Column("stiffness", stiffness.ravel(), units.label("stiffness"), "eigenvalue of the scaled stiffness matrix"),
-        Column("dx", twists[:, :, 0].ravel(), "", "its twist, of unit size"),
-        Column("dy", twists[:, :, 1].ravel(), "", "its twist, of unit size"),
-        Column("turn", twists[:, :, 2].ravel(), "", "its twist: the characteristic length times dphi"),
-    ]
-    return Table("eigen", tuple(columns), "eigen-stiffnesses by the characteristic length")
+    dx, dy, turn = twists.reshape(-1, 3).T
+    return EIGEN.table(pose_columns(study, poses, repeat) + EIGEN.columns(
+        study.units.labels, mode=np.tile([1, 2, 3], poses.count), stiffness=stiffness.ravel(), dx=dx, dy=dy, turn=turn
+    ))  # fmt: skip
 
 
 def compliance_table(study: Study, poses: Poses, soft: Floats) -> Table:
-    """``compliance.csv``: C11 to C33, a row for each pose."""
-    columns = pose_columns(study, poses) + _entries(study, "C", soft, "compliance", "displacement per load")
-    return Table(
-        "compliance", tuple(columns), "twist (dx, dy, dphi in radians) at the asked point per load, axes of the world"
-    )
+    """``compliance.csv``: C11 ... C33."""
+    return COMPLIANCE.table(pose_columns(study, poses) + _entries(study, COMPLIANCE, "C", soft))
 
 
 def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Springs) -> Table:
     """``springs.csv``: a row for each pose, leg and spring."""
     units = study.units
-    per_radian = units.label("rotational_stiffness")
-    columns = [
-        *pose_columns(study, poses, springs.row),
-        Column("leg", np.array([*legs, ""])[springs.leg], "", "links of the leg, from the base"),
-        Column("stiffness", springs.stiffness, units.label("stiffness"),
-               f"along its line, inf where rigid; where angle is nan about its point ({per_radian})"),
-        Column("x", springs.place.real, units.label("length"), "a point on its line"),
-        Column("y", springs.place.imag, units.label("length"), "a point on its line"),
-        Column("angle", springs.angle / units.angle_factor, units.label("angle"), "direction of its line"),
-    ]  # fmt: skip
-    return Table("springs", tuple(columns), "springs that hold the body as its legs do")
+    return SPRINGS.table(pose_columns(study, poses, springs.row) + SPRINGS.columns(
+        units.labels | {"unit": units.label("rotational_stiffness")}, leg=np.array([*legs, ""])[springs.leg],
+        stiffness=springs.stiffness, x=springs.place.real, y=springs.place.imag,
+        angle=springs.angle / units.angle_factor,
+    ))  # fmt: skip
 
 
 def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
-    """``deflections.csv``: a row for each pose and load; `loads` of shape (poses, loads, 3)."""
-    units = study.units
+    """``deflections.csv``: a row a pose and load; `loads` of shape (poses, loads, 3)."""
     size = soft.shape[1]
     moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), loads.shape[1])
-    applied = loads.reshape(-1, 3)
-    columns = pose_columns(study, poses, repeat)
-    force, moment, length = units.label("force"), units.label("moment"), units.label("length")
-    for name, values, unit in zip(("fx", "fy", "mz")[:size], applied.T, (force, force, moment), strict=False):
-        columns.append(Column(name, values, unit, "load at the asked point"))
-    for name, values, unit in zip(("dx", "dy", "dphi")[:size], moved.T, (length, length, "rad"), strict=False):
-        columns.append(Column(name, values, unit, "deflection of the asked point"))
-    return Table("deflections", tuple(columns), "deflections under the study's loads")
+    names = (*("fx", "fy", "mz")[:size], *("dx", "dy", "dphi")[:size])
+    values = (*loads.reshape(-1, 3).T[:size], *moved.T)
+    columns = DEFLECTIONS.columns(study.units.labels | {"as radians": "rad"}, **dict(zip(names, values, strict=True)))
+    return DEFLECTIONS.table([*pose_columns(study, poses, repeat), *columns])
 
 
 def forces_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
     """``forces.csv``: what every joint bears, a row for each pose, load and joint."""
     edges = [network.edges[k] for k in joints_of(network)]
     count, joints, loads, _ = effects.forces.shape
-    values = effects.forces.swapaxes(1, 2).reshape(-1, 3)
-    units = study.units
-    body = "a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several links ('pin:')"
-    columns = _of_loads(study, poses, loads, joints)
-    for name, words, meaning in (
-        ("joint", [edge.name for edge in edges], "point or slide"),
-        ("on", [_link(edge.a) for edge in edges], f"what the force acts on: {body}"),
-        ("by", [_link(edge.b) for edge in edges],
-         "what exerts it; in a telescopic leg its rod, on the part at its first end"),
-    ):  # fmt: skip
-        columns.append(Column(name, np.tile(words, count * loads), "", meaning))
-    columns += [
-        Column("fx", values[:, 0], units.label("force"), "force on the one by the other, axes of the world"),
-        Column("fy", values[:, 1], units.label("force"), "force on the one by the other, axes of the world"),
-        Column("mz", values[:, 2], units.label("moment"), "moment likewise, about the joint's point"),
-    ]
-    return Table("forces", tuple(columns), "what the joints bear under the study's loads")
+    fx, fy, mz = effects.forces.swapaxes(1, 2).reshape(-1, 3).T
+    words = {
+        "joint": [edge.name for edge in edges], "on": [_link(edge.a) for edge in edges],
+        "by": [_link(edge.b) for edge in edges],
+    }  # fmt: skip
+    tiled = {name: np.tile(texts, count * loads) for name, texts in words.items()}
+    columns = FORCES.columns(study.units.labels, **tiled, fx=fx, fy=fy, mz=mz)
+    return FORCES.table([*_of_loads(study, poses, loads, joints), *columns])
 
 
 def displacements_table(study: Study, poses: Poses, network: Network, effects: Effects) -> Table:
@@ -185,24 +148,18 @@ def displacements_table(study: Study, poses: Poses, network: Network, effects: E
     count, number, loads = effects.moves.shape
     moved = effects.moves.swapaxes(1, 2).ravel()
     places = np.repeat(effects.places[:, None], loads, axis=1).ravel()
-    length = study.units.label("length")
-    columns = _of_loads(study, poses, loads, number)
-    columns += [
-        Column("link", np.tile([link for link, _, _ in points], count * loads), "", "link"),
-        Column("point", np.tile([point for _, point, _ in points], count * loads), "", "its point"),
-        Column("x", places.real, length, "place without a load"),
-        Column("y", places.imag, length, "place without a load"),
-        Column("dx", moved.real, length, "displacement"),
-        Column("dy", moved.imag, length, "displacement"),
-    ]
-    return Table("displacements", tuple(columns), "displacements of all points under the study's loads")
+    return DISPLACEMENTS.table(_of_loads(study, poses, loads, number) + DISPLACEMENTS.columns(
+        study.units.labels, link=np.tile([link for link, _, _ in points], count * loads),
+        point=np.tile([point for _, point, _ in points], count * loads), x=places.real, y=places.imag, dx=moved.real,
+        dy=moved.imag,
+    ))  # fmt: skip
 
 
 def _of_loads(study: Study, poses: Poses, loads: int, rows: int) -> list[Column]:
     """Columns of the pose and of the load's number, for `rows` rows of each pose and load."""
     repeat = np.repeat(np.arange(poses.count), loads * rows)
     numbers = np.tile(np.repeat(np.arange(1, loads + 1), rows), poses.count)
-    return [*pose_columns(study, poses, repeat), Column("load", numbers, "", "which of the study's loads")]
+    return [*pose_columns(study, poses, repeat), LOAD.column(numbers)]
 
 
 def _link(vertex: str) -> str:

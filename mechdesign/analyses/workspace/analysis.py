@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.columns import SHARED, power_of_length, shared
+from mechdesign.analyses.columns import power_of_length
 from mechdesign.analyses.poses import in_study_units
 from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
+from mechdesign.analyses.workspace.columns import BOUNDARY, INDICES, LOCAL, PIECES, RANGE_INDICES
 from mechdesign.analyses.workspace.ellipses import ellipses
 from mechdesign.analyses.workspace.index import Local, determinant_power, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
@@ -44,7 +45,7 @@ from mechdesign.analyses.workspace.tables import (
 )
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
-from mechdesign.indices import REGIONAL, STATISTICS, index
+from mechdesign.indices import index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
@@ -107,16 +108,14 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
         progress.update(1)
     if not regions:
         raise AssemblyError(_unreachable(study, asked))
-    indices = Table("indices", (*_indices(study, asked, answers), *inscribed_columns(study, shapes)),
-                    "performance indices over the region")  # fmt: skip
+    indices = INDICES.table([*_indices(study, asked, answers), *inscribed_columns(study, shapes)])
     tables = [
         indices,
         *_totals(indices, asked),
-        Table("local", stacked([_local(*region) for region in regions]),
-              "local indices on a grid that follows the boundary"),
+        LOCAL.table(stacked([_local(*region) for region in regions])),
         *outlines(regions),
         *_several(pieces),
-    ]  # fmt: skip
+    ]
     empty = sum(not given.panels.closes[0] for given in answers)
     named = {table.name: table for table in tables}
     along = poses_along(study, regions[0][1].held, named["boundary"])
@@ -146,7 +145,7 @@ def _totals(indices: Table, asked: Sequence[Question]) -> Iterator[Table]:
 
 def _several(pieces: Sequence[Sequence[Column]]) -> Iterator[Table]:
     """The table of pieces, where a region has several."""
-    table = Table("pieces", stacked(pieces), "pieces of the region that do not hang together")
+    table = PIECES.table(stacked(pieces))
     if (table["piece"] > 1).any():
         yield table
 
@@ -188,14 +187,14 @@ def _doubts(question: Question, given: Evaluation) -> Iterator[Caution]:
 
 def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluation]) -> Iterator[Column]:
     yield from stacked([held_columns(study, question, 1) for question in asked])
-    meanings = index_meanings(study, asked[0])
+    kinds = index_columns(study, asked[0])
 
     def column(name: str) -> Column:
-        return Column(name, np.concatenate([given.values[name] for given in answers]), *meanings[name])
+        return replace(kinds[name], values=np.concatenate([given.values[name] for given in answers]))
 
     def error(name: str) -> Column:
         values = np.concatenate([given.errors[name] for given in answers])
-        return Column(f"{name}_error", values, meanings[name][0], f"estimated error of {name}")
+        return INDICES["<statistic>_error"].column(values, kinds[name].unit, statistic=name)
 
     estimated = asked[0].rule == "gauss"
     statistics = [name for name in asked[0].wanted if name not in COLUMNS]
@@ -205,17 +204,14 @@ def _indices(study: Study, asked: Sequence[Question], answers: Sequence[Evaluati
     yield from (error(name) for name in statistics if estimated or not name.endswith(("_mean", "_std")))
 
 
-def index_meanings(study: Study, question: Question) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each column of the answer."""
-    found = {
-        "GII": ("", REGIONAL["GII"].meaning),
-        "GRI": (index("resistivity").unit(study, question.field), REGIONAL["GRI"].meaning),
-    }
-    found |= {name: (study.units.label(SHARED[name][0]), SHARED[name][1]) for name in ("SUI", "area", "box_area")}
+def index_columns(study: Study, question: Question) -> dict[str, Column]:
+    """The columns of the answer, without values."""
+    words = study.units.labels | {"as resistivity": index("resistivity").unit(study, question.field)}
+    found = {column.name: column for column in INDICES.columns(words, **dict.fromkeys(COLUMNS, ()))}
     for name in (name for name in question.wanted if name not in COLUMNS):
-        declared, kind = index(split(name)[0]), split(name)[1]
-        unit = declared.unit(study, question.field)
-        found[name] = (unit, f"{STATISTICS[kind]} over the region: {declared.meaning}")
+        local, kind = split(name)
+        words = {"index": local, "meaning of the index": index(local).meaning}
+        found[name] = INDICES[f"<index>_{kind}"].column((), index(local).unit(study, question.field), **words)
     return found
 
 
@@ -234,21 +230,20 @@ def _local(study: Study, question: Question, found: Sequence[Patch]) -> list[Col
         middle = Local.at(question.field, np.array([patch.middle(question.about) for patch in found]), {}).determinant
         determinant = np.copysign(determinant, np.broadcast_to(middle, len(found))[patch])
     columns = [
-        Column(each.name, np.broadcast_to(each.values(local), z.shape), each.index.unit(study, question.field),
-               each.index.meaning)
+        LOCAL["<index>"].column(np.broadcast_to(each.values(local), z.shape), each.index.unit(study, question.field),
+                                **{"index": each.name, "meaning of the index": each.index.meaning})
         for each in prepare(study, list(names))
     ]  # fmt: skip
+    words = study.units.labels | {"as its outputs over the drives, multiplied": per_area}
     return [
         *held_columns(study, question, len(z)),
-        *shared(study.units, x=z.real, y=z.imag),
+        *LOCAL.columns(words, x=z.real, y=z.imag),
         *columns[:2],
-        Column("det_J", determinant, per_area, "determinant of the Jacobian, per radian"),
+        *LOCAL.columns(words, det_J=determinant),
         *columns[2:],
-        Column("patch", patch, "", "part of the region between two boundary curves"),
-        Column("ray", ray, "", "ray of the patch's grid"),
-        Column("node", node, "", "node along the ray, from the inner to the outer boundary"),
-        *shared(study.units, piece=np.repeat([patch.piece for patch in found], [grid.size for grid in grids])),
-    ]
+        *LOCAL.columns(words, patch=patch, ray=ray, node=node,
+                       piece=np.repeat([patch.piece for patch in found], [grid.size for grid in grids])),
+    ]  # fmt: skip
 
 
 def _reachable(study: Study, progress: Progress) -> Result:
@@ -279,16 +274,13 @@ def _reachable(study: Study, progress: Progress) -> Result:
         )
     values = {key: np.concatenate([given.values[key] for given in answers]) for key in OF_RANGE}
     area, error = values["area"], np.concatenate([given.errors["area"] for given in answers])
-    told = (
-        *stacked([held_columns(study, question, 1) for question in asked]),
-        *shared(study.units, **values),
-        Column("area_error", error, study.units.label("area"), "estimated error of area"),
-    )
-    indices = Table("indices", told, f"the region over the range of {name}")
+    coordinates = stacked([held_columns(study, question, 1) for question in asked])
+    columns = RANGE_INDICES.columns(study.units.labels, **values, area_error=error)
+    indices = RANGE_INDICES.table([*coordinates, *columns], held=name)
     tables = [
         indices,
         *_totals(indices, asked),
-        Table("boundary", stacked(boundaries), "boundary of the region, curve by curve"),
+        BOUNDARY.table(stacked(boundaries)),
         *_several(pieces),
     ]
     late = (area > 0) & (error > FINEST_AREA * area)
@@ -316,6 +308,6 @@ def _outline(study: Study, question: Question, name: str, found: Sequence[Patch]
         row = np.array([over.extreme(label) for label in range(len(over.labels))])[margin]
         value = np.take_along_axis(over.deciding(z)[1], row[None], axis=0)[0]
         shown = np.asarray(in_study_units(study, coordinate, value))
-        yield Column(name, shown, study.units.label(coordinate.quantity), "value of the range that decides there")
+        yield BOUNDARY["<coordinate>"].column(shown, study.units.label(coordinate.quantity), coordinate=name)
 
     return [column for column in boundary_columns(study, question, found, told, deciding) if column.name != "theta"]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units
+from mechdesign.analyses.workspace.columns import PATH, PATH_INDICES
 from mechdesign.curve.ends import Ends
 from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
@@ -17,7 +17,7 @@ from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -109,38 +109,20 @@ def point_path(study: Study) -> Result:
             arc[-1], error, *box[0], *(box[1] - box[0]), arc[-1] / travel, ratio.min(), ratio.max(),
         ])  # fmt: skip
     piece, at, x, y, ratio, inverse, arc = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    told = (
-        ("length", length, "length of the path"),
-        ("length_error", length, "estimated error of length"),
-        ("box_x", length, "left side of the rectangle around the path"),
-        ("box_y", length, "lower side of the rectangle around the path"),
-        ("box_width", length, "width of the rectangle around the path"),
-        ("box_height", length, "height of the rectangle around the path"),
-        ("speed_ratio_mean", power, "length of the path over the drive's travel"),
-        ("speed_ratio_min", power, "smallest speed ratio of the rows"),
-        ("speed_ratio_max", power, "largest speed ratio of the rows"),
-    )
-    indices = (
-        Column("from", shown([path.low for path in paths]), label, f"{drive} where the motion begins"),
-        Column("to", shown([path.high for path in paths]), label, f"{drive} where it ends"),
-        Column("from_at", np.array([path.ends[0] for path in paths]), "", "what ends the motion there"),
-        Column("to_at", np.array([path.ends[1] for path in paths]), "", "what ends the motion there"),
-        Column("closed", np.array([path.closed for path in paths]), "", "1 where the path closes after a turn"),
-        *(Column(name, values, unit, meaning)
-          for (name, unit, meaning), values in zip(told, np.transpose(totals), strict=True)),
+    words = study.units.labels | {
+        "drive": drive, "length or angle": label, "as speed_ratio": power, "as length over the drive in radians": power,
+        "as one over speed_ratio": f"1/{power}" if power else "",
+    }  # fmt: skip
+    names = ("length", "length_error", "box_x", "box_y", "box_width", "box_height", "speed_ratio_mean",
+             "speed_ratio_min", "speed_ratio_max")  # fmt: skip
+    indices = PATH_INDICES.columns(
+        words, **{"from": shown([path.low for path in paths])}, to=shown([path.high for path in paths]),
+        from_at=[path.ends[0] for path in paths], to_at=[path.ends[1] for path in paths],
+        closed=[path.closed for path in paths], **dict(zip(names, np.transpose(totals), strict=True)),
     )  # fmt: skip
-    path_columns = (
-        Column("piece", piece.astype(int), "", "row of the indices"),
-        Column(drive, shown(at), label, "drive"),
-        *shared(study.units, x=x, y=y),
-        Column("speed_ratio", ratio, power, "speed of the point over the drive's rate, per radian"),
-        Column("resistivity", inverse, f"1/{power}" if power else "", "1/speed_ratio"),
-        Column("arc", arc, length, "length of the path from its beginning"),
-    )
-    tables = [
-        Table("indices", indices, "the path as a whole"),
-        Table("path", path_columns, "the point's path, from limit to limit of the motion"),
-    ]
+    columns = PATH.columns(words, piece=piece.astype(int), **{"<drive>": shown(at)}, x=x, y=y, speed_ratio=ratio,
+                           resistivity=inverse, arc=arc)  # fmt: skip
+    tables = [PATH_INDICES.table(indices), PATH.table(columns)]
     return Result("workspace", {table.name: table for table in tables}, (), {"paths": len(paths)})
 
 

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import shared
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.columns import BOUNDARY, HELD, INDICES, PIECES, SINGULARITIES, TOTALS
 from mechdesign.analyses.workspace.inscribed import INSCRIBED
 from mechdesign.analyses.workspace.question import Question, answer
 from mechdesign.analyses.workspace.singularities import around, causes, inside
@@ -82,7 +82,7 @@ def beyond(study: Study, question: Question, areas: Sequence[float]) -> list[Cau
 def held_columns(study: Study, question: Question, rows: int) -> list[Column]:
     """The held coordinates, the same in each row."""
     return [
-        Column(name, np.full(rows, value), study.units.label(study.mechanism.quantity(name)), "held coordinate")
+        HELD.column(np.full(rows, value), study.units.label(study.mechanism.quantity(name)), held=name)
         for name, value in question.held.items()
     ]
 
@@ -122,16 +122,14 @@ def boundary_columns(
     inwards, turn = np.where(side == "inner", 1.0, -1.0), np.exp(1j * theta)
     z = np.asarray(question.about + radius * turn)
     within = np.asarray(question.about + radius * (1 + BESIDE * inwards) * turn)
-    angle = study.units.label("angle")
-    kinds = np.array([kind for kind, _ in question.field.labels])
+    kinds, labels = np.array([kind for kind, _ in question.field.labels]), study.units.labels
     return [
         *held_columns(study, question, len(z)),
-        *shared(study.units, x=z.real, y=z.imag, kind=kinds[margin]),
+        *BOUNDARY.columns(labels, x=z.real, y=z.imag, kind=kinds[margin]),
         *also(z, within, inwards, margin),
-        *shared(study.units, at=np.array(told)[margin]),
-        Column("theta", theta / study.units.angle_factor, angle, "angle of the ray about the centre of the scan"),
-        *shared(study.units, side=side, curve=np.repeat(np.arange(len(curves)), lengths), piece=piece),
-    ]
+        *BOUNDARY.columns(labels, at=np.array(told)[margin], theta=theta / study.units.angle_factor, side=side,
+                          curve=np.repeat(np.arange(len(curves)), lengths), piece=piece),
+    ]  # fmt: skip
 
 
 def piece_columns(
@@ -141,19 +139,15 @@ def piece_columns(
 
     Of an empty region it is one row, piece 0 of area 0.
     """
-    length = study.units.label("length")
     number = np.arange(1, len(areas) + 1) if areas else np.zeros(1, dtype=int)
     own = [[patch for patch in found if patch.piece == k] for k in number]
     widest = [max(patches, key=lambda p: float(np.max(p.outer - p.inner)), default=None) for patches in own]
     z = np.array([complex(np.nan, np.nan) if patch is None else patch.middle(question.about) for patch in widest])
     return [
         *held_columns(study, question, len(z)),
-        *shared(study.units, piece=number),
-        Column("area", np.array([*areas] or [0.0]), study.units.label("area"), "area of the piece"),
-        Column("x", z.real, length, "a place inside the piece"),
-        Column("y", z.imag, length, "a place inside the piece"),
-        Column("sketch", ((number == 1) & drawn).astype(int), "", "whether it holds the point's place in the sketch"),
-    ]
+        *PIECES.columns(study.units.labels, piece=number, area=np.array([*areas] or [0.0]), x=z.real, y=z.imag,
+                        sketch=((number == 1) & drawn).astype(int)),
+    ]  # fmt: skip
 
 
 def singularity_columns(study: Study, question: Question, found: Sequence[Patch]) -> list[Column]:
@@ -167,25 +161,16 @@ def singularity_columns(study: Study, question: Question, found: Sequence[Patch]
 
     return [
         *held_columns(study, question, len(z)),
-        Column("curve", np.repeat(np.arange(len(loci)), lengths), "", "points of one curve, in order"),
-        Column("kind", each([locus.kind for locus in loci]), "",
-               "forward: the drives do not hold the mechanism; inverse: a leg is stretched or folded"),
-        *shared(study.units, x=z.real, y=z.imag),
-        Column("cause", each([locus.cause for locus in loci]), "", "which links, and what they do there"),
+        *SINGULARITIES.columns(
+            study.units.labels, curve=np.repeat(np.arange(len(loci)), lengths),
+            kind=each([locus.kind for locus in loci]), x=z.real, y=z.imag, cause=each([locus.cause for locus in loci]),
+        ),
     ]  # fmt: skip
 
 
 def inscribed_columns(study: Study, shapes: Sequence[Floats]) -> list[Column]:
     """The largest circle and rectangle inside each region, as `inscribed` gives them; nan where it is empty."""
-    length = study.units.label("length")
-    shape = {"circle": "the largest circle", "rectangle": "the largest axis-parallel rectangle"}
-    told = {"x": "centre", "y": "centre", "radius": "radius", "width": "width", "height": "height"}
-    return [
-        Column(
-            name, values, length, f"{told[name.partition('_')[2]]} of {shape[name.partition('_')[0]]} inside the region"
-        )
-        for name, values in zip(INSCRIBED, np.transpose(shapes), strict=True)
-    ]
+    return INDICES.columns(study.units.labels, **dict(zip(INSCRIBED, np.transpose(shapes), strict=True)))
 
 
 def totals(indices: Table, held: Sequence[str]) -> Table:
@@ -200,25 +185,15 @@ def totals(indices: Table, held: Sequence[str]) -> Table:
     with np.errstate(invalid="ignore"):
         mean = np.where(known, values, 0.0).sum(axis=1) / np.where(some, known.sum(axis=1), np.nan)
     ends = {"smallest": least, "largest": most}
-    over = "over the held values that have one, in `unit`"
-    return Table(
-        "totals",
-        (
-            Column("statistic", np.array([column.name for column in told]), "", "column of the indices"),
-            Column("smallest", values[row, least], "", f"smallest {over}"),
-            Column("mean", mean, "", f"mean {over}"),
-            Column("largest", values[row, most], "", f"largest {over}"),
-            *(
-                Column(f"{end}_at_{name}", np.where(some, indices[name][at], np.nan), indices.column(name).unit,
-                       f"held value at which the {end} is")
-                for end, at in ends.items() for name in held
-            ),
-            Column("unit", np.array([column.unit for column in told]), "", "unit of the row's values"),
-            Column("values", np.full(len(told), len(indices)), "", "held values, empty regions among them"),
-            Column("empty", np.full(len(told), int((indices["area"] == 0).sum())), "", "held values of empty regions"),
-        ),
-        "the indices over all held values",
-    )  # fmt: skip
+    return TOTALS.table([
+        *TOTALS.columns({}, statistic=np.array([column.name for column in told]), smallest=values[row, least],
+                        mean=mean, largest=values[row, most]),
+        *(TOTALS[f"{end}_at_<held>"].column(np.where(some, indices[name][at], np.nan), indices.column(name).unit,
+                                            held=name)
+          for end, at in ends.items() for name in held),
+        *TOTALS.columns({}, unit=np.array([column.unit for column in told]), values=np.full(len(told), len(indices)),
+                        empty=np.full(len(told), int((indices["area"] == 0).sum()))),
+    ])  # fmt: skip
 
 
 def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list[Table]:
@@ -228,10 +203,9 @@ def outlines(regions: Sequence[tuple[Study, Question, Sequence[Patch]]]) -> list
         for region in regions
     ]
     return [
-        Table("boundary", stacked(boundaries), "boundary of the region, curve by curve"),
-        Table("singularities", stacked([singularity_columns(*region) for region in regions]),
-              "curves of singularities inside the region and around it"),
-    ]  # fmt: skip
+        BOUNDARY.table(stacked(boundaries)),
+        SINGULARITIES.table(stacked([singularity_columns(*region) for region in regions])),
+    ]
 
 
 def _drives(
@@ -253,7 +227,7 @@ def _drives(
             turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
             values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
         shown = np.asarray(in_study_units(study, drive, values))
-        yield Column(drive.name, shown, study.units.label(drive.quantity), "drive's value there")
+        yield BOUNDARY["<drive>"].column(shown, study.units.label(drive.quantity), drive=drive.name)
 
 
 def curves(table: Table) -> Iterator[Ints]:

@@ -1,27 +1,34 @@
-"""The few numbers of a result that a person asks for first, found by what its columns are called and mean."""
+"""The few numbers of a result that a person asks for first, found by the kinds of its columns."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.analyses.columns import DRIVE, GIVEN
+from mechdesign.analyses.kinematics.columns import EXTREMES, MOTION
+from mechdesign.analyses.optimize.columns import OPTIMUM
+from mechdesign.analyses.reliability.columns import CAPABILITY, MOMENTS, RELIABILITY
+from mechdesign.analyses.stiffness.columns import DEFLECTIONS, STIFFNESS
+from mechdesign.analyses.workspace.columns import HELD, INDICES
 from mechdesign.report.cases import best_of
 from mechdesign.report.figures.style import printed, raised
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Column, Result, Table, TableKind
 from mechdesign.rows import unit_of
 from mechdesign.statistics import Asked
 
 # Most numbers of a question.
 MOST = 8
-# Ends of names in the table of extremes of which the largest size is told instead, or nothing.
-_RATES_AND_FORCES = ("_effort", "_advantage", "_velocity", "_acceleration")
-# Meanings of the columns that make a pose.
-_POSE = ("drive", "given", "held coordinate")
+# Kinds of columns whose extremes are not shown: of some the largest size is.
+_RATES_AND_FORCES = [
+    MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
+]
+# Kinds of the columns that make a pose.
+_POSE = (DRIVE, GIVEN, HELD)
 # Part of the numbers beside it below which one differs from zero by rounding alone.
 _NOISE = 1e-12
 _DIGITS = 4
@@ -45,11 +52,10 @@ class Headline:
 class _Rule:
     """Which columns give a number, and of which row."""
 
-    table: str
-    column: str  # a pattern of names
+    table: TableKind
+    column: str  # its kind, by its declared name; empty: any
     label: str  # with the words of the row, the column's `name` and its `meaning`
     row: Literal["first", "each", "largest", "smallest", "size"] = "each"  # size: the largest, whatever its sign
-    meaning: str = "*"  # a pattern of meanings
     by: tuple[str, ...] = ()  # columns of words of which each value counts by itself
     bounds: tuple[str, str] | None = None  # columns of the ends between which it lies
     interval: str = "from {low} to {high}"
@@ -58,31 +64,31 @@ class _Rule:
 
 _RULES: dict[str, tuple[_Rule, ...]] = {
     "kinematics": (
-        _Rule("extremes", "range", "range of {output}", bounds=("min", "max")),
-        _Rule("motion", "*_velocity", "largest {meaning}", "size", "velocity of *"),
-        _Rule("motion", "*_effort", "largest effort of {name}", "size"),
-        _Rule("motion", "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
+        _Rule(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
+        _Rule(MOTION, "<output>_velocity", "largest {meaning}", "size"),
+        _Rule(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
+        _Rule(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
     ),
     "workspace": (
-        _Rule("indices", "area", "area of the region", "largest", several="regions"),
-        _Rule("indices", "SUI", "area over that of the rectangle around it", "largest", several="regions"),
-        _Rule("indices", "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
-        _Rule("indices", "*_mean", "mean {name}", "largest", "mean over *", several="regions"),
+        _Rule(INDICES, "area", "area of the region", "largest", several="regions"),
+        _Rule(INDICES, "SUI", "area over that of the rectangle around it", "largest", several="regions"),
+        _Rule(INDICES, "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
+        _Rule(INDICES, "<index>_mean", "mean {name}", "largest", several="regions"),
     ),
     "optimize": (
-        _Rule("optimum", "*", "best {name}", "first", "design variable"),
-        _Rule("optimum", "*", "{name} of the best", "first"),
+        _Rule(OPTIMUM, "<variable>", "best {name}", "first"),
+        _Rule(OPTIMUM, "", "{name} of the best", "first"),
     ),
     "reliability": (
-        _Rule("reliability", "failure", "failure probability, {method}", "largest", by=("method",),
+        _Rule(RELIABILITY, "failure", "failure probability, {method}", "largest", by=("method",),
               bounds=("failure_low", "failure_high"), interval="99.7 % between {low} and {high}"),
-        _Rule("moments", "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
-        _Rule("capability", "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
+        _Rule(MOMENTS, "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
+        _Rule(CAPABILITY, "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
     ),
     "stiffness": (
-        _Rule("stiffness", "k_min", "smallest stiffness", "smallest"),
-        _Rule("stiffness", "k_max", "largest stiffness", "largest"),
-        _Rule("deflections", "d[xy]", "largest deflection {name}", "size"),
+        _Rule(STIFFNESS, "k_min", "smallest stiffness", "smallest"),
+        _Rule(STIFFNESS, "k_max", "largest stiffness", "largest"),
+        _Rule(DEFLECTIONS, "dx", "largest deflection {name}", "size"),
     ),
     "sweep": (),
     "sensitivities": (),
@@ -107,14 +113,13 @@ def headlines(result: Result) -> list[Headline]:
     """The first numbers of a result, at most `MOST`, each of a name once."""
     found = {each.label: each for each in _best(result.main)}
     for rule in _RULES[result.command]:
-        table = result.tables.get(rule.table)
+        table = result.tables.get(rule.table.name)
         if table is None or not len(table):
             continue
         for column in table.columns:
-            if column.numeric and fnmatchcase(column.name, rule.column) and fnmatchcase(column.meaning, rule.meaning):
-                if not _asked(result, rule, column):
-                    continue
-                for each in _of(rule, table, column):
+            fits = not rule.column or column.kind == rule.table[rule.column]
+            if fits and column.numeric and _asked(result, rule, column):
+                for each in _of(result, rule, column):
                     found.setdefault(each.label, each)
     return list(found.values())[:MOST]
 
@@ -130,14 +135,15 @@ def _best(table: Table) -> Iterator[Headline]:
 
 def _asked(result: Result, rule: _Rule, column: Column) -> bool:
     """Whether a column is one that the study asked for: the rate of an output, a goal with a weight."""
-    if rule.column == "*_velocity" and "extremes" in result.tables:
+    if rule.column == "<output>_velocity" and "extremes" in result.tables:
         return column.name.removesuffix("_velocity") in result.tables["extremes"]["output"]
-    if rule.table == "optimum" and rule.meaning == "*":
+    if not rule.column:
         return f"w_{column.name}" in result.tables["optimum"]
     return True
 
 
-def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
+def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
+    table = result.tables[rule.table.name]
     values = np.asarray(column.values, dtype=float)
     if rule.row == "size":
         values = np.abs(values)
@@ -157,13 +163,13 @@ def _of(rule: _Rule, table: Table, column: Column) -> Iterator[Headline]:
     between = _between(rule, table, column)
     for row in rows[:1] if between else rows:
         words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
-        if rule.table == "extremes" and words["output"].endswith(_RATES_AND_FORCES):
+        if rule.table is EXTREMES and result.tables["motion"].column(words["output"]).kind in _RATES_AND_FORCES:
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
-        if rule.table == "extremes" and low == high:
+        if rule.table is EXTREMES and low == high:
             # Of a motion of one pose.
             yield Headline(words["output"], shown(low), unit)
         else:
@@ -196,7 +202,7 @@ def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
 
 def _pose(table: Table, row: int) -> str:
     """The pose of a row, or what is held in it; nothing where all rows have the same."""
-    leading = [column for column in table.columns if column.meaning in _POSE]
+    leading = [column for column in table.columns if column.kind in _POSE]
     if all(len(np.unique(column.values)) == 1 for column in leading):
         return ""
     values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)

@@ -202,6 +202,11 @@ class Units:
             return above
         return f"{above or '1'}/{below[0] if len(below) == 1 else '(' + '*'.join(below) + ')'}"
 
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """Units of all kinds of quantity."""
+        return {kind: self.label(kind) for kind in KINDS}
+
     @staticmethod
     def ratio(above: str, below: str) -> str:
         """Unit of a quantity over another, from their labels."""
