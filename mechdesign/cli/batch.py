@@ -189,10 +189,7 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
         if not options.resume:
             _import(tasks, options)
     ledger.begin(tasks)
-
-    def work(index: int, tell: Tell) -> End:
-        return _study(tasks[index], tell, several=ledger.several)
-
+    work = partial(_study, tasks, ledger.several)
     if count > 1:
         _side_by_side(work, range(len(tasks)), count, ledger)
         return
@@ -261,8 +258,9 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
             import_module(f"{FIGURES}.{command}")
 
 
-def _study(task: Task, hear: Tell, *, several: bool) -> End:
+def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
     """Answer the questions of a study, and write its page however that ends."""
+    task = tasks[index]
     options = task.options
     words = io.StringIO()
     told: list[Outcome] = []
