@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, redirect_stderr, suppress
+from contextlib import redirect_stderr, suppress
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -190,36 +190,36 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
             _import(tasks, options)
     ledger.begin(tasks)
     work = partial(_study, tasks, ledger.several)
-    if count > 1:
-        _side_by_side(work, range(len(tasks)), count, ledger)
+    waiting = iter(range(len(tasks)))
+    if count == 1:
+        for index in waiting:
+            if not ledger.stopped:
+                ledger.end(index, work(index, partial(ledger.note, index)))
+            if ledger.interrupted:
+                raise KeyboardInterrupt
         return
-    for index in range(len(tasks)):
-        if not ledger.stopped:
-            ledger.end(index, work(index, partial(ledger.note, index)))
-        if ledger.interrupted:
-            raise KeyboardInterrupt
-
-
-def _side_by_side(work: Work, indices: Sequence[int], count: int, ledger: Ledger) -> None:
-    """Answer the studies of these indices in so many processes, fewer where the system has no room for more."""
-    waiting = iter(indices)
-    with ExitStack() as stack:
-        processes = [stack.enter_context(closing(TaskProcess(work)))]
+    processes = [TaskProcess(work)]
+    try:
+        # Fewer where the system has no room for more.
         with suppress(OSError):
-            for _ in range(count - 1):
-                processes.append(stack.enter_context(closing(TaskProcess(work))))
-        try:
-            _finish(processes, waiting, ledger)
-        except KeyboardInterrupt:
-            ledger.stopped = True
-            for process in processes:
-                process.interrupt()
-            _finish(processes, waiting, ledger)
-            raise
+            while len(processes) < count:
+                processes.append(TaskProcess(work))
+        _finish(work, processes, waiting, ledger)
+    except KeyboardInterrupt:
+        ledger.stopped = True
+        _interrupt(processes)
+        _finish(work, processes, waiting, ledger)
+        raise
+    finally:
+        for process in processes:
+            process.close()
 
 
-def _finish(processes: Sequence[TaskProcess], waiting: Iterator[int], ledger: Ledger) -> None:
-    """Give each process one study after the other, until none waits or the run stops, and note what they tell."""
+def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], ledger: Ledger) -> None:
+    """Give each process one study after the other, until none waits or the run stops, and note what they tell.
+
+    One that was killed is replaced.
+    """
     while True:
         for process in processes:
             if process.task is None and not ledger.stopped and (index := next(waiting, None)) is not None:
@@ -228,26 +228,29 @@ def _finish(processes: Sequence[TaskProcess], waiting: Iterator[int], ledger: Le
         if not busy:
             return
         for notes in wait([*busy], LOOK):
-            _hear(busy[notes], processes, ledger)  # type: ignore[index]
+            process = busy[notes]  # type: ignore[index]
+            index, stopped = process.task, ledger.stopped
+            assert index is not None
+            note = process.hear()
+            if process.task is not None:
+                ledger.note(index, note)
+            else:
+                ledger.end(index, note)
+            if process.lost:
+                process.close()
+                processes[processes.index(process)] = TaskProcess(work)
+            if ledger.stopped and not stopped:
+                # The first failure does not wait for the others.
+                _interrupt([other for other in processes if other is not process])
         interrupts.check()
         if ledger.interrupted and not ledger.stopped:
             raise KeyboardInterrupt
         ledger.board.show()
 
 
-def _hear(process: TaskProcess, processes: Sequence[TaskProcess], ledger: Ledger) -> None:
-    """Hear of a process how far it is, or the end of its study; the first failure may stop the others."""
-    index, stopped = process.task, ledger.stopped
-    assert index is not None
-    done, note = process.hear()
-    if done:
-        ledger.end(index, note)
-        return
-    ledger.note(index, note)
-    if ledger.stopped and not stopped:
-        for other in processes:
-            if other is not process:
-                other.interrupt()
+def _interrupt(processes: Sequence[TaskProcess]) -> None:
+    for process in processes:
+        process.interrupt()
 
 
 def _import(tasks: Sequence[Task], options: Options) -> None:

@@ -49,6 +49,9 @@ class Signals:
         self._pending = False
         for number in self._handled:
             signal.signal(number, signal.SIG_IGN)
+        # Python forgets its handlers as it ends, and an alarm would end it first.
+        if hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
 
     def check(self) -> None:
         """Raise what was noted."""

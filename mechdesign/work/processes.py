@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
@@ -66,56 +66,52 @@ class TaskProcess:
         Gives what the task tells.
     task : int or None
         Number of the task under way.
+    lost : bool
+        Whether the process was killed.
     """
 
     def __init__(self, work: Work) -> None:
-        self._work = work
         self.task: int | None = None
-        self._start()
-
-    def _start(self) -> None:
+        self.lost = False
         self.notes, notes = multiprocessing.Pipe(duplex=False)
         # In the end nobody else holds the other end: a process that is killed closes it.
         with notes:
-            self._executor = forked(1, partial(_take_tasks, self._work, notes))
+            self._executor = forked(1, partial(_take_tasks, work, notes))
         self._process = self._executor.submit(os.getpid)
 
     def begin(self, task: int) -> None:
         """Give it a task."""
         self.task = task
-        try:
-            self._value: Future[Any] = self._executor.submit(_do, task)
-        except BrokenExecutor as error:
-            # It was killed while it had none.
-            self._value = Future()
-            self._value.set_exception(error)
+        # One that was killed has closed its end of the notes.
+        with suppress(BrokenExecutor):
+            self._value = self._executor.submit(_do, task)
 
-    def hear(self) -> tuple[bool, Any]:
-        """Whether the task is done, and its value or else a note; None of one that was not begun or was killed."""
-        with suppress(EOFError, OSError):
-            if (note := self.notes.recv()) is not None:
-                return False, note
-        self.task = None
+    def hear(self) -> Any:
+        """A note while `task` is under way, and then its value: None where it was not begun or the process killed."""
         try:
-            return True, self._value.result()
-        except BrokenExecutor:
-            self.notes.close()
-            self._executor.shutdown()
-            self._start()
-            return True, None
+            if (note := self.notes.recv()) is not None:
+                return note
+            self.task = None
+            return self._value.result()
+        except (EOFError, OSError, BrokenExecutor):
+            self.task, self.lost = None, True
+            return None
 
     def interrupt(self) -> None:
-        """Raise an interrupt in its task."""
-        with suppress(ProcessLookupError, BrokenExecutor):
-            os.kill(self._process.result(), signal.SIGTERM)
+        """Raise an interrupt in its task, if there is one."""
+        if self.task is not None:
+            self._send(signal.SIGTERM)
 
     def close(self) -> None:
         """End the process; a task under way is lost."""
         if self.task is not None:
-            with suppress(ProcessLookupError, BrokenExecutor):
-                os.kill(self._process.result(), signal.SIGKILL)
+            self._send(signal.SIGKILL)
         self._executor.shutdown()
         self.notes.close()
+
+    def _send(self, number: int) -> None:
+        with suppress(ProcessLookupError, BrokenExecutor):
+            os.kill(self._process.result(), number)
 
 
 def _take_tasks(work: Work, notes: Connection) -> None:
