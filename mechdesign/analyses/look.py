@@ -6,10 +6,10 @@ import dataclasses
 from importlib import import_module
 
 from mechdesign.commands import COMMANDS
-from mechdesign.parallel import here
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import Precision
+from mechdesign.work.chunks import here
 
 # Enough designs that one of them may well be feasible.
 DESIGNS = 10

@@ -22,13 +22,13 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints, evenly
-from mechdesign.parallel import map_chunks, worker_count
 from mechdesign.results import Column, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.expansion import OWN, Numbers, default, expand, number_of_poses
 from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.poses import PoseSection
+from mechdesign.work.chunks import map_chunks, worker_count
 
 # Poses solved at once: their arrays stay within some megabytes, however long the sweep.
 POSES_AT_ONCE = 65536

@@ -130,8 +130,8 @@ def _placed(options: Options) -> AbstractContextManager[None]:
     """Where great work goes."""
     if options.executor is None:
         return nullcontext()
-    from mechdesign.executors import named
-    from mechdesign.parallel import on
+    from mechdesign.work.chunks import on
+    from mechdesign.work.executors import named
 
     return on(named(options.executor, options.jobs))
 

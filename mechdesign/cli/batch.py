@@ -6,18 +6,17 @@ import glob
 import io
 import os
 import sys
-from collections.abc import Sequence
-from contextlib import redirect_stderr
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stderr, suppress
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mechdesign import shards
 from mechdesign.cli import places, terminal
-from mechdesign.cli.board import Board, Far, Reported
-from mechdesign.cli.crew import Alone, Crew, Tell
+from mechdesign.cli.board import Board, Reported
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     Outcome,
@@ -35,12 +34,16 @@ from mechdesign.cli.places import PAGE, claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import StudyError
 from mechdesign.files import check_marked, owned
-from mechdesign.parallel import one_thread, worker_count
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
 from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
+from mechdesign.work import interrupts, shards
+from mechdesign.work.chunks import worker_count
+from mechdesign.work.pool import LOOK
+from mechdesign.work.processes import TaskProcess, Tell, Work
+from mechdesign.work.threads import one_thread
 
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
@@ -116,6 +119,7 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
+        interrupts.check()
         label, study = name_of(path), None
         try:
             origin = source_of(path, options)
@@ -185,29 +189,68 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
         if not options.resume:
             _import(tasks, options)
     ledger.begin(tasks)
-    work = partial(_study, ledger.several)
-    crew: Crew[Task, End] | Alone[Task, End]
-
-    def heard(index: int, note: Far | Said) -> None:
-        before = ledger.stopped
-        ledger.note(index, note)
-        if ledger.stopped and not before:
-            crew.stop(index)
-
-    def finish() -> None:
-        for index, end in crew:
-            ledger.end(index, end)
-            if ledger.interrupted and not ledger.stopped:
+    work = partial(_study, tasks, ledger.several)
+    waiting = iter(range(len(tasks)))
+    if count == 1:
+        for index in waiting:
+            if not ledger.stopped:
+                ledger.end(index, work(index, partial(ledger.note, index)))
+            if ledger.interrupted:
                 raise KeyboardInterrupt
+        return
+    processes = [TaskProcess(work)]
+    try:
+        # Fewer where the system has no room for more.
+        with suppress(OSError):
+            while len(processes) < count:
+                processes.append(TaskProcess(work))
+        _finish(work, processes, waiting, ledger)
+    except KeyboardInterrupt:
+        ledger.stopped = True
+        _interrupt(processes)
+        _finish(work, processes, waiting, ledger)
+        raise
+    finally:
+        for process in processes:
+            process.close()
 
-    with Crew(work, tasks, count, heard, ledger.board.show) if count > 1 else Alone(work, tasks, heard) as crew:
-        try:
-            finish()
-        except KeyboardInterrupt:
-            ledger.stopped = True
-            crew.stop()
-            finish()
-            raise
+
+def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], ledger: Ledger) -> None:
+    """Give each process one study after the other, until none waits or the run stops, and note what they tell.
+
+    One that was killed is replaced.
+    """
+    while True:
+        for process in processes:
+            if process.task is None and not ledger.stopped and (index := next(waiting, None)) is not None:
+                process.begin(index)
+        busy = {process.notes: process for process in processes if process.task is not None}
+        if not busy:
+            return
+        for notes in wait([*busy], LOOK):
+            process = busy[notes]  # type: ignore[index]
+            index, stopped = process.task, ledger.stopped
+            assert index is not None
+            note = process.hear()
+            if process.task is not None:
+                ledger.note(index, note)
+            else:
+                ledger.end(index, note)
+            if process.lost:
+                process.close()
+                processes[processes.index(process)] = TaskProcess(work)
+            if ledger.stopped and not stopped:
+                # The first failure does not wait for the others.
+                _interrupt([other for other in processes if other is not process])
+        interrupts.check()
+        if ledger.interrupted and not ledger.stopped:
+            raise KeyboardInterrupt
+        ledger.board.show()
+
+
+def _interrupt(processes: Sequence[TaskProcess]) -> None:
+    for process in processes:
+        process.interrupt()
 
 
 def _import(tasks: Sequence[Task], options: Options) -> None:
@@ -218,8 +261,9 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
             import_module(f"{FIGURES}.{command}")
 
 
-def _study(several: bool, task: Task, hear: Tell) -> End:
+def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
     """Answer the questions of a study, and write its page however that ends."""
+    task = tasks[index]
     options = task.options
     words = io.StringIO()
     told: list[Outcome] = []

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import terminal
-from mechdesign.cli.crew import Tell
 from mechdesign.cli.execution import Outcome
 from mechdesign.progress import Progress
+from mechdesign.work import interrupts
+from mechdesign.work.processes import Tell
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -45,12 +46,14 @@ class Reported(Progress):
         self._say()
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage."""
+        """Begin a stage; a place for an interrupt."""
+        interrupts.check()
         self._stage, self._done, self._total = what, 0, total
         self._say()
 
     def update(self, n: int) -> None:
-        """`n` more steps are done."""
+        """`n` more steps are done; a place for an interrupt."""
+        interrupts.check()
         self._done += n
         if time.monotonic() - self._told > _OFTEN:
             self._say()

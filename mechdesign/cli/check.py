@@ -17,11 +17,11 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
-from mechdesign.parallel import one_thread
 from mechdesign.report.requirements import foresee, on_warnings
 from mechdesign.report.writer import write_sketch
 from mechdesign.study import Study
 from mechdesign.study.schema.reliability import in_words
+from mechdesign.work.threads import one_thread
 
 
 @one_thread()

@@ -16,7 +16,6 @@ from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit_text, mark
 from mechdesign.errors import StudyError, counted
 from mechdesign.files import FORMATS, check_marked, check_writable, marked
-from mechdesign.parallel import one_thread
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
 from mechdesign.report.comparison.differences import OUTCOME, VERDICT, Comparison, Difference, Tolerance, Tolerances
@@ -24,6 +23,7 @@ from mechdesign.report.manifest import Extras
 from mechdesign.report.tables import to_csv
 from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
+from mechdesign.work.threads import one_thread
 
 # Files in the folder of differences.
 _TABLE = "differences.csv"

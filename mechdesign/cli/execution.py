@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import mechdesign
-from mechdesign import shards
 from mechdesign.analyses.look import LONG
 from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
@@ -24,8 +23,6 @@ from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
-from mechdesign.journal import NAME, Journal
-from mechdesign.parallel import Divided, divided, one_thread
 from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import laid_under
@@ -35,11 +32,15 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
-from mechdesign.shards import Shard
 from mechdesign.study import Study, load, template_path
 from mechdesign.study.loading import load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES
 from mechdesign.study.text.inputs import Folder
+from mechdesign.work import shards
+from mechdesign.work.chunks import Divided, divided
+from mechdesign.work.journal import NAME, Journal
+from mechdesign.work.shards import Shard
+from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
 _ROWS_AT_ONCE = 20_000  # of a table that is read from its file

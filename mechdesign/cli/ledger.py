@@ -16,13 +16,13 @@ from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import Outcome, Source
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
-from mechdesign.courier import LostWorkerError
 from mechdesign.errors import Interrupted, MechdesignError, counted, printable
 from mechdesign.files import check_marked
 from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
 from mechdesign.study import Study
+from mechdesign.work.pool import LostWorkerError
 
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry

@@ -15,7 +15,7 @@ from mechdesign.errors import StudyError
 from mechdesign.files import FORMATS, formats_of
 
 if TYPE_CHECKING:
-    from mechdesign.shards import Shard
+    from mechdesign.work.shards import Shard
 
 # Widths of the pages of pictures and sizes of their type.
 STYLES = ("screen", "paper")
@@ -325,7 +325,7 @@ class Options:
     @property
     def part(self) -> Shard | None:
         """The shard that is to be computed."""
-        from mechdesign.shards import Shard
+        from mechdesign.work.shards import Shard
 
         return None if self.shard is None else Shard.of(self.shard)
 

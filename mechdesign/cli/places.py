@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from mechdesign import shards
 from mechdesign.cli.options import STYLES, Options
 from mechdesign.commands import SWEEP
 from mechdesign.errors import StudyError
 from mechdesign.files import check_marked
-from mechdesign.journal import MARK, NAME
 from mechdesign.report import manifest
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.study import Study
+from mechdesign.work import shards
+from mechdesign.work.journal import MARK, NAME
 
 PAGE = pages.GENERATOR.encode()  # by which a report is known
 RESULTS = Path("results")  # where no other folder is asked for

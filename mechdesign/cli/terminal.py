@@ -16,6 +16,7 @@ from mechdesign.errors import printable_lines
 from mechdesign.progress import Progress
 from mechdesign.report.tables import cells, csv_blocks, json_blocks
 from mechdesign.results import Table
+from mechdesign.work import interrupts
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Shown
@@ -129,7 +130,8 @@ class Bar(Progress):
             self._bar = self._task = None
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage; a great one is said, also where nobody sees a bar."""
+        """Begin a stage; a great one is said, also where nobody sees a bar. A place for an interrupt."""
+        interrupts.check()
         if great := announced(total, what):
             say(great, quiet=self._quiet)
         self._total, self._done, self._what = total, 0, what
@@ -137,7 +139,8 @@ class Bar(Progress):
             self._bar.reset(self._task, total=total, description=what)
 
     def update(self, n: int) -> None:
-        """`n` more steps are done."""
+        """`n` more steps are done; a place for an interrupt."""
+        interrupts.check()
         self._done += n
         if self._bar is not None and self._task is not None:
             self._bar.update(self._task, completed=self._done)

@@ -14,6 +14,7 @@ from mechdesign.cli.options import Options
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggestion
 from mechdesign.study.text.inputs import FILES, MAX_FILE_BYTES
+from mechdesign.work import interrupts
 
 _LOOK = 0.2  # seconds between two looks at the files
 _NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\b")
@@ -58,6 +59,7 @@ def _await_change(seen: dict[Path, bytes | None]) -> None:
     changed = _contents(seen) != seen
     while True:
         time.sleep(_LOOK)
+        interrupts.check()
         now = _stamps(seen)
         if now == stamps and changed:
             return

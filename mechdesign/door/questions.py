@@ -11,9 +11,9 @@ from mechdesign import study as studies
 from mechdesign.commands import QUESTIONS
 from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
-from mechdesign.journal import Journal
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study
+from mechdesign.work.journal import Journal
 
 
 def load(

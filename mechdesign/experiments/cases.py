@@ -16,13 +16,13 @@ from mechdesign.experiments import batches, compiled
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.wanted import Wanted
 from mechdesign.numerics.arrays import Ints
-from mechdesign.parallel import map_chunks
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import overrides, with_entries
+from mechdesign.work.chunks import map_chunks
 
 # Cases that are answered at once, where one costs far less among many: of few so many that all workers have some.
 CASES_AT_ONCE, MOST_AT_ONCE, CHUNKS = 64, 256, 32

@@ -19,7 +19,6 @@ from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.differences import STEPS, slope
-from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -29,6 +28,7 @@ from mechdesign.study.text.document import dotted, has
 from mechdesign.study.text.fields import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
 from mechdesign.study.variants import entry_unit
+from mechdesign.work.threads import one_thread
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01

@@ -19,9 +19,7 @@ from mechdesign.experiments.design import Design, Listed, cases_of
 from mechdesign.experiments.ranking import Ranking, goals_of
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
-from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Flags
-from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
 from mechdesign.report.requirements import in_words
@@ -29,6 +27,8 @@ from mechdesign.results import Column, Result
 from mechdesign.study import Study
 from mechdesign.study.text.units import QUANTITY, Units
 from mechdesign.study.variants import entry_unit
+from mechdesign.work.journal import Journal
+from mechdesign.work.threads import one_thread
 
 _SECTION = "matrix"
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Warned, Worst
 from mechdesign.experiments.cases import Case
-from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.cases import changes_in_words
 from mechdesign.report.requirements import Verdict, over_cases
+from mechdesign.work.journal import Journal, digest
 
 # Cases after which, and seconds, a journal gets those that are finished.
 _BLOCK, _SECONDS = 1024, 5.0

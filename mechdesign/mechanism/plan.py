@@ -20,7 +20,8 @@ from mechdesign.mechanism.solve import as_configuration, run
 from mechdesign.mechanism.state import CONVERGED, NEWTON_STEPS, State, Unknowns, start_state
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.parallel import keep_freed_memory, map_chunks, worker_count
+from mechdesign.work.chunks import map_chunks, worker_count
+from mechdesign.work.threads import keep_freed_memory
 
 # A pose set exactly on a limit must not fall outside by rounding.
 LIMIT_ROUNDING = 1e-14

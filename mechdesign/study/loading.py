@@ -24,7 +24,6 @@ from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
-from mechdesign.parallel import one_thread
 from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
@@ -48,6 +47,7 @@ from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
+from mechdesign.work.threads import one_thread
 
 # Characters of a study's name that a folder's name does without, and the name of a study that has none.
 _UNFIT = re.compile(r"[^\w.-]+")

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import mechdesign
-from mechdesign import courier
-from mechdesign.executors import named
-from mechdesign.parallel import on
 from mechdesign.report.tables import to_csv
+from mechdesign.work.chunks import on
+from mechdesign.work.executors import named
+from mechdesign.work.pool import ChunkMap
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SAMPLES = int(float(os.environ.get("MECHDESIGN_SAMPLES", "2e7")))
@@ -49,14 +49,14 @@ def generator(designs: int) -> Any:
 def seconds(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Lengths of the tasks, in the workers."""
     found: list[float] = []
-    before = courier.Courier._values
+    before = ChunkMap._values
 
     def heard(self: Any, task: Any) -> Any:
         values = before(self, task)
         found.append(task.future.result()[1])
         return values
 
-    monkeypatch.setattr(courier.Courier, "_values", heard)
+    monkeypatch.setattr(ChunkMap, "_values", heard)
     return found
 
 

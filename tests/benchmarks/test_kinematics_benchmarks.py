@@ -26,10 +26,10 @@ from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.poses import study_poses
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
-from mechdesign.parallel import map_chunks
 from mechdesign.report.tables import csv_blocks
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.work.chunks import map_chunks
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 POSES = 2_000_000

@@ -14,7 +14,7 @@ import pytest
 
 import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.journal import NAME, Journal, digest
+from mechdesign.work.journal import NAME, Journal, digest
 
 STUDY = """\
 mechanism:

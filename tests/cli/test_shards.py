@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign import shards
-from mechdesign.shards import FILE, Shard
+from mechdesign.work import shards
+from mechdesign.work.shards import FILE, Shard
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # The second chunk of samples is not whole.

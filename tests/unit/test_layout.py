@@ -13,7 +13,8 @@ ROOT = Path(mechdesign.__file__).parent
 # Folders and files from the bottom to the top; each may import what stands in its own line and above.
 ORDER = (
     ("mechdesign.numerics",),
-    ("mechdesign",),  # the files beside the folders: results, errors, expressions, parallel, ...
+    ("mechdesign",),  # the files beside the folders: results, errors, expressions, ...
+    ("mechdesign.work",),
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
     ("mechdesign.study.building",),

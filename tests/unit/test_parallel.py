@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 import mechdesign
-from mechdesign import courier, executors
-from mechdesign.courier import LostWorkerError, Pool
-from mechdesign.parallel import map_chunks, on
 from mechdesign.report.tables import to_csv
+from mechdesign.work import executors, pool
+from mechdesign.work.chunks import map_chunks, on
+from mechdesign.work.pool import LOOK_AHEAD, ChunkMap, LostWorkerError, Pool
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 forked = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
@@ -95,7 +95,7 @@ def fatal(marks, times, k):
 def test_a_lost_worker_costs_its_chunk(tmp_path):
     assert [*map_chunks(partial(fatal, tmp_path, 1), range(200), 2, processes=True)] == [k * k for k in range(200)]
     # Of the others only those are computed twice that were under way.
-    assert len([*tmp_path.iterdir()]) <= 200 + 2 * courier.LOOK_AHEAD * 8
+    assert len([*tmp_path.iterdir()]) <= 200 + 2 * LOOK_AHEAD * 8
     assert len([*tmp_path.glob("199_*")]) == 1
 
 
@@ -117,51 +117,56 @@ def test_an_error_in_a_process_ends_the_work():
 def test_chunks_go_together_when_they_are_short():
     lengths = []
 
-    def together(items):
-        lengths.append(len(items))
-        return [k * k for k in items]
+    class Heard(ThreadPoolExecutor):
+        def submit(self, perform, items):
+            lengths.append(len(items))
+            return super().submit(perform, items)
 
-    class Here(ThreadPoolExecutor):
-        def submit(self, perform, version, digest, content, items):
-            courier._functions[digest] = together
-            return super().submit(perform, version, digest, content, items)
-
-    found = courier.Courier(Pool(lambda: Here(2), 2), squared)
+    found = ChunkMap(Pool(lambda: Heard(2), 2), squared)
     assert [*found(range(10_000))] == [k * k for k in range(10_000)]
     assert lengths[0] == 1
-    assert 100 < max(lengths) <= 10_000 / (2 * courier.LOOK_AHEAD)
+    assert 100 < max(lengths) <= 10_000 / (2 * LOOK_AHEAD)
     assert lengths[-1] == 1
 
 
-def test_a_long_function_goes_once_to_each_worker():
-    sent = []
+def test_chunks_on_threads_of_this_process_go_one_by_one():
+    """What they give may be great, and is all in memory."""
+    lengths = []
 
     class Heard(ThreadPoolExecutor):
-        def submit(self, perform, version, digest, content, items):
-            sent.append(content is not None)
-            return super().submit(perform, version, digest, content, items)
+        def submit(self, perform, items):
+            lengths.append(len(items))
+            return super().submit(perform, items)
 
-    with on(Pool(lambda: Heard(2), 2)):
-        found = [*map_chunks(partial(len_and, bytes(100_000)), range(300), travels=True)]
+    assert [*ChunkMap(Pool(lambda: Heard(2), 2, threads=True), squared)(range(100))] == [k * k for k in range(100)]
+    assert lengths == [1] * 100
+
+
+class Long:
+    """A function with a great deal to read, which a mark is left of each time."""
+
+    def __init__(self, marks):
+        self.marks, self.content = marks, bytes(100_000)
+
+    def __setstate__(self, state):
+        self.__dict__ |= state
+        (self.marks / f"{os.getpid()}_{time.monotonic_ns()}").touch()
+
+    def __call__(self, k):
+        return len(self.content) + k
+
+
+def test_a_long_function_is_read_once_by_each_worker(tmp_path):
+    fresh = multiprocessing.get_context("spawn")
+    with on(Pool(lambda: ProcessPoolExecutor(2, mp_context=fresh), 2)):
+        found = [*map_chunks(Long(tmp_path), range(300), travels=True)]
     assert found == [100_000 + k for k in range(300)]
-    assert len(sent) > sum(sent) == 2
-
-
-def len_and(content, k):
-    return len(content) + k
-
-
-def test_a_worker_that_forgot_the_function_asks_for_it(monkeypatch):
-    forgetful = {}
-    monkeypatch.setattr(courier, "_functions", forgetful)
-    items = (forgetful.clear() or k for k in range(50))
-    with on(Pool(lambda: ThreadPoolExecutor(1), 1)):
-        assert [*map_chunks(partial(len_and, bytes(100_000)), items, travels=True)] == [100_000 + k for k in range(50)]
+    assert 1 <= len([*tmp_path.iterdir()]) <= 2
 
 
 def test_workers_have_the_same_version(monkeypatch):
-    before = courier._perform
-    monkeypatch.setattr(courier, "_perform", lambda version, *rest: before("0.0", *rest))
+    before = pool._perform
+    monkeypatch.setattr(pool, "_perform", lambda version, *rest: before("0.0", *rest))
     with on(Pool(lambda: ThreadPoolExecutor(1), 1)), pytest.raises(mechdesign.MechdesignError, match=r"not 0\.0"):
         list(map_chunks(squared, [1], travels=True))
 
@@ -226,15 +231,15 @@ def test_a_scheduler_that_will_not_answer_is_not_waited_for(monkeypatch, how):
 
     monkeypatch.setattr(executors, "_RECOUNT", 0.01)
     monkeypatch.setattr(executors, "_NO_WORKERS", 0.05)
-    pool = object.__new__(executors._Dask)
-    pool._name, pool._client = "dask:tcp://there", Client()
+    there = object.__new__(executors._Dask)
+    there._name, there._client = "dask:tcp://there", Client()
     future = Future()
     if how == "cancelled":
         future.cancel()
         future.set_running_or_notify_cancel()
     told = "has had no workers for 0.05 seconds" if how == "no workers" else "does not answer any more"
     with pytest.raises(LostWorkerError, match=f"^--executor dask:tcp://there: the scheduler {told}"):
-        pool.outcome(future)
+        there.outcome(future)
 
 
 def texts(command, study, **options):

@@ -13,8 +13,8 @@ import mechdesign
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.experiments import sweep as room
 from mechdesign.experiments.design import cases_of
-from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Floats
+from mechdesign.work.journal import Journal
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE = "kinematics.extremes.B.x.range"

@@ -12,8 +12,8 @@ import scipy.linalg  # noqa: F401 - its library of linear algebra is another tha
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import mechdesign
-from mechdesign.parallel import one_thread
 from mechdesign.report.tables import to_csv
+from mechdesign.work.threads import one_thread
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

@@ -19,11 +19,11 @@ from mechdesign.analyses.together import Answers
 from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.work.threads import one_thread
 
 # Assembly modes that a picture shows at most.
 MAX_DRAWN_MODES = 12

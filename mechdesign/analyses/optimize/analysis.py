@@ -34,15 +34,16 @@ from mechdesign.analyses.workspace.contained import Shape, fitting_scale
 from mechdesign.analyses.workspace.question import answer, questions, split
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
-from mechdesign.journal import Journal
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.parallel import one_thread, workers
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study import designs as study_designs
 from mechdesign.study.designs import variant
 from mechdesign.study.schema.workspace import Over
+from mechdesign.work.chunks import workers
+from mechdesign.work.journal import Journal
+from mechdesign.work.threads import one_thread
 
 # Numbers that a search keeps of the rows behind its goals.
 MAX_KEPT_ROWS = 30_000_000

@@ -19,7 +19,6 @@ from mechdesign.analyses.optimize.goals import Goal, goals_of, unit_of
 from mechdesign.analyses.optimize.variables import Batch, from_cube, shown
 from mechdesign.analyses.optimize.variables import unit_of as variable_unit
 from mechdesign.errors import MechanismError
-from mechdesign.journal import Journal, digest
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.results import Column, ColumnKind
@@ -27,6 +26,7 @@ from mechdesign.statistics import STATISTICS
 from mechdesign.study import Study
 from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.limits import SUFFIXES
+from mechdesign.work.journal import Journal, digest
 
 # Designs evaluated together: enough that arrays are long, few enough that the workers end together.
 DESIGNS_AT_ONCE = 384

@@ -27,12 +27,13 @@ from mechdesign.analyses.reliability.task import MAX_SAMPLES, MethodResult, Part
 from mechdesign.cautions import Caution
 from mechdesign.errors import Interrupted, StudyError
 from mechdesign.mechanism import Reason
-from mechdesign.parallel import Divided, apart, keep_freed_memory, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
+from mechdesign.work.chunks import Divided, apart
+from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048

@@ -18,9 +18,9 @@ from mechdesign.analyses.reliability.simulation import CHUNK, Setting, errors_of
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Ints
-from mechdesign.parallel import map_chunks
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
+from mechdesign.work.chunks import map_chunks
 
 # Stream of random numbers: no other name has four numbers.
 _STREAM = (3, 0)

@@ -19,8 +19,8 @@ from mechdesign.mechanism import Configuration, Mechanism
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.parallel import map_chunks
 from mechdesign.progress import NULL, Progress
+from mechdesign.work.chunks import map_chunks
 
 # Samples drawn together.
 CHUNK = 20_000

@@ -24,9 +24,9 @@ from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import Task
 from mechdesign.cautions import Caution
 from mechdesign.numerics.arrays import Floats
-from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import ReliabilitySection
+from mechdesign.work.chunks import map_chunks
 
 # Least number of replicates, and the most points of one.
 _REPLICATES = 16

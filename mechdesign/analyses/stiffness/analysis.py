@@ -44,12 +44,13 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.parallel import map_chunks, one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.stiffness import StiffnessSection
+from mechdesign.work.chunks import map_chunks
+from mechdesign.work.threads import one_thread
 
 # Number of poses solved together.
 CHUNK = 8192

@@ -47,11 +47,11 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.indices import index
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.parallel import one_thread
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
+from mechdesign.work.threads import one_thread
 
 # An error of the area beyond this part of it is told.
 AREA_SURE = 1e-3

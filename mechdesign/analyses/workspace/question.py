@@ -23,11 +23,11 @@ from mechdesign.errors import Problem, StudyError
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import dips
-from mechdesign.parallel import keep_freed_memory
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
 from mechdesign.study.text.fields import parts_of
 from mechdesign.study.text.units import Amount
+from mechdesign.work.threads import keep_freed_memory
 
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6

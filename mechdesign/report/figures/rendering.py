@@ -10,9 +10,9 @@ from typing import ParamSpec
 
 from matplotlib.figure import Figure
 
-from mechdesign.courier import LostWorkerError
 from mechdesign.errors import explain
-from mechdesign.parallel import map_chunks, worker_count
+from mechdesign.work.chunks import map_chunks, worker_count
+from mechdesign.work.pool import LostWorkerError
 
 # To the files of one picture: their bytes by their names.
 Drawing = Callable[[], dict[str, bytes]]

@@ -13,8 +13,8 @@ from mechdesign.analyses.reliability.question import ReliabilityQuestion
 from mechdesign.analyses.reliability.simulation import Setting
 from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 from mechdesign.numerics.arrays import Floats
-from mechdesign.parallel import map_chunks
 from mechdesign.study.schema.methods import METHODS
+from mechdesign.work.chunks import map_chunks
 
 # Streams of random numbers, besides those of the plain samples.
 SEARCH, QUASI = 1, 2

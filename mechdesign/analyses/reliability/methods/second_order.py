@@ -20,7 +20,7 @@ from mechdesign.analyses.reliability.simulation import Setting, errors_of
 from mechdesign.analyses.reliability.sources import Sources
 from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.parallel import map_chunks
+from mechdesign.work.chunks import map_chunks
 
 # Longest step of the differences, as a part of the mechanism's size or in radians: the fourth root of rounding, at
 # which a second derivative has about seven digits.

@@ -21,7 +21,7 @@ from typing import Any
 
 from mechdesign.errors import OutputError, StudyError
 from mechdesign.files import replace
-from mechdesign.parallel import Divided
+from mechdesign.work.chunks import Divided
 
 Compute = Callable[[Iterable[Any]], Iterator[Any]]
 
@@ -85,7 +85,7 @@ class Taken:
         self._names: Counter[str] = Counter()
 
     def __call__(self, name: str, compute: Compute, items: Iterable[Any]) -> Iterator[Any]:
-        """See `mechdesign.parallel.divided`."""
+        """See `mechdesign.work.chunks.divided`."""
         source = iter(items)
         first = [*islice(source, 2)]
         if len(first) < 2:
@@ -133,7 +133,7 @@ class Merged:
         self._names: Counter[str] = Counter()
 
     def __call__(self, name: str, compute: Compute, items: Iterable[Any]) -> Iterator[Any]:
-        """See `mechdesign.parallel.divided`."""
+        """See `mechdesign.work.chunks.divided`."""
         source = iter(items)
         first = [*islice(source, 2)]
         items = chain(first, source)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import math
 import os
 import signal
 import socket
@@ -14,9 +15,10 @@ from itertools import chain
 from typing import Any
 from urllib.parse import urlsplit
 
-from mechdesign.courier import LostWorkerError, Pool
 from mechdesign.errors import StudyError, counted
-from mechdesign.parallel import worker_count
+from mechdesign.work import interrupts
+from mechdesign.work.chunks import worker_count
+from mechdesign.work.pool import LOOK, LostWorkerError, Pool
 
 LOCAL = "local"
 _PORT = 8786  # of a scheduler, where none is said
@@ -88,6 +90,9 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
 class _Dask(Pool):
     """Workers of a scheduler of dask, which replaces those that are lost; or of one that is started here."""
 
+    threads = False
+    _counted, _threads = -math.inf, 0  # when the workers' threads were counted, and how many there were
+
     def __init__(self, name: str, address: str, jobs: int | None) -> None:
         try:
             distributed: Any = importlib.import_module("distributed")
@@ -122,7 +127,6 @@ class _Dask(Pool):
             self.close()
             message = f"the scheduler has no workers after {counted(_NO_WORKERS, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
-        self._counted, self._threads = -_RECOUNT, 1
         if address != LOCAL:
             # It has tried several workers.
             self.losses = 0
@@ -131,16 +135,16 @@ class _Dask(Pool):
     @property
     def width(self) -> int:
         """Number of threads of the workers, which come and go."""
-        if time.monotonic() - self._counted > _RECOUNT:
-            self._threads = max(1, self._count())
-            self._counted = time.monotonic()
-        return self._threads
+        return max(1, self._count())
 
     def _count(self) -> int:
-        try:
-            return sum(self._client.nthreads().values())
-        except Exception as error:
-            raise self._gone() from error
+        if time.monotonic() - self._counted > _RECOUNT:
+            try:
+                self._threads = sum(self._client.nthreads().values())
+            except Exception as error:
+                raise self._gone() from error
+            self._counted = time.monotonic()
+        return self._threads
 
     def _gone(self) -> LostWorkerError:
         return LostWorkerError(f"--executor {self._name}: the scheduler does not answer any more")
@@ -148,7 +152,8 @@ class _Dask(Pool):
     def outcome(self, future: Future[Any]) -> Any:
         """What a task gives; a scheduler without workers would wait for some for ever."""
         since = time.monotonic()
-        while not wait([future], _RECOUNT).done:
+        while not wait([future], min(LOOK, _RECOUNT)).done:
+            interrupts.check()
             if self._count():
                 since = time.monotonic()
             elif time.monotonic() - since > _NO_WORKERS:

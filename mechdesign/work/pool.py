@@ -1,7 +1,6 @@
-"""Work that travels to the workers of any executor, and comes back in order; workers may be lost on the way.
+"""Workers of any executor of `concurrent.futures`, and an ordered map on them; workers may be lost on the way.
 
-A task is a function, pickled, and some items. A short function goes along with every task; a long one goes once to each
-worker, which keeps it by its digest.
+A task is a function and some items. In other processes the function goes along pickled, and is read once a worker.
 """
 
 from __future__ import annotations
@@ -11,15 +10,16 @@ import platform
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
-from functools import cache
-from hashlib import blake2b
+from functools import cache, lru_cache, partial
 from itertools import islice
 from operator import length_hint
 from typing import Any, Generic, TypeVar, cast
 
 from mechdesign.errors import MechdesignError
+from mechdesign.work import interrupts
+from mechdesign.work.threads import keep_freed_memory, one_thread
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
@@ -27,12 +27,10 @@ Value = TypeVar("Value")
 # Tasks a worker that are under way or waiting: enough that none idles while the consumer works; few, because they are
 # all in memory.
 LOOK_AHEAD = 3
+LOOK = 0.2  # seconds between two looks for an interrupt
 # Length of a task, in seconds, and how many times as many chunks as the one before it has at most.
 _SECONDS = 1.0
 _GROWTH = 8
-# Bytes of a function that go along with every task, and longer functions that a worker keeps.
-_SHORT = 20_000
-_MOST_KEPT = 4
 
 
 class LostWorkerError(MechdesignError):
@@ -40,12 +38,15 @@ class LostWorkerError(MechdesignError):
 
 
 class Pool:
-    """`width` workers of an executor; `open_` gives one, and another where workers were lost."""
+    """`width` workers of an executor; `open_` gives one, and another where workers were lost.
+
+    Threads of this process have its functions and its memory: to them nothing is pickled, and chunks go one by one.
+    """
 
     losses = 1  #: times that workers are lost before chunks go one by one
 
-    def __init__(self, open_: Callable[[], Executor], width: int) -> None:
-        self._open, self._width = open_, width
+    def __init__(self, open_: Callable[[], Executor], width: int, *, threads: bool = False) -> None:
+        self._open, self._width, self.threads = open_, width, threads
         self.executor = open_()
 
     @property
@@ -66,6 +67,9 @@ class Pool:
         LostWorkerError
             If the executor dropped it.
         """
+        while not future.done():
+            wait([future], LOOK)
+            interrupts.check()
         try:
             return future.result()
         except (CancelledError, ConnectionError) as error:
@@ -97,8 +101,8 @@ class _Task:
         return self.future.cancelled() or _is_loss(self.future.exception())
 
 
-class Courier(Generic[Item, Value]):
-    """An ordered map on the workers of a pool: `function` takes a list of items and gives a list of values.
+class ChunkMap(Generic[Item, Value]):
+    """An ordered map of a function over items on the workers of a pool.
 
     At most ``3 * width`` tasks are under way or waiting to be consumed; chunks are put together so that a task takes
     about a second. Chunks of lost workers are computed again.
@@ -109,18 +113,18 @@ class Courier(Generic[Item, Value]):
         If a chunk ends each worker that takes it, or the executor takes no work or gives something else for it.
     """
 
-    def __init__(self, pool: Pool, function: Callable[[list[Item]], list[Value]]) -> None:
+    def __init__(self, pool: Pool, function: Callable[[Item], Value]) -> None:
         self._pool = pool
-        self._content = pickle.dumps(function, protocol=5)
-        self._digest = blake2b(self._content, digest_size=16).digest()
+        self._work = partial(_timed, function)
+        if not pool.threads:
+            self._work = partial(_perform, _version(), pickle.dumps(function, protocol=5))
         # Of the next task, as far as there are enough for all workers.
         self._chunks = 1
-        self._sent = 0
 
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:
         source, left = iter(items), length_hint(items)
         tasks: deque[_Task] = deque()
-        done = losses = 0
+        begun = losses = 0
         try:
             while True:
                 while len(tasks) < (ahead := LOOK_AHEAD * self._pool.width):
@@ -129,9 +133,9 @@ class Courier(Generic[Item, Value]):
                     own = [*islice(source, min(self._chunks, shared))]
                     if not own:
                         break
+                    tasks.append(_Task(begun, own, self._submit(own)))
+                    begun += len(own)
                     left -= len(own)
-                    first = tasks[-1].first + len(tasks[-1].items) if tasks else done
-                    tasks.append(_Task(first, own, self._send(own)))
                 if not tasks:
                     return
                 try:
@@ -143,28 +147,21 @@ class Courier(Generic[Item, Value]):
                     self._pool.renew()
                     while losses > self._pool.losses and tasks:
                         yield from self._one_by_one(tasks[0])
-                        done = tasks[0].first + len(tasks[0].items)
                         tasks.popleft()
                     losses %= self._pool.losses + 1
                     for task in tasks:
                         if task.lost:
-                            task.future = self._send(task.items)
+                            task.future = self._submit(task.items)
                 else:
-                    done = tasks.popleft().first + len(values)
+                    tasks.popleft()
                     yield from values
         finally:
             for task in tasks:
                 task.future.cancel()
 
-    def _send(self, items: list[Item]) -> Future[Any]:
-        # As many tasks as there are workers bring a long function along; who has not got it asks for it.
-        self._sent += 1
-        brought = self._sent <= self._pool.width or len(self._content) <= _SHORT
-        return self._submit(items, self._content if brought else None)
-
-    def _submit(self, items: list[Item], content: bytes | None) -> Future[Any]:
+    def _submit(self, items: list[Item]) -> Future[Any]:
         try:
-            return self._pool.executor.submit(_perform, _version(), self._digest, content, items)
+            return self._pool.executor.submit(self._work, items)
         except BrokenExecutor as error:
             future: Future[Any] = Future()
             future.set_exception(error)
@@ -174,13 +171,11 @@ class Courier(Generic[Item, Value]):
 
     def _values(self, task: _Task) -> list[Value]:
         found = self._pool.outcome(task.future)
-        if found is None:
-            task.future = self._submit(task.items, self._content)
-            found = self._pool.outcome(task.future)
         if not isinstance(found, tuple) or len(found) != 2 or len(found[0]) != len(task.items):
             raise LostWorkerError("the executor gives something else than the values of the work that it took")
         values, seconds = found
-        self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
+        if not self._pool.threads:
+            self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
         return cast(list[Value], values)
 
     def _one_by_one(self, task: _Task) -> Iterator[Value]:
@@ -190,7 +185,7 @@ class Courier(Generic[Item, Value]):
             return
         for number, item in enumerate(task.items, task.first + 1):
             try:
-                yield from self._values(_Task(number, [item], self._submit([item], self._content)))
+                yield from self._values(_Task(number, [item], self._submit([item])))
             except Exception as error:
                 if not _is_loss(error):
                     raise
@@ -214,21 +209,22 @@ def _version() -> str:
     return ", ".join([f"Python {python}", *(f"{name} {version(name)}" for name in ("mechdesign", "numpy", "scipy"))])
 
 
-# In a worker: the functions that it got, by their digests.
-_functions: dict[bytes, Callable[[list[Any]], list[Any]]] = {}
+@lru_cache(maxsize=4)
+def _function(content: bytes) -> Callable[[Any], Any]:
+    """In a worker: the function of a task, which it keeps for the next ones."""
+    function: Callable[[Any], Any] = pickle.loads(content)
+    return function
 
 
-def _perform(version: str, digest: bytes, content: bytes | None, items: list[Any]) -> tuple[list[Any], float] | None:
-    """In a worker: the values of a function and how long they took, in seconds; None where it is not known here."""
+def _perform(version: str, content: bytes, items: list[Any]) -> tuple[list[Any], float]:
+    """In a worker: the values of a pickled function, and how long they took, in seconds."""
     if version != _version():
         raise MechdesignError(f"a worker has {_version()}, not {version}; install the same there")
-    function = _functions.get(digest)
-    if function is None:
-        if content is None:
-            return None
-        function = _functions[digest] = pickle.loads(content)
-        while len(_functions) > _MOST_KEPT:
-            _functions.pop(next(iter(_functions)), None)
+    keep_freed_memory()
+    with one_thread():
+        return _timed(_function(content), items)
+
+
+def _timed(function: Callable[[Any], Any], items: list[Any]) -> tuple[list[Any], float]:
     begun = time.perf_counter()
-    values = function(items)
-    return values, time.perf_counter() - begun
+    return [function(item) for item in items], time.perf_counter() - begun

@@ -1,0 +1,172 @@
+"""Chunks of work on threads, processes or any executor, in order and with bounded memory.
+
+Great work travels: a function that can be pickled, with the study and what is asked of it, goes to workers elsewhere
+and may be divided into shards. What comes back does not depend on who computed it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextvars import ContextVar
+from functools import partial
+from typing import Any, TypeVar
+
+from mechdesign.commands import MAX_JOBS
+from mechdesign.work import interrupts
+from mechdesign.work.pool import ChunkMap, Pool
+from mechdesign.work.processes import forked
+
+Item = TypeVar("Item")
+Value = TypeVar("Value")
+# From the name of what is computed, a map, and the items of that, to values.
+Share = Callable[[str, Callable[[Iterable[Any]], Iterator[Any]], Iterable[Any]], Iterator[Any]]
+
+_pool: ContextVar[Pool | None] = ContextVar("where great work goes", default=None)
+_division: ContextVar[Share | None] = ContextVar("who computes which chunks", default=None)
+
+
+def worker_count(jobs: int | None) -> int:
+    """Number of threads: `jobs`, or the processors this process may use.
+
+    Raises
+    ------
+    ValueError
+        If `jobs` is less than 1 or more than `MAX_JOBS`.
+    """
+    if jobs is None:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not 1 <= jobs <= MAX_JOBS:
+        raise ValueError(f"jobs must be from 1 to {MAX_JOBS}, not {jobs}")
+    return jobs
+
+
+def map_chunks(
+    function: Callable[[Item], Value],
+    items: Iterable[Item],
+    jobs: int | None = 1,
+    *,
+    processes: bool = False,
+    travels: bool = False,
+) -> Iterator[Value]:
+    """Yield ``function(item)`` in the order of `items`, computed by `jobs` workers; see `workers`."""
+    with workers(function, jobs, processes=processes, travels=travels) as compute:
+        yield from compute(items)
+
+
+@contextmanager
+def workers(
+    function: Callable[[Item], Value], jobs: int | None = 1, *, processes: bool = False, travels: bool = False
+) -> Iterator[Callable[[Iterable[Item]], Iterator[Value]]]:
+    """Give a map of `function` over items, in their order, whose workers live until the context ends.
+
+    Few tasks are under way or waiting to be consumed, whatever the number of items. An exception or an interrupt (also
+    of the consumer) drops the chunks not begun and waits for those under way.
+
+    Parameters
+    ----------
+    jobs : int or None
+        Number of workers; None uses every processor. 1 computes in the calling thread.
+    processes : bool
+        Workers are forked processes where the system has them, else threads. NumPy releases the interpreter's lock in
+        its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
+        less need processes. The function, items and values are pickled.
+    travels : bool
+        Whether the work is worth going to the executor of `on`, where there is one, and being divided by `divided`. The
+        function, items and values are pickled there.
+
+    Raises
+    ------
+    LostWorkerError
+        If a chunk ends each worker that takes it.
+    """
+    count = worker_count(jobs)
+    elsewhere, share = (_pool.get(), _division.get()) if travels else (None, None)
+    work = function if share is None else partial(_undivided, function)
+    with _local(count, processes=processes) if elsewhere is None else nullcontext(elsewhere) as pool:
+        compute = partial(_one_after_another, work) if pool is None else ChunkMap(pool, work)
+        yield compute if share is None else partial(share, _name(function), compute)
+
+
+def _local(count: int, *, processes: bool) -> AbstractContextManager[Pool | None]:
+    """Workers of this machine; none where the calling thread is the only one."""
+    if count == 1:
+        return nullcontext()
+    if processes and sys.platform == "linux":
+        return closing(Pool(partial(forked, count, _settle_in), count))
+    return closing(Pool(partial(ThreadPoolExecutor, count, "mechdesign"), count, threads=True))
+
+
+def _one_after_another(function: Callable[[Item], Value], items: Iterable[Item]) -> Iterator[Value]:
+    for item in items:
+        interrupts.check()
+        yield function(item)
+
+
+def _settle_in() -> None:
+    # Work inside of work stays here.
+    _pool.set(None)
+    _division.set(None)
+    # An interrupt is the parent's to handle: it lets the chunks under way finish.
+    interrupts.leave_to_parent()
+
+
+@contextmanager
+def on(pool: Pool) -> Iterator[None]:
+    """Inside, great work goes to the workers of a pool, which is closed in the end."""
+    before = _pool.set(pool)
+    try:
+        yield
+    finally:
+        _pool.reset(before)
+        pool.close()
+
+
+@contextmanager
+def divided(share: Share | None) -> Iterator[None]:
+    """Inside, the values of great work are what a function gives: from its name, a map, and the items of that."""
+    before = _division.set(share)
+    try:
+        yield
+    finally:
+        _division.reset(before)
+
+
+class Divided(BaseException):
+    """Great work ends without its values, of which others compute a part."""
+
+
+@contextmanager
+def apart(left: list[Divided]) -> Iterator[None]:
+    """Inside, work may be divided without an end to what follows, which does not depend on it; `left` tells of it."""
+    try:
+        yield
+    except Divided as error:
+        left.append(error)
+
+
+@contextmanager
+def here() -> Iterator[None]:
+    """Inside, no work goes elsewhere or is divided."""
+    pool, division = _pool.set(None), _division.set(None)
+    try:
+        yield
+    finally:
+        _pool.reset(pool)
+        _division.reset(division)
+
+
+def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
+    with here():
+        return function(item)
+
+
+def _name(function: Any) -> str:
+    """What a function computes, in the same words in every process."""
+    if isinstance(function, partial):
+        return " ".join(map(_name, (function.func, *filter(callable, function.args))))
+    kind = function if hasattr(function, "__qualname__") else type(function)
+    return f"{kind.__module__}.{kind.__qualname__}"

@@ -1,0 +1,76 @@
+"""Linear algebra on one thread, and memory that is freed and wanted again: both are settings of the whole process.
+
+The last digits of a long sum depend on how many threads share it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cache
+
+# Options of glibc's mallopt, from malloc.h.
+_TRIM_THRESHOLD = -1
+_MMAP_THRESHOLD = -3
+_MEBIBYTE = 2**20
+# Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
+_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+_lock = threading.Lock()
+_inside = 0
+_outside = ExitStack()
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let the C library keep up to 256 MiB of freed blocks; does nothing where it is not glibc.
+
+    A chunk's temporaries are of some hundred kilobytes. By default every one of them is mapped anew and returned on
+    release, so that each of its pages faults in its first write: that took half the time of a Monte Carlo run.
+    """
+    if platform.libc_ver()[0] != "glibc":
+        return
+    mallopt = ctypes.CDLL(None).mallopt
+    mallopt(_MMAP_THRESHOLD, 64 * _MEBIBYTE)
+    mallopt(_TRIM_THRESHOLD, 256 * _MEBIBYTE)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Results of what is computed inside do not depend on how many threads linear algebra may use.
+
+    The limit is that of the process, and of those forked from it. What was set before comes back with the last of
+    those inside, so that they may be nested, and overlap where several threads compute.
+    """
+    global _inside
+    with _lock:
+        if not _inside:
+            _limit()
+        _inside += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _inside -= 1
+            if not _inside:
+                _outside.close()
+
+
+def _limit() -> None:
+    from threadpoolctl import threadpool_limits
+
+    _outside.callback(_restore, {name: os.environ.get(name) for name in _VARIABLES})
+    os.environ.update(dict.fromkeys(_VARIABLES, "1"))
+    _outside.enter_context(threadpool_limits(1, user_api="blas"))
+
+
+def _restore(values: dict[str, str | None]) -> None:
+    for name, value in values.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
