@@ -28,14 +28,14 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from mechdesign.door.questions import kinematics as kinematics
-    from mechdesign.door.questions import load as load
-    from mechdesign.door.questions import optimize as optimize
-    from mechdesign.door.questions import reliability as reliability
-    from mechdesign.door.questions import sensitivities as sensitivities
-    from mechdesign.door.questions import stiffness as stiffness
-    from mechdesign.door.questions import sweep as sweep
-    from mechdesign.door.questions import workspace as workspace
+    from mechdesign.api.questions import kinematics as kinematics
+    from mechdesign.api.questions import load as load
+    from mechdesign.api.questions import optimize as optimize
+    from mechdesign.api.questions import reliability as reliability
+    from mechdesign.api.questions import sensitivities as sensitivities
+    from mechdesign.api.questions import stiffness as stiffness
+    from mechdesign.api.questions import sweep as sweep
+    from mechdesign.api.questions import workspace as workspace
     from mechdesign.errors import AssemblyError as AssemblyError
     from mechdesign.errors import MechdesignError as MechdesignError
     from mechdesign.errors import StudyError as StudyError
@@ -48,7 +48,7 @@ _HOMES = {
     "requirements": "mechdesign.report.requirements",
     **dict.fromkeys(
         ("load", "kinematics", "workspace", "optimize", "reliability", "stiffness", "sweep", "sensitivities"),
-        "mechdesign.door.questions",
+        "mechdesign.api.questions",
     ),
 }
 __all__ = sorted((*_HOMES, "__version__"))

@@ -127,7 +127,7 @@ def _compare(**said: Any) -> int:
 
 
 def _placed(options: Options) -> AbstractContextManager[None]:
-    """Where great work goes."""
+    """The workers that long computations go to."""
     if options.executor is None:
         return nullcontext()
     from mechdesign.work.chunks import on

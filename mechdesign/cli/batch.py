@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cli import places, terminal
-from mechdesign.cli.board import Board, Reported
+from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, name_of
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     Outcome,
@@ -28,7 +28,7 @@ from mechdesign.cli.execution import (
     tell,
     write_report,
 )  # fmt: skip
-from mechdesign.cli.ledger import End, Ledger, Said, Task, failure, name_of
+from mechdesign.cli.live_table import LiveTable, Reported
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import PAGE, claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
@@ -103,18 +103,18 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
     unless `options.fail_fast`. After an interrupt the summary and the JUnit file show what was finished.
     """
     asked = found_studies(paths)
-    with Board(quiet=options.quiet) as board:
-        ledger = Ledger(options, asked, board)
+    with LiveTable(quiet=options.quiet) as live_table:
+        record = BatchRecord(options, asked, live_table)
         try:
-            tasks = _read(asked, options, ledger, only)
-            if not ledger.stopped:
-                _answer(tasks, options, ledger)
+            tasks = _read(asked, options, record, only)
+            if not record.stopped:
+                _answer(tasks, options, record)
         except KeyboardInterrupt:
-            ledger.interrupted = True
-    return ledger.close()
+            record.interrupted = True
+    return record.close()
 
 
-def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: Sequence[str]) -> list[Task]:
+def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str]) -> list[Task]:
     """Read the studies, and keep no more of them than their texts."""
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
@@ -137,8 +137,8 @@ def _read(paths: Sequence[Path | None], options: Options, ledger: Ledger, only: 
                 places.check(study, command, directory, own)
             tasks.append(Task(number, origin, label, root, asked, own))
         except Exception as error:
-            ledger.missing(number, failure(label, "check", Path(), error, study))
-            if ledger.stopped:
+            record.missing(number, failure(label, "check", Path(), error, study))
+            if record.stopped:
                 break
     return tasks
 
@@ -173,7 +173,7 @@ def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tupl
     return found if not begun or "run" in given else begun
 
 
-def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
+def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:
     """Answer the questions of the studies, side by side if there are several and the system forks processes.
 
     Raises
@@ -188,14 +188,14 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
         tasks = [replace(task, options=replace(task.options, jobs=jobs // count)) for task in tasks]
         if not options.resume:
             _import(tasks, options)
-    ledger.begin(tasks)
-    work = partial(_study, tasks, ledger.several)
+    record.begin(tasks)
+    work = partial(_study, tasks, record.several)
     waiting = iter(range(len(tasks)))
     if count == 1:
         for index in waiting:
-            if not ledger.stopped:
-                ledger.end(index, work(index, partial(ledger.note, index)))
-            if ledger.interrupted:
+            if not record.stopped:
+                record.end(index, work(index, partial(record.note, index)))
+            if record.interrupted:
                 raise KeyboardInterrupt
         return
     processes = [TaskProcess(work)]
@@ -204,48 +204,48 @@ def _answer(tasks: Sequence[Task], options: Options, ledger: Ledger) -> None:
         with suppress(OSError):
             while len(processes) < count:
                 processes.append(TaskProcess(work))
-        _finish(work, processes, waiting, ledger)
+        _finish(work, processes, waiting, record)
     except KeyboardInterrupt:
-        ledger.stopped = True
+        record.stopped = True
         _interrupt(processes)
-        _finish(work, processes, waiting, ledger)
+        _finish(work, processes, waiting, record)
         raise
     finally:
         for process in processes:
             process.close()
 
 
-def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], ledger: Ledger) -> None:
+def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], record: BatchRecord) -> None:
     """Give each process one study after the other, until none waits or the run stops, and note what they tell.
 
     One that was killed is replaced.
     """
     while True:
         for process in processes:
-            if process.task is None and not ledger.stopped and (index := next(waiting, None)) is not None:
+            if process.task is None and not record.stopped and (index := next(waiting, None)) is not None:
                 process.begin(index)
         busy = {process.notes: process for process in processes if process.task is not None}
         if not busy:
             return
         for notes in wait([*busy], LOOK):
             process = busy[notes]  # type: ignore[index]
-            index, stopped = process.task, ledger.stopped
+            index, stopped = process.task, record.stopped
             assert index is not None
             note = process.hear()
             if process.task is not None:
-                ledger.note(index, note)
+                record.note(index, note)
             else:
-                ledger.end(index, note)
+                record.end(index, note)
             if process.lost:
                 process.close()
                 processes[processes.index(process)] = TaskProcess(work)
-            if ledger.stopped and not stopped:
+            if record.stopped and not stopped:
                 # The first failure does not wait for the others.
                 _interrupt([other for other in processes if other is not process])
         interrupts.check()
-        if ledger.interrupted and not ledger.stopped:
+        if record.interrupted and not record.stopped:
             raise KeyboardInterrupt
-        ledger.board.show()
+        record.live_table.show()
 
 
 def _interrupt(processes: Sequence[TaskProcess]) -> None:

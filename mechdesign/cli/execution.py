@@ -192,7 +192,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
 
 
 def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
-    """Compute a part of the great work of a command, and keep it for merge; what is not great is left to that."""
+    """Compute one shard of a command and keep it for `merge`; what is not divided is left to `merge`."""
     told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
     if command not in DIVIDED:
         return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")

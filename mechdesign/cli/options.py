@@ -99,7 +99,7 @@ EXECUTOR = _text(
     str,
     "--executor",
     "NAME",
-    "Where great work is computed: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
+    "Where long computations run: dask:tcp://HOST:PORT, dask:local, or module:factory, a function that gives a "
     "concurrent.futures.Executor. The results do not depend on it. Default: here.",
 )
 SHARD = _text(
@@ -107,7 +107,7 @@ SHARD = _text(
     str,
     "--shard",
     "I/N",
-    "Compute the I-th of N parts of the great work alone, from 1 on, and keep it in the folder of the results; "
+    "Compute only the I-th of N parts of the long computations, I from 1 on, and keep it in the folder of the results; "
     "`mechdesign merge` puts the parts together.",
 )
 JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from mechdesign.cli.batch_record import failure, name_of
 from mechdesign.cli.execution import Outcome, ask
-from mechdesign.cli.ledger import failure, name_of
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit, mark
 from mechdesign.errors import Interrupted, Problem, StudyError

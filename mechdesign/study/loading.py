@@ -171,7 +171,7 @@ def load(
 ) -> Study:
     """Load a study from a file, a mapping or a text in YAML.
 
-    Parameters and errors are told at `mechdesign.load`, the door to it.
+    Parameters and errors are told at `mechdesign.load`, which calls this.
     """
     named = isinstance(source, str) and "\n" not in source
     if (source is None) == (text is None) or not (source is None or named or isinstance(source, os.PathLike | Mapping)):

@@ -1,7 +1,7 @@
 """Chunks of work on threads, processes or any executor, in order and with bounded memory.
 
-Great work travels: a function that can be pickled, with the study and what is asked of it, goes to workers elsewhere
-and may be divided into shards. What comes back does not depend on who computed it.
+A long computation is a function that can be pickled, with its study and arguments, and a sequence of items: it can run
+on other machines and be divided into shards. Its values do not depend on where they are computed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Value = TypeVar("Value")
 # From the name of what is computed, a map, and the items of that, to values.
 Share = Callable[[str, Callable[[Iterable[Any]], Iterator[Any]], Iterable[Any]], Iterator[Any]]
 
-_pool: ContextVar[Pool | None] = ContextVar("where great work goes", default=None)
+_pool: ContextVar[Pool | None] = ContextVar("pool of long computations", default=None)
 _division: ContextVar[Share | None] = ContextVar("who computes which chunks", default=None)
 
 
@@ -116,7 +116,7 @@ def _settle_in() -> None:
 
 @contextmanager
 def on(pool: Pool) -> Iterator[None]:
-    """Inside, great work goes to the workers of a pool, which is closed in the end."""
+    """Inside, long computations run on the workers of a pool, which is closed at the end."""
     before = _pool.set(pool)
     try:
         yield
@@ -127,7 +127,7 @@ def on(pool: Pool) -> Iterator[None]:
 
 @contextmanager
 def divided(share: Share | None) -> Iterator[None]:
-    """Inside, the values of great work are what a function gives: from its name, a map, and the items of that."""
+    """Inside, `share` decides which chunks of long computations are computed, from the name, the map and its items."""
     before = _division.set(share)
     try:
         yield
@@ -136,7 +136,7 @@ def divided(share: Share | None) -> Iterator[None]:
 
 
 class Divided(BaseException):
-    """Great work ends without its values, of which others compute a part."""
+    """A long computation ends without its values, since other shards compute a part of them."""
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Great work divided between processes that know nothing of each other, such as those of a job array.
+"""Long computations divided between processes that do not communicate, such as those of a job array.
 
 Each computes every n-th chunk of the maps that it comes to, and keeps their values in a file. Who merges them takes the
 values from the files, and computes what depends on them.

@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.live import Live
 
 from mechdesign.cli import terminal
-from mechdesign.cli.board import Board, Far
 from mechdesign.cli.execution import Outcome
+from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.summary import summary
 
 from .conftest import SLIDER, answer
@@ -91,13 +91,13 @@ def test_a_long_name_leaves_room_for_what_became_of_it(capsys, monkeypatch):
 
 
 def test_the_table_of_what_is_under_way_has_room_for_it():
-    board = Board(quiet=False)
-    board._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
-    board.start(["long " * 30, "b"])
-    board.far(0, Far("reliability", "samples", 1, 4))
-    board.done(1, Outcome("b", "kinematics", Path(), 1, 0))
-    board._live.console.print(board._table())
-    text = board._live.console.file.getvalue()
+    live_table = LiveTable(quiet=False)
+    live_table._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    live_table.start(["long " * 30, "b"])
+    live_table.advance(0, ProgressNote("reliability", "samples", 1, 4))
+    live_table.done(1, Outcome("b", "kinematics", Path(), 1, 0))
+    live_table._live.console.print(live_table._table())
+    text = live_table._live.console.file.getvalue()
     assert all(word in text for word in ("kinematics", "requirement not met", "reliability", "samples", "1 failed"))
 
 

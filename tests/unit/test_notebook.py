@@ -1,4 +1,4 @@
-"""The Python door as a notebook uses it: studies that are no file, tables that convert, what a cell shows."""
+"""The Python interface as a notebook uses it: studies that are no file, tables that convert, what a cell shows."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import mechdesign
+from mechdesign.api.shown import Answer, ShownStudy
 from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
 from mechdesign.commands import QUESTIONS
-from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Mechanism
 from mechdesign.results import Column, Result, Table

@@ -25,7 +25,7 @@ _WIDTH = 24  # of a bar, in characters
 
 
 @dataclass(frozen=True)
-class Far:
+class ProgressNote:
     """How far a question is: steps done of a total in a stage; none of them before its first stage."""
 
     command: str
@@ -60,10 +60,10 @@ class Reported(Progress):
 
     def _say(self) -> None:
         self._told = time.monotonic()
-        self._tell(Far(self._command, self._stage, self._done, self._total))
+        self._tell(ProgressNote(self._command, self._stage, self._done, self._total))
 
 
-class Board:
+class LiveTable:
     """The table: questions that failed and those answered last, and below them those under way.
 
     It is on stderr, only on a terminal, and appears after a second; messages go above it. Use it as a context.
@@ -76,13 +76,13 @@ class Board:
         self._begun = time.monotonic()
         self._live: Live | None = None
         self._labels: Sequence[str] = ()
-        self._under_way: dict[int, tuple[float, Far]] = {}  # since when, and how far
+        self._under_way: dict[int, tuple[float, ProgressNote]] = {}  # since when, and how far
         self._failed: list[Outcome] = []
         self._last: deque[Outcome] = deque(maxlen=_LAST)
         self._ended = 0
         self._shown = 0.0
 
-    def __enter__(self) -> Board:
+    def __enter__(self) -> LiveTable:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -96,7 +96,7 @@ class Board:
         """Begin with the studies of these names."""
         self._labels = labels
 
-    def far(self, index: int, how: Far) -> None:
+    def advance(self, index: int, how: ProgressNote) -> None:
         """A study's question is so far."""
         since, before = self._under_way.get(index, (0.0, None))
         if before is None or before.command != how.command:

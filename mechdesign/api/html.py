@@ -103,7 +103,7 @@ def _render(template: str, **said: object) -> str:
 @cache
 def _environment() -> Environment:
     made = Environment(
-        loader=PackageLoader("mechdesign.door"),
+        loader=PackageLoader("mechdesign.api"),
         autoescape=True,
         finalize=harmless,
         trim_blocks=True,

@@ -8,8 +8,8 @@ from importlib import import_module
 from typing import Any
 
 from mechdesign import study as studies
+from mechdesign.api.shown import Answer, ShownStudy
 from mechdesign.commands import QUESTIONS
-from mechdesign.door.shown import Answer, ShownStudy
 from mechdesign.errors import Interrupted
 from mechdesign.progress import NULL, Progress
 from mechdesign.study import Study

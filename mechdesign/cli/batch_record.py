@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error
-from mechdesign.cli.board import Board, Far
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import Outcome, Source
+from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
 from mechdesign.errors import Interrupted, MechdesignError, counted, printable
@@ -61,12 +61,12 @@ class End:
     interrupted: bool = False
 
 
-class Ledger:
+class BatchRecord:
     """What becomes of studies: told in their order, in whatever order it is heard, and written in the end."""
 
-    def __init__(self, options: Options, asked: Sequence[Path | None], board: Board) -> None:
+    def __init__(self, options: Options, asked: Sequence[Path | None], live_table: LiveTable) -> None:
         self.options = options
-        self.board = board
+        self.live_table = live_table
         self.several = len(asked) > 1
         self.interrupted = False
         self.stopped = False  # nothing more is begun
@@ -105,19 +105,19 @@ class Ledger:
         """Begin with the questions."""
         self._tasks = tasks
         self._words = [[] for _ in tasks]
-        self.board.start([task.label for task in tasks])
+        self.live_table.start([task.label for task in tasks])
 
-    def note(self, index: int, note: Far | Said) -> None:
+    def note(self, index: int, note: ProgressNote | Said) -> None:
         """Hear of a task how far it is, or a question's outcome."""
         task = self._tasks[index]
-        if isinstance(note, Far):
-            self.board.far(index, note)
+        if isinstance(note, ProgressNote):
+            self.live_table.advance(index, note)
             great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
             note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
         self._words[index].append(note.words)
         if note.given is not None:
             self._answers[task.number].append(note.given)
-            self.board.done(index, note.given)
+            self.live_table.done(index, note.given)
             self.stopped |= self.options.fail_fast and note.given.exit_code > 0
         if index == self._first:
             self._say()
@@ -127,7 +127,7 @@ class Ledger:
         if index in self._ended:
             return
         self._ended.add(index)
-        self.board.end(index)
+        self.live_table.end(index)
         number = self._tasks[index].number
         if end is None:
             if not self.stopped:
@@ -147,7 +147,7 @@ class Ledger:
 
     def _say(self) -> None:
         for words in self._words[self._first]:
-            self.board.say(words)
+            self.live_table.say(words)
         self._words[self._first].clear()
 
     def close(self) -> int:

@@ -45,7 +45,7 @@ class ShownStudy(Study):
         return f"<Study {shown(self.name)}: {words}\n  asks {', '.join(self.questions) or 'no question'}{warned}>"
 
     def _repr_html_(self) -> str:
-        from mechdesign.door.html import study_html
+        from mechdesign.api.html import study_html
 
         return study_html(self, self._repr_png_())
 
@@ -170,7 +170,7 @@ class Answer(Result):
         return "\n  ".join(lines) + ">"
 
     def _repr_html_(self) -> str:
-        from mechdesign.door.html import answer_html
+        from mechdesign.api.html import answer_html
 
         return answer_html(self.study, self, self._judged(), *self._seen)
 

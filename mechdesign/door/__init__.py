@@ -1,1 +1,0 @@
-"""The Python door: studies and results that show themselves in notebooks, and the questions as functions."""
