@@ -53,7 +53,7 @@ class Simulated(NamedTuple):
 class Aim(ABC):
     """The target of an allocation, as a measure."""
 
-    target: float
+    asked: float
 
     noun: ClassVar[str]
 
@@ -66,7 +66,7 @@ class Aim(ABC):
         """The inverse of `level`."""
 
     @abstractmethod
-    def tabulated(self, measure: Floats) -> Floats:
+    def shown(self, measure: Floats) -> Floats:
         """The measure as tables have it: a reliability or a Cpk."""
 
     @abstractmethod
@@ -113,7 +113,7 @@ class Reliable(Aim):
 
         return np.asarray(2.0 * ndtr(-np.exp(level)))
 
-    def tabulated(self, measure: Floats) -> Floats:
+    def shown(self, measure: Floats) -> Floats:
         return 1.0 - measure
 
     def in_words(self, measure: float) -> str:
@@ -128,7 +128,7 @@ class Reliable(Aim):
         return made_failure(linear, closing, question.bands, question.discs)[None]
 
     def method(self, task: Task, section: ReliabilitySection) -> str:
-        return "auto" if "auto" in section.methods or task.samples * self.target < _ENOUGH_FAILURES else "monte_carlo"
+        return "auto" if "auto" in section.methods or task.samples * self.asked < _ENOUGH_FAILURES else "monte_carlo"
 
     def simulate(self, task: Task, method: str) -> Simulated:
         result = methods.run(method, task)
@@ -138,9 +138,9 @@ class Reliable(Aim):
 
     def safe(self, simulated: Simulated) -> Floats:
         # Where few failures are seen, or none, the interval's end keeps the correction on the safe side.
-        few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.target)
+        few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.asked)
         seen = np.where(few, simulated.worst, simulated.value)
-        return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.target), seen)
+        return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.asked), seen)
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         from mechdesign.numerics.statistics import outside
@@ -168,7 +168,7 @@ class Capable(Aim):
     def measure(self, level: Number) -> Floats:
         return np.asarray(np.exp(level) / 3.0)
 
-    def tabulated(self, measure: Floats) -> Floats:
+    def shown(self, measure: Floats) -> Floats:
         return measure
 
     def in_words(self, measure: float) -> str:

@@ -64,7 +64,7 @@ class _Round:
 
     def missed(self) -> Flags:
         """Where the target is missed beyond chance; for grades also where simulation and model both miss it."""
-        aim, target = self.model.aim, self.model.aim.level(self.model.aim.target)
+        aim, target = self.model.aim, self.model.aim.level(self.model.aim.asked)
         missed = aim.level(self.simulated.best) < target
         if self.model.steps:
             missed |= (aim.level(self.simulated.value) < target) & (aim.level(self.analytic) < target)
@@ -76,7 +76,7 @@ class _Round:
         For grades wherever the model is pessimistic: a coarser grade may do.
         """
         aim = self.model.aim
-        more = (aim.level(self.simulated.worst) > aim.level(aim.target)) | self.simulated.unseen
+        more = (aim.level(self.simulated.worst) > aim.level(aim.asked)) | self.simulated.unseen
         level = aim.level(self.analytic)
         if self.model.steps:
             return np.asarray(more & ((aim.level(self.simulated.worst) > level) | self.simulated.unseen))
@@ -85,7 +85,7 @@ class _Round:
     def levels(self) -> tuple[Floats, Floats]:
         """Levels by the model, and the excess of the simulated levels over the target's."""
         aim = self.model.aim
-        return aim.level(self.analytic), aim.level(aim.safe(self.simulated)) - aim.level(aim.target)
+        return aim.level(self.analytic), aim.level(aim.safe(self.simulated)) - aim.level(aim.asked)
 
     def worst(self) -> tuple[str, str, str]:
         """In words: the worst pose, the model's measure there, and the simulated one with its interval."""
@@ -150,12 +150,12 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if last.bound < last.cost() * (1.0 - _SAME):
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
-    text, files = rewritten(
+    text, others = rewritten(
         study, allocated_data(study, given, last.scales), f"Tolerances of {study.name}, the cheapest for a {asked}"
     )
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))
-    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **files})
+    return Result("allocation", tables, notes, failed=failed, files={"allocated.yaml": text, **others})
 
 
 def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
@@ -163,7 +163,7 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
     free, aim, rounds = model.free, model.aim, list[_Round]()
     settings = range(len(model.task.settings))
     limits = len(model.reached(np.ones(len(model.tolerances)), settings))
-    wanted = np.full((limits, len(settings)), aim.level(aim.target))
+    wanted = np.full((limits, len(settings)), aim.level(aim.asked))
     for _ in range(_MAX_ROUNDS):
         if model.steps:
             scales, bound = graded(model, wanted)
@@ -198,7 +198,7 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
 def _asked(last: _Round) -> str:
     """The target in words."""
     aim = last.model.aim
-    return f"{aim.noun} of {float(aim.tabulated(np.array(aim.target))):.15g}"
+    return f"{aim.noun} of {float(aim.shown(np.array(aim.asked))):.15g}"
 
 
 def _corrected(rounds: Sequence[_Round]) -> Floats:
@@ -245,20 +245,20 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
 
 
 def _allocation(last: _Round) -> Table:
-    sources, given = last.model.tolerances, [tolerance.given for tolerance in last.model.tolerances]
-    sizes = [tolerance.size(scale) for tolerance, scale in zip(sources, last.scales.tolist(), strict=True)]
-    prices = [np.array([tolerance.price(size) for tolerance, size in zip(sources, widths, strict=True)])
+    found, given = last.model.tolerances, [tolerance.given for tolerance in last.model.tolerances]
+    sizes = [tolerance.size(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)]
+    prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, widths, strict=True)])
               for widths in (given, sizes)]  # fmt: skip
-    names = np.array([tolerance.grade(scale) for tolerance, scale in zip(sources, last.scales.tolist(), strict=True)])
+    names = np.array([tolerance.grade(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)])
     meaning = "standard grade of ISO 286-1 that it is, half to either side; empty where it is held"
     grades = [Column("grade", names, meaning=meaning)] if last.model.steps else []
     columns = (
-        Column("source", np.array([tolerance.name for tolerance in sources]), meaning="what varies"),
-        Column("kind", np.array([tolerance.kind for tolerance in sources]),
+        Column("source", np.array([tolerance.name for tolerance in found]), meaning="what varies"),
+        Column("kind", np.array([tolerance.kind for tolerance in found]),
                meaning="tolerance: half its width; sigma; measured: the values' sigma; clearance: its mean radial one"),
         Column("given", np.array(given), meaning="as the study gives it, in `unit`"),
         Column("allocated", np.array(sizes), meaning="the cheapest, in `unit`"),
-        Column("unit", np.array([tolerance.unit for tolerance in sources]), meaning="unit of the two columns before"),
+        Column("unit", np.array([tolerance.unit for tolerance in found]), meaning="unit of the two columns before"),
         *grades,
         Column("cost_given", prices[0], meaning="a/T^exponent; nan where it is held"),
         Column("cost_allocated", prices[1], meaning="a/T^exponent; nan where it is held"),
@@ -270,23 +270,22 @@ def _allocation(last: _Round) -> Table:
 
 
 def _confirmation(last: _Round) -> Table:
-    aim, simulated, task = last.model.aim, last.simulated, last.model.task
+    aim, said, task = last.model.aim, last.simulated, last.model.task
     # The worst limit at each pose.
-    place = np.argmin(aim.level(simulated.value), axis=0), np.arange(len(task.settings))
+    place = np.argmin(aim.level(said.value), axis=0), np.arange(len(task.settings))
     value, worst, best, analytic, target = (
-        aim.tabulated(part[place])
-        for part in (simulated.value, simulated.worst, simulated.best, last.analytic, aim.measure(last.wanted))
+        aim.shown(part[place]) for part in (said.value, said.worst, said.best, last.analytic, aim.measure(last.wanted))
     )
     columns = [
         *at_poses(task, np.array([setting.pose for setting in task.settings])),
-        Column("asked", aim.tabulated(np.full(len(value), aim.target)), meaning="reliability, or Cpk, asked for"),
+        Column("asked", aim.shown(np.full(len(value), aim.asked)), meaning="reliability, or Cpk, asked for"),
         Column("target", target, meaning="what the analytic model had to reach for it"),
         Column("analytic", analytic, meaning="reliability, or least Cpk of any limit, by the first-order model"),
         Column("simulated", value, meaning="the same by simulation"),
         Column("low", worst, meaning="lower end of its interval, 99.7 %"),
         Column("high", best, meaning="upper end of its interval, 99.7 %"),
         Column("method", np.full(len(value), last.method), meaning="how it was simulated"),
-        *shared(task.study.units, evaluations=simulated.evaluations),
+        *shared(task.study.units, evaluations=said.evaluations),
         Column("met", np.logical_not(last.missed().any(axis=0)),
                meaning="1 where the interval holds what is asked, or all of it is above"),
     ]  # fmt: skip
@@ -339,7 +338,7 @@ def _unreachable(last: _Round) -> str:
     held = [k for k, tolerance in enumerate(model.tolerances) if tolerance.cost is None and share[k] > _HELD_SHARE]
     if not question.kept(np.zeros((len(question.channels), 1))).all():
         reason = "the nominal value lies outside its limits"
-    elif linear.shift().any() and (aim.level(centred) >= aim.level(aim.target)).all():
+    elif linear.shift().any() and (aim.level(centred) >= aim.level(aim.asked)).all():
         reason = "the mean errors, which the width of no tolerance changes, break the limits by themselves"
     elif held:
         held.sort(key=lambda k: -share[k])
@@ -352,7 +351,7 @@ def _unreachable(last: _Round) -> str:
     with_what = "in their finest grades" if model.steps else f"at {TIGHTEST:g} times the given ones"
     reached = f"{aim.in_words(float(last.simulated.value[limit, worst]))} by {last.method} and by the analytic model "
     return (
-        f"allocate: a {aim.noun} of {aim.in_words(aim.target)} cannot be reached at {model.task.where(pose)}: with all "
+        f"allocate: a {aim.noun} of {aim.in_words(aim.asked)} cannot be reached at {model.task.where(pose)}: with all "
         f"tolerances {with_what} it is {reached}{aim.in_words(float(last.analytic[limit, worst]))}; {reason}"
     )
 
@@ -367,7 +366,7 @@ def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst:
     scales = tightest.copy()
     scales[free] = TIGHTEST
     aim = model.aim
-    if not free or model.steps or (aim.level(model.reached(scales, [worst])) < aim.level(aim.target)).any():
+    if not free or model.steps or (aim.level(model.reached(scales, [worst])) < aim.level(aim.asked)).any():
         return ""
     instead = f", with 'radial' in place of the fit of {', '.join(fits)}" if fits else ""
     return f"; name {', '.join(names)} in 'cost' to have it allocated too{instead}"
