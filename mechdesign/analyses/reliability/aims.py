@@ -1,7 +1,8 @@
-"""What allocated tolerances have to reach at every pose: a reliability, or a Cpk of every limited output.
+"""The target of an allocation at every pose: a reliability, or a Cpk of every limited output.
 
-An aim is measured by what is asked: a probability of failure, or a Cpk. Its `level`, the logarithm of a distance from
-the limits in standard deviations, is nearly linear in the logarithms of tolerances, and grows with what is better.
+An aim has a measure: the probability of failure, or the Cpk. The `level` of a measure is the logarithm of the distance
+from the limits in standard deviations. It is nearly linear in the logarithms of the tolerances, and a higher level is
+better.
 """
 
 from __future__ import annotations
@@ -23,21 +24,22 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study.schema.allocation import Allocate
 from mechdesign.study.schema.reliability import ReliabilitySection
 
-# Least failure probability that is told from 0, and least distance from a limit.
+# Lower bound of a failure probability before its quantile is taken.
 _LEAST_FAILURE = 1e-300
+# Lower bound of a distance from a limit, in standard deviations, before its logarithm is taken.
 _LEAST_DISTANCE = 1e-6
-# Expected failures from which on the study's own samples confirm them.
+# Expected failures among the study's samples from which on plain Monte Carlo confirms a reliability.
 _ENOUGH_FAILURES = 100
-# Share of the failures asked that a simulation which sees none is counted for at most.
+# Probability of failure assumed at most where a simulation saw no failure, as a share of the target.
 _UNSEEN = 0.01
-# Halvings in the search of a deviation.
+# Bisection steps in the search of a standard deviation.
 _HALVINGS = 60
 
 
 class Simulated(NamedTuple):
-    """What simulation finds, with the ends of its interval, 99.7 %; measures, shape (limits, poses).
+    """Simulated measures and the worse and better end of their 99.7 % intervals, shape (limits, poses).
 
-    `unseen` is where no failure was seen; `evaluations` are of each pose.
+    `unseen` marks poses without a failed sample; `evaluations` are the mechanisms solved at each pose.
     """
 
     value: Floats
@@ -49,7 +51,7 @@ class Simulated(NamedTuple):
 
 @dataclass(frozen=True)
 class Aim(ABC):
-    """What is asked, as a measure."""
+    """The target of an allocation, as a measure."""
 
     asked: float
 
@@ -57,7 +59,7 @@ class Aim(ABC):
 
     @abstractmethod
     def level(self, measure: Number) -> Floats:
-        """Logarithms of distances from the limits."""
+        """Logarithms of distances from the limits, in standard deviations."""
 
     @abstractmethod
     def measure(self, level: Number) -> Floats:
@@ -65,33 +67,33 @@ class Aim(ABC):
 
     @abstractmethod
     def shown(self, measure: Floats) -> Floats:
-        """As tables have it."""
+        """The measure as tables have it: a reliability or a Cpk."""
 
     @abstractmethod
-    def plain(self, measure: float) -> str:
-        """In words."""
+    def in_words(self, measure: float) -> str:
+        """The same for a message."""
 
     @abstractmethod
     def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
-        """Measures of a linear model at poses, shape (limits, poses), and of its margins of assembly."""
+        """Measures by the linear model of the errors and that of the margins of assembly, shape (limits, poses)."""
 
     @abstractmethod
     def method(self, task: Task, section: ReliabilitySection) -> str:
-        """The method that confirms it."""
+        """The simulation method that confirms the target."""
 
     @abstractmethod
-    def simulated(self, task: Task, method: str) -> Simulated:
-        """What the method finds at the settings of a task."""
+    def simulate(self, task: Task, method: str) -> Simulated:
+        """Measures at the settings of a task by a simulation method."""
 
     @abstractmethod
-    def safe(self, found: Simulated) -> Floats:
-        """Measures on the safe side of what was found, from which the model is corrected."""
+    def safe(self, simulated: Simulated) -> Floats:
+        """Measures on the safe side of the simulated ones, from which the model's target is corrected."""
 
     @abstractmethod
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
-        """Standard deviations with which an error of mean 0 has a level at most within an interval, 0 where with none.
+        """Largest standard deviation of an error of mean 0 that reaches `level` within [low, high]; 0 where none does.
 
-        Where limits are kept together, a level of both is one of each by itself at least.
+        Where several limits have to be kept together, each of them alone has to reach the level, too.
         """
 
 
@@ -101,7 +103,7 @@ class Reliable(Aim):
     noun = "reliability"
 
     def level(self, measure: Number) -> Floats:
-        """Log of the distance, in standard deviations, of two limits that are so often broken."""
+        """Log of the distance, in standard deviations, of symmetric limits broken with this probability."""
         from scipy.special import ndtri
 
         return np.log(np.maximum(-ndtri(0.5 * np.maximum(measure, _LEAST_FAILURE)), _LEAST_DISTANCE))
@@ -114,8 +116,8 @@ class Reliable(Aim):
     def shown(self, measure: Floats) -> Floats:
         return 1.0 - measure
 
-    def plain(self, measure: float) -> str:
-        """With as many digits as tell it from 1."""
+    def in_words(self, measure: float) -> str:
+        """The reliability with enough digits to differ from 1."""
         digits = 6 if measure <= 0 else max(6, math.ceil(-math.log10(measure)) + 3)
         return f"{1.0 - measure:.{digits}f}".rstrip("0").rstrip(".")
 
@@ -128,24 +130,24 @@ class Reliable(Aim):
     def method(self, task: Task, section: ReliabilitySection) -> str:
         return "auto" if "auto" in section.methods or task.samples * self.asked < _ENOUGH_FAILURES else "monte_carlo"
 
-    def simulated(self, task: Task, method: str) -> Simulated:
-        said = methods.run(method, task)
-        each = [said.estimates[setting.pose] for setting in task.settings]
-        value, low, high = (np.array([[getattr(e, name) for e in each]]) for name in ("failure", "low", "high"))
-        return Simulated(value, high, low, value == 0, [e.evaluations for e in each])
+    def simulate(self, task: Task, method: str) -> Simulated:
+        result = methods.run(method, task)
+        estimates = [result.estimates[setting.pose] for setting in task.settings]
+        value, low, high = (np.array([[getattr(e, name) for e in estimates]]) for name in ("failure", "low", "high"))
+        return Simulated(value, high, low, value == 0, [e.evaluations for e in estimates])
 
-    def safe(self, found: Simulated) -> Floats:
+    def safe(self, simulated: Simulated) -> Floats:
         # Where few failures are seen, or none, the interval's end keeps the correction on the safe side.
-        few = (2.0 * found.best < found.worst) & (found.worst < self.asked)
-        seen = np.where(few, found.worst, found.value)
-        return np.where(found.unseen, np.minimum(found.worst, _UNSEEN * self.asked), seen)
+        few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.asked)
+        seen = np.where(few, simulated.worst, simulated.value)
+        return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.asked), seen)
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         from mechdesign.numerics.statistics import outside
 
         allowed = self.measure(level)
         with np.errstate(divide="ignore", invalid="ignore"):
-            # Log of the deviation; of two limits alike it is known, and of one it may be wider.
+            # Bracket of the deviation's logarithm: exact for symmetric limits, wider where one limit is farther.
             least, most = (np.log(np.minimum(high, -low) * factor / np.exp(level)) for factor in (0.1, 1e3))
             for _ in range(_HALVINGS):
                 middle = 0.5 * (least + most)
@@ -169,8 +171,7 @@ class Capable(Aim):
     def shown(self, measure: Floats) -> Floats:
         return measure
 
-    def plain(self, measure: float) -> str:
-        """With the digits that are counted."""
+    def in_words(self, measure: float) -> str:
         return f"{measure:.6g}"
 
     def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
@@ -179,27 +180,29 @@ class Capable(Aim):
     def method(self, task: Task, section: ReliabilitySection) -> str:
         return "monte_carlo"
 
-    def simulated(self, task: Task, method: str) -> Simulated:
+    def simulate(self, task: Task, method: str) -> Simulated:
         poses = [setting.pose for setting in task.settings]
-        said = methods.run(method, task)
-        mean, covariance = said.moments(task)
+        result = methods.run(method, task)
+        mean, covariance = result.moments(task)
         sigma = np.sqrt(np.diagonal(covariance[poses], axis1=1, axis2=2).T)
         value = _cpk(task.question.at(task.nominal[:, poses]), mean[:, poses], sigma)
-        counts = np.array([said.sums[pose].valid for pose in poses])
+        counts = np.array([result.sums[pose].valid for pose in poses])
         # [Bissell, How reliable is your capability index?, 1990]
         half = WIDTH * np.sqrt(1.0 / (9.0 * counts) + value**2 / (2.0 * (counts - 1)))
         return Simulated(value, value - half, value + half, np.zeros(value.shape, dtype=bool), counts.tolist())
 
-    def safe(self, found: Simulated) -> Floats:
-        return found.value
+    def safe(self, simulated: Simulated) -> Floats:
+        return simulated.value
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         return np.maximum(np.minimum(high, -low), 0.0) / np.exp(level)
 
 
-def aim_of(given: Allocate) -> Aim:
-    """What a study asks."""
-    return Reliable(1.0 - given.reliability) if given.reliability is not None else Capable(given.cpk or 0.0)
+def aim_of(allocate: Allocate) -> Aim:
+    """The target that a study's `allocate` gives."""
+    if allocate.reliability is not None:
+        return Reliable(1.0 - allocate.reliability)
+    return Capable(allocate.cpk or 0.0)
 
 
 def _cpk(question: ReliabilityQuestion, mean: Floats, sigma: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""A study with its allocated tolerances, as data of its file."""
+"""The data of a study file with its allocated tolerances."""
 
 from __future__ import annotations
 
@@ -14,33 +14,34 @@ from mechdesign.study.text.document import plain
 
 
 def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
-    """The study's data where tolerances are as many times as wide.
+    """The study's data with its tolerances times the factors `scales`, shape (tolerances,).
 
-    What a wildcard gives is written out, place by place, unless all of it stays alike. What is done is no longer asked:
-    `allocate` is left out, unless a requirement judges its tables.
+    A wildcard is written out, dimension by dimension, unless all its dimensions keep equal tolerances. `allocate` is
+    left out, unless a requirement judges its tables.
     """
     section = study.reliability
     assert section is not None
     data: dict[str, Any] = plain(study.resolved)
     changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
-    given = data["reliability"]
-    if not any(each.result.split(".")[1:2] in (["allocation"], ["confirmation"]) for each in study.requirements):
-        del given["allocate"]
-    entries = given.get("dimensions") or {}
+    written = data["reliability"]
+    judged = (["allocation"], ["confirmation"])
+    if not any(requirement.result.split(".")[1:2] in judged for requirement in study.requirements):
+        del written["allocate"]
+    entries = written.get("dimensions") or {}
     # Of several wildcards the last one counts.
     key_of = {name: name if name in entries else [key for key in entries if fnmatchcase(name, key)][-1]
               for name in section.dimensions}  # fmt: skip
     dimensions: dict[str, Any] = {}
     for key, raw in entries.items():
-        own = {name: _dimension(raw, *changed[name], study) if name in changed else raw
-               for name, origin in key_of.items() if origin == key}  # fmt: skip
-        values = [*own.values(), raw]
-        dimensions |= own if any(value != values[0] for value in values[:-1]) else {key: values[0]}
+        by_name = {name: _dimension(raw, *changed[name], study) if name in changed else raw
+                   for name, origin in key_of.items() if origin == key}  # fmt: skip
+        values = [*by_name.values(), raw]
+        dimensions |= by_name if any(value != values[0] for value in values[:-1]) else {key: values[0]}
     if entries:
-        given["dimensions"] = dimensions
-    for point, raw in (given.get("clearances") or {}).items():
+        written["dimensions"] = dimensions
+    for point, raw in (written.get("clearances") or {}).items():
         if point in changed:
-            given["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
+            written["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
     return data
 
 
@@ -55,12 +56,12 @@ def _dimension(raw: Any, tolerance: Tolerance, scale: float, study: Study) -> An
         new = grade
     elif isinstance(width, list) or tolerance.middle:
         new = [_number(tolerance.middle - size, 12), _number(tolerance.middle + size, 12)]
-    # An allocated number is of no class, and needs no leg to go by.
+    # A study gives a leg only beside a tolerance class, which a number replaces.
     return {**{key: raw[key] for key in raw if key != "leg"}, "tolerance": new} if isinstance(raw, dict) else new
 
 
 def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:
-    """Its radius or diameter, and the tolerance of that, in proportion."""
+    """A clearance with its radius or diameter times a factor, and the tolerance of that in proportion."""
     key = "radial" if clearance.radial is not None else "diametral"
     size = clearance.radius if clearance.radial is not None else 2.0 * clearance.radius
     new = {**raw, key: _number(size * scale)}

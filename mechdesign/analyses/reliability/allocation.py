@@ -1,8 +1,8 @@
 """Tolerances from a reliability or a Cpk: the cheapest by the first-order model, confirmed by simulation.
 
-Every pose by itself has to reach it, not a whole cycle. Where simulation and model differ beyond the
-interval, the model's target is corrected by their ratio and the tolerances are sought again: tighter where the pose
-fails too often, cheaper where the model holds them back needlessly.
+Every pose has to reach the target by itself; the whole cycle does not. Where simulation and model differ beyond the
+interval, the model's target is corrected by their ratio and the tolerances are allocated again: tighter where a pose
+fails too often, cheaper where the model is pessimistic.
 """
 
 from __future__ import annotations
@@ -25,30 +25,33 @@ from mechdesign.results import Result, Table
 from mechdesign.study.schema.reliability import Precision, ReliabilitySection
 from mechdesign.study.variants import rewritten
 
-# How often the model's target is corrected, and the part of a bracket that each correction leaves out at least.
+# Most rounds of allocation and simulation.
 _MAX_ROUNDS = 14
+# Least share by which a correction shortens the bracket of the model's target.
 _BRACKET_PART = 0.1
-# Relative precision by which `auto` confirms failures, where the study does not say.
+# Coefficient of variation to which `auto` confirms failures, where the study gives no precision.
 _PRECISION = 0.1
-# A pose holds the tolerances back where its level is so near the one wanted.
+# Distance between a pose's level and the model's target up to which its constraint is active.
 _ACTIVE = 1e-3
-# How far the level wanted of grades falls at once: of the next choice simulation and model may differ less.
+# Largest step by which a round lowers the target level of grades: with the next choice the difference between
+# simulation and model may be smaller.
 _LEVEL_STEP = 0.1
-# Costs that count as the same.
+# Relative difference up to which costs are equal.
 _SAME = 1e-9
-# Share of the variance from which on what is held is to blame.
+# Share of the variance from which on a source that is not allocated is named as the reason of a failure.
 _HELD_SHARE = 0.005
 # Largest share of the variance that counts as none.
 _NO_SHARE = 1e-12
-# A limit of 0 weighs as much as this one.
+# Least limit in the weights of variances, so that a limit of 0 does not divide by zero.
 _NARROWEST = 1e-100
 
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """Tolerances, and what they reach by the model and by simulation, see `Aim`, by limit and pose of the settings.
+    """Tolerances, and the measures (see `Aim`) that they reach by the model and by simulation, shape (limits, poses).
 
-    `bound` is the least that any tolerances cost that reach what was wanted, as far as that is known.
+    `wanted` are the levels that the model had to reach. `bound` is a lower bound of the cost of any grades that reach
+    them, infinite where tolerances are no grades.
     """
 
     model: ToleranceModel
@@ -56,48 +59,48 @@ class _Round:
     bound: float
     wanted: Floats
     analytic: Floats
-    said: Simulated
+    simulated: Simulated
     method: str
 
     def missed(self) -> Flags:
-        """Where less is reached than asked, beyond chance; of grades also where both say so, simulation and model."""
-        aim, asked = self.model.aim, self.model.aim.level(self.model.aim.asked)
-        missed = aim.level(self.said.best) < asked
+        """Where the target is missed beyond chance; for grades also where simulation and model both miss it."""
+        aim, target = self.model.aim, self.model.aim.level(self.model.aim.asked)
+        missed = aim.level(self.simulated.best) < target
         if self.model.steps:
-            missed |= (aim.level(self.said.value) < asked) & (aim.level(self.analytic) < asked)
+            missed |= (aim.level(self.simulated.value) < target) & (aim.level(self.analytic) < target)
         return np.asarray(missed)
 
     def idle(self) -> Flags:
-        """Where more is reached than asked, beyond what chance explains, though the model holds the tolerances back.
+        """Where the target is exceeded beyond chance, although the model's constraint is active.
 
-        Of grades wherever the model is too careful: the next may do.
+        For grades wherever the model is pessimistic: a coarser grade may do.
         """
         aim = self.model.aim
-        more = (aim.level(self.said.worst) > aim.level(aim.asked)) | self.said.unseen
+        more = (aim.level(self.simulated.worst) > aim.level(aim.asked)) | self.simulated.unseen
         level = aim.level(self.analytic)
         if self.model.steps:
-            return np.asarray(more & ((aim.level(self.said.worst) > level) | self.said.unseen))
+            return np.asarray(more & ((aim.level(self.simulated.worst) > level) | self.simulated.unseen))
         return np.asarray(more & (level < self.wanted + _ACTIVE))
 
     def levels(self) -> tuple[Floats, Floats]:
-        """Levels of the model, and of simulation less the one asked."""
+        """Levels by the model, and the excess of the simulated levels over the target's."""
         aim = self.model.aim
-        return aim.level(self.analytic), aim.level(aim.safe(self.said)) - aim.level(aim.asked)
+        return aim.level(self.analytic), aim.level(aim.safe(self.simulated)) - aim.level(aim.asked)
 
     def worst(self) -> tuple[str, str, str]:
-        """In words: the pose that is worst, what the model says of it, and simulation."""
-        aim, task, said = self.model.aim, self.model.task, self.said
-        k = _worst(aim.level(said.value))
-        interval = f"({aim.plain(float(said.worst[k]))} to {aim.plain(float(said.best[k]))})"
-        simulated = f"{aim.plain(float(said.value[k]))} {interval}"
-        return task.where(task.settings[k[1]].pose), aim.plain(float(self.analytic[k])), simulated
+        """In words: the worst pose, the model's measure there, and the simulated one with its interval."""
+        aim, task, simulated = self.model.aim, self.model.task, self.simulated
+        k = _worst(aim.level(simulated.value))
+        parts = simulated.value, simulated.worst, simulated.best, self.analytic
+        value, worst, best, analytic = (aim.in_words(float(part[k])) for part in parts)
+        return task.where(task.settings[k[1]].pose), analytic, f"{value} ({worst} to {best})"
 
     def cost(self) -> float:
-        """What the tolerances cost."""
+        """Cost of the allocated tolerances."""
         return self.model.cost(np.log(self.scales[self.model.free]))[0]
 
     def tightest(self) -> bool:
-        """Whether all tolerances are as tight as may be."""
+        """Whether all allocated tolerances are at their tightest."""
         return bool((self.scales[self.model.free] < self.model.tightest * 1.001).all())
 
 
@@ -108,29 +111,29 @@ def _worst(level: Floats) -> tuple[int, int]:
 
 
 def allocate(task: Task, section: ReliabilitySection) -> Result:
-    """Allocate the tolerances of a study that asks for it: tables, notes, and the study that has them."""
+    """Allocate the tolerances of a study with `allocate`: tables, warnings, and the study with the new tolerances."""
     if section.allocate is None or not task.settings:
         return Result("allocation", {})
     study, aim = task.study, aim_of(section.allocate)
-    found = tolerances(study, task.sources)
-    free = np.array([k for k, tolerance in enumerate(found) if tolerance.cost is not None], dtype=np.intp)
+    given = tolerances(study, task.sources)
+    free = np.array([k for k, tolerance in enumerate(given) if tolerance.cost is not None], dtype=np.intp)
     task = replace(task, settings=[replace(setting, scale=None, followed=False) for setting in task.settings])
     if section.precision is None:
         task = replace(task, precision=Precision(relative=_PRECISION))
-    model = ToleranceModel(task, aim, found, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST))
+    model = ToleranceModel(task, aim, given, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST))
     rounds = _rounds(model, aim.method(task, section))
-    met = [each for each in rounds if not each.missed().any()]
-    if not met and rounds[-1].tightest():
+    confirmed = [candidate for candidate in rounds if not candidate.missed().any()]
+    if not confirmed and rounds[-1].tightest():
         return Result("allocation", {}, failed=_unreachable(rounds[-1]))
-    last = min(met, key=_Round.cost) if met else rounds[-1]
+    last = min(confirmed, key=_Round.cost) if confirmed else rounds[-1]
     where, by_model, by_simulation = last.worst()
     asked, failed = _asked(last), ""
-    if not met:
+    if not confirmed:
         failed = (
             f"allocate: the {aim.noun} asked, {asked.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
             f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}"
         )
-    before = sum(found[k].price(found[k].given) for k in free.tolist())
+    before = sum(given[k].price(given[k].given) for k in free.tolist())
     notes = [Caution(
         "allocated",
         f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {asked}, and at "
@@ -148,7 +151,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
     text, others = rewritten(
-        study, allocated_data(study, found, last.scales), f"Tolerances of {study.name}, the cheapest for a {asked}"
+        study, allocated_data(study, given, last.scales), f"Tolerances of {study.name}, the cheapest for a {asked}"
     )
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))
@@ -156,7 +159,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
 
 
 def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
-    """Tolerances, cheapest by the model first, each time for a target that is corrected by simulation."""
+    """Allocations by the model in their order, each after the first for a target that simulation has corrected."""
     free, aim, rounds = model.free, model.aim, list[_Round]()
     settings = range(len(model.task.settings))
     limits = len(model.reached(np.ones(len(model.tolerances)), settings))
@@ -167,19 +170,19 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
         else:
             scales, bound = cheapest(model, wanted), np.inf
             scales[free] = [model.tolerances[k].rounded(float(scales[k])) for k in free.tolist()]
-        again = next((each for each in rounds if model.steps and (scales == each.scales).all()), None)
-        if again is not None and any(each.missed().any() for each in rounds):
+        again = next((past for past in rounds if model.steps and (scales == past.scales).all()), None)
+        if again is not None and any(past.missed().any() for past in rounds):
             break
         if again is None:
-            said = _simulated(model, scales, method)
-            last = _Round(model, scales, bound, wanted, model.reached(scales, settings), said, method)
+            simulated = _simulated(model, scales, method)
+            last = _Round(model, scales, bound, wanted, model.reached(scales, settings), simulated, method)
             rounds.append(last)
         else:
             last = replace(again, wanted=wanted)
         missed = last.missed()
         if missed.any() and last.tightest():
             break
-        # What has no influence to the first order may have one that only simulation sees.
+        # A tolerance without influence to the first order may break limits in the simulation.
         without = _idle(model, scales) & (scales[free] > 1.0)
         if without.any() and missed.any():
             model = replace(model, widest=np.where(without, 1.0, model.widest))
@@ -193,18 +196,18 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
 
 
 def _asked(last: _Round) -> str:
-    """What is asked, in words."""
+    """The target in words."""
     aim = last.model.aim
     return f"{aim.noun} of {float(aim.shown(np.array(aim.asked))):.15g}"
 
 
 def _corrected(rounds: Sequence[_Round]) -> Floats:
-    """Levels that the model must reach so that simulation has the one asked, shape (limits, poses).
+    """Levels that the model has to reach so that simulation reaches the target's, shape (limits, poses).
 
-    Between the widest tolerances that keep them and the tightest that do not by the rule of the secant; before both are
-    known, simulation is taken to follow the model.
+    By the secant rule between the lowest level of the model that met the target and the highest that missed it. Until
+    there are both, the difference between simulation and model is taken to be constant.
     """
-    levels, excess = (np.stack(part) for part in zip(*(each.levels() for each in rounds), strict=True))
+    levels, excess = (np.stack(part) for part in zip(*(past.levels() for past in rounds), strict=True))
     wanted = levels[-1] - excess[-1]
     for place in np.ndindex(wanted.shape):
         model, beyond = levels[:, *place], excess[:, *place]
@@ -218,17 +221,17 @@ def _corrected(rounds: Sequence[_Round]) -> Floats:
 
 
 def _simulated(model: ToleranceModel, scales: Floats, method: str) -> Simulated:
-    """What simulation says of these tolerances, at each pose."""
+    """Simulated measures of these tolerances at the poses of the settings."""
     try:
         linear = model.linear(scales)
-        return model.aim.simulated(replace(model.task, sources=linear.sources, linear=linear), method)
+        return model.aim.simulate(replace(model.task, sources=linear.sources, linear=linear), method)
     except Partial as partial:
-        # What it had found is not the answer to the study's own question.
+        # The partial result is that of trial tolerances, not of the study's own.
         raise KeyboardInterrupt from partial
 
 
 def _shares(model: ToleranceModel, scales: Floats) -> Floats:
-    """Shares of the sources in the variances of limited errors over their squared limits, shape (poses, sources)."""
+    """Share of each source in the sum of limited variances, each over its limit squared, shape (poses, sources)."""
     poses = [setting.pose for setting in model.task.settings]
     question, linear = model.task.question.at(model.task.nominal[:, poses]), model.linear(scales).take(poses)
     weights = np.zeros((len(question.channels), len(poses)))
@@ -244,8 +247,8 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
 def _allocation(last: _Round) -> Table:
     found, given = last.model.tolerances, [tolerance.given for tolerance in last.model.tolerances]
     sizes = [tolerance.size(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)]
-    prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, each, strict=True)])
-              for each in (given, sizes)]  # fmt: skip
+    prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, widths, strict=True)])
+              for widths in (given, sizes)]  # fmt: skip
     names = np.array([tolerance.grade(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)])
     return ALLOCATION.table(ALLOCATION.columns(
         {}, source=np.array([tolerance.name for tolerance in found]),
@@ -257,8 +260,8 @@ def _allocation(last: _Round) -> Table:
 
 
 def _confirmation(last: _Round) -> Table:
-    aim, said, task = last.model.aim, last.said, last.model.task
-    # Of each pose the limit that is worst.
+    aim, said, task = last.model.aim, last.simulated, last.model.task
+    # The worst limit at each pose.
     place = np.argmin(aim.level(said.value), axis=0), np.arange(len(task.settings))
     value, worst, best, analytic, target = (
         aim.shown(part[place]) for part in (said.value, said.worst, said.best, last.analytic, aim.measure(last.wanted))
@@ -272,7 +275,7 @@ def _confirmation(last: _Round) -> Table:
 
 
 def _ends(last: _Round) -> list[Caution]:
-    """Which tolerances end at what is allowed, and which have no grade."""
+    """Warnings of tolerances at the ends of their ranges, and of those that have no grade."""
     model, notes = last.model, []
     idle, free = _idle(model, last.scales), model.free.tolist()
     tight, wide = (f"{factor:g} times the given tolerance" for factor in (TIGHTEST, WIDEST))
@@ -301,14 +304,14 @@ def _ends(last: _Round) -> list[Caution]:
 
 
 def _idle(model: ToleranceModel, scales: Floats) -> Flags:
-    """Allocated tolerances that change no limited error at any pose, to the first order."""
+    """Which allocated tolerances change no limited error at any pose, to the first order, shape (free,)."""
     return np.asarray(~(np.abs(_shares(model, scales)[:, model.free]) > _NO_SHARE).any(axis=0))
 
 
 def _unreachable(last: _Round) -> str:
-    """Why the tightest tolerances do not do, what they reach, and what would mend it."""
+    """The error message: what the tightest tolerances reach, why they miss the target, and the remedy."""
     model, tightest, aim = last.model, last.scales, last.model.aim
-    limit, worst = _worst(aim.level(last.said.value))
+    limit, worst = _worst(aim.level(last.simulated.value))
     setting = model.task.settings[worst]
     question, pose, share = setting.question, setting.pose, _shares(model, tightest)[worst]
     linear = model.linear(tightest).take([pose])
@@ -328,15 +331,15 @@ def _unreachable(last: _Round) -> str:
     else:
         reason = "they would have to shrink to nothing"
     with_what = "in their finest grades" if model.steps else f"at {TIGHTEST:g} times the given ones"
-    reached = f"{aim.plain(float(last.said.value[limit, worst]))} by {last.method} and by the analytic model "
+    reached = f"{aim.in_words(float(last.simulated.value[limit, worst]))} by {last.method} and by the analytic model "
     return (
-        f"allocate: a {aim.noun} of {aim.plain(aim.asked)} cannot be reached at {model.task.where(pose)}: with all "
-        f"tolerances {with_what} it is {reached}{aim.plain(float(last.analytic[limit, worst]))}; {reason}"
+        f"allocate: a {aim.noun} of {aim.in_words(aim.asked)} cannot be reached at {model.task.where(pose)}: with all "
+        f"tolerances {with_what} it is {reached}{aim.in_words(float(last.analytic[limit, worst]))}; {reason}"
     )
 
 
 def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst: int) -> str:
-    """What to write so that clearances and loads that are held are allocated too, if that is enough."""
+    """How to have held clearances and loads allocated too, where that reaches the target; else empty."""
     section, tolerances = model.task.study.reliability, model.tolerances
     assert section is not None
     free = [k for k in held if tolerances[k].kind != "measured"]

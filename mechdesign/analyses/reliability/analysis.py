@@ -1,4 +1,4 @@
-"""How precise is it when it is made? Error moments, reliability and contributions, analytically and by simulation."""
+"""The reliability question: error moments, reliability and contributions, analytically and by simulation."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048
-# Distance of a dead centre, in standard deviations of its margin, up to which one is told: one mechanism in a million.
+# Distance of a dead centre, in standard deviations of its margin, up to which there is a warning (1 in a million).
 _NEAR = 4.75
-# Listed poses that get a density of their own.
+# Listed poses that have a density.
 _DENSITIES = 12
 # Poses that give the same coordinates, and the rates of their drives.
 _Groups = Sequence[tuple[SolvedPoses, DriveRates]]
@@ -77,36 +77,36 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
             raise left[0]
         allocated = allocate(task, section)
     except Partial as partial:
-        found.append(partial.found)
+        found.append(partial.result)
         interrupted = "interrupted: "
     except KeyboardInterrupt:
         if not found:
             raise
         interrupted = "interrupted: "
     counts = {"poses": poses.count}
-    done = [sums for each in found for sums in each.sums.values()]
+    done = [sums for result in found for sums in result.sums.values()]
     if done:
         counts["samples"] = sum(sums.samples for sums in done)
         counts["invalid"] = sum(sums.samples - sums.valid for sums in done)
         if counts["invalid"]:
             words = f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             failures.append(Caution("unassembled", words))
-    cycles = [each.cycle.samples for each in found if each.cycle is not None and each.cycle.samples]
+    cycles = [part.cycle.samples for part in found if part.cycle is not None and part.cycle.samples]
     if cycles:
         counts["cycles"] = cycles[0]
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, "
         interrupted += f"{counts['cycles']} whole cycles, " if cycles else ""
-        interrupted += f"{', '.join(each.method for each in found)}"
-    made = [tables.moments(task, found)]
+        interrupted += f"{', '.join(part.method for part in found)}"
+    built = [tables.moments(task, found)]
     if task.question.limited:
-        made += [tables.success(task, found), tables.capability(task, found)]
-    made += [tables.contributions(task, indices)]
-    # Of the first method that samples the errors.
-    sampled = next((each.sums for each in found if each.sums), {})
-    made += tables.of_drawn(task, sampled)
+        built += [tables.success(task, found), tables.capability(task, found)]
+    built += [tables.contributions(task, indices)]
+    # Samples of the first method that samples the errors.
+    sampled = next((part.sums for part in found if part.sums), {})
+    built += tables.of_drawn(task, sampled)
     result = Result(
-        "reliability", of_poses(made, task.reason) | dict(allocated.tables),
+        "reliability", of_poses(built, task.reason) | dict(allocated.tables),
         [*warnings, *notes(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings], counts,
         "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
         {"poses": poses, "samples": tables.drawn_samples(task, sampled)}, reached=bool(failed) or not allocated.failed,
@@ -119,7 +119,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
 def first_order_tables(
     study: Study, poses: Poses, wanted: Collection[str]
 ) -> tuple[dict[str, Table], NDArray[np.int8]]:
-    """Wanted tables of the first-order analysis at poses, perhaps of several designs, and why poses fail.
+    """The `wanted` tables of the first-order analysis at poses, which may be of several designs, and why poses fail.
 
     Raises
     ------
@@ -127,23 +127,23 @@ def first_order_tables(
         If nothing varies.
     """
     task, _, _ = _first_order(study, poses, find_sources(study, poses)[0])
-    found = [MethodResult("analytic", normal=(task.linear.shift(), task.linear.covariance()))]
+    results = [MethodResult("analytic", normal=(task.linear.shift(), task.linear.covariance()))]
     if "reliability" in wanted:
-        found = [with_cycle(methods.run("analytic", task), task, ())]
-    made = [tables.moments(task, found)] if "moments" in wanted else []
+        results = [with_cycle(methods.run("analytic", task), task, ())]
+    built = [tables.moments(task, results)] if "moments" in wanted else []
     if "reliability" in wanted and task.question.limited:
-        made.append(tables.success(task, found))
+        built.append(tables.success(task, results))
     if "capability" in wanted and task.question.limited:
-        made.append(tables.capability(task, found))
+        built.append(tables.capability(task, results))
     if "contributions" in wanted:
-        made.append(tables.contributions(task, {}))
-    return {table.name: table for table in made}, task.reason
+        built.append(tables.contributions(task, {}))
+    return {table.name: table for table in built}, task.reason
 
 
 def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[Caution]]:
-    """The nominal mechanism and its linear error model at every pose, nan where it is not assembled; what is doubtful.
+    """The nominal mechanism and its linear error model at every pose, nan where it is not assembled; warnings.
 
-    Poses that do not hold the study's load are marked.
+    Poses that do not hold the study's load have the reason `NOT_HELD`.
     """
     mechanism, section = study.mechanism, study.reliability
     assert section is not None
@@ -161,21 +161,21 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
         reason[rows] = configuration.reason
         rates = DriveRates((), ())
         if any(channel.order for channel in channels):
-            # Held for made mechanisms too.
+            # Made mechanisms have the same rates of the drives.
             rates = drive_rates(study, section, poses, solved, mechanism.linearize(configuration))
         for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates), strict=True):
             row[rows] = value
         for begin in range(0, len(rows), _POSES_TOGETHER):
             block = np.arange(begin, min(begin + _POSES_TOGETHER, len(rows)))
-            part, here = configuration.take(block), None
+            part, block_elastic = configuration.take(block), None
             if bent is not None and elastic is not None:
-                here = bent.at(part, channels, rows[block])
-                elastic.flexibility[:, :, rows[block]] = here.flexibility
+                block_elastic = bent.at(part, channels, rows[block])
+                elastic.flexibility[:, :, rows[block]] = block_elastic.flexibility
             with np.errstate(invalid="ignore", divide="ignore"):
-                own = sources.take(rows[block])
-                found = linear_errors(mechanism, part, channels, own, rates.take(block), here)
-                margins = linear_margins(mechanism, part, own)
-            linear.components[:, :, rows[block]] = found.components
+                block_sources = sources.take(rows[block])
+                errors = linear_errors(mechanism, part, channels, block_sources, rates.take(block), block_elastic)
+                margins = linear_margins(mechanism, part, block_sources)
+            linear.components[:, :, rows[block]] = errors.components
             if not len(closing.components):
                 closing = FirstOrder.unknown(sources, len(margins.components), poses.count)
             closing.components[:, :, rows[block]], closing.offset[:, rows[block]] = margins.components, margins.offset
@@ -190,26 +190,26 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
 
 
 def _settings(task: Task, groups: _Groups) -> list[Setting]:
-    """Poses that can be assembled, in their order."""
+    """Settings of the poses that can be assembled, in their order."""
     mechanism, pair = task.study.mechanism, task.question.pair
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
     followed = _followed(task)
     settings = []
     for solved, rates in groups:
-        given = set(solved.given) == set(mechanism.drives)
+        by_drives = set(solved.given) == set(mechanism.drives)
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue
             pose = solved.configuration.take(k)
             scale = None
             if pair is not None and task.poses.listed and row in (*assembled[:_DENSITIES], followed):
-                one, two = ((float(mean[channel, row]), float(sigma[channel, row])) for channel in pair)
-                scale = (one, two) if one[1] > 0 and two[1] > 0 else None
+                x, y = ((float(mean[channel, row]), float(sigma[channel, row])) for channel in pair)
+                scale = (x, y) if x[1] > 0 and y[1] > 0 else None
             settings.append(
                 Setting(
                     task.question.at(task.nominal[:, row]), row, mechanism,
-                    mechanism.forward if given else forward_plan(mechanism, pose), pose, rates.take(k),
+                    mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
                     None if task.elastic is None else task.elastic.take([row]), scale, row == followed,
                 )
@@ -218,8 +218,10 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
 
 
 def _followed(task: Task) -> int:
-    """The pose whose samples are followed: the one that the study shows, or else the one that fails most by the first
-    order; without limits the first; -1: none."""
+    """The pose whose samples are kept: the study's `shown`, else the one that fails most often by the first order.
+
+    Without limits the first one; -1 where no pose can be assembled.
+    """
     section, assembled = task.study.reliability, np.flatnonzero(task.assembled)
     assert section is not None
     if section.shown is not None:
@@ -235,7 +237,7 @@ def _followed(task: Task) -> int:
 
 
 def notes(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """All that is to be known of what the methods found."""
+    """Warnings about the results of the methods."""
     return [
         *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
         *_pointless(found, task), *_not_assembled(found, task), *_unassembled(found), *_of_cycles(found, task),
@@ -243,7 +245,7 @@ def notes(found: Sequence[MethodResult], task: Task) -> list[Caution]:
 
 
 def _outside(task: Task) -> list[Caution]:
-    """Where a nominal value lies outside its own limits: the farthest pose of each."""
+    """Warnings of nominal values outside their own limits, each at its farthest pose."""
     found = []
     for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
         beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
@@ -266,16 +268,16 @@ def _outside(task: Task) -> list[Caution]:
     return found
 
 
-def disagreements(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """One warning for each two methods that are apart by more than a factor beyond their intervals: the worst pose."""
+def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of pairs of methods whose intervals are more than `FACTOR` apart, each at its worst pose."""
     apart: dict[tuple[str, str], list[tuple[float, int, Estimate, Estimate]]] = {}
     for pose in range(task.poses.count):
         estimates: dict[str, Estimate] = {}
-        for each in found:
-            for rung, estimate in each.rungs.get(pose, {}).items():
+        for result in results:
+            for rung, estimate in result.rungs.get(pose, {}).items():
                 estimates.setdefault(rung, estimate)
-            if pose in each.estimates and not each.rungs:
-                estimates[each.method] = each.estimates[pose]
+            if pose in result.estimates and not result.rungs:
+                estimates[result.method] = result.estimates[pose]
         for pair in itertools.combinations(estimates, 2):
             one, other = (estimates[name] for name in pair)
             times = disagree(one, other)
@@ -296,17 +298,17 @@ def disagreements(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     return warnings
 
 
-def _unseen(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """Where counted failures are none: the upper end of the interval."""
+def _unseen(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of methods without a failed sample, with the upper end of the interval."""
     cases = []
-    for each in found:
-        poses = {pose: e for pose, e in each.estimates.items() if e.samples and not e.failures}
+    for result in results:
+        poses = {pose: e for pose, e in result.estimates.items() if e.samples and not e.failures}
         if poses:
             pose, widest = max(poses.items(), key=lambda item: item[1].high)
             where = f"at {task.where(pose)}" if len(poses) == 1 else f"at {len(poses)} poses"
-            cases.append((each.method, widest, "samples", where))
-        if each.cycle is not None and each.cycle.samples and not each.cycle.failures:
-            cases.append((each.method, each.cycle, "made mechanisms", "over the whole cycle"))
+            cases.append((result.method, widest, "samples", where))
+        if result.cycle is not None and result.cycle.samples and not result.cycle.failures:
+            cases.append((result.method, result.cycle, "made mechanisms", "over the whole cycle"))
     return [
         Caution(
             "unconverged",
@@ -318,20 +320,20 @@ def _unseen(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     ]
 
 
-def _unreached(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """Where `auto` ended before the precision asked: the worst pose and what was reached there."""
+def _unreached(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `auto` ended before its precision, with the worst pose and the precision reached there."""
     precision = task.precision
     short: dict[int, float] = {}
-    for each in found:
-        for pose in each.rungs:
-            estimate = each.estimates[pose]
-            # Where no failure was seen, `_unseen` says so.
+    for result in results:
+        for pose in result.rungs:
+            estimate = result.estimates[pose]
+            # `_unseen` warns where no sample failed.
             if estimate.failures and not reached(precision, estimate.failure, estimate.low, estimate.high):
                 half = 0.5 * (estimate.high - estimate.low)
                 short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half
     if not short:
         return []
-    pose = max(short, key=lambda each: short[each])
+    pose = max(short, key=short.__getitem__)
     if precision.half_width is None:
         asked, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
         what = "the coefficient of variation"
@@ -347,10 +349,10 @@ def _unreached(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     )]  # fmt: skip
 
 
-def _pointless(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """Where `form` found no design point although limits are broken."""
-    unknown = [pose for each in found if each.method == "form"
-               for pose, estimate in each.estimates.items() if math.isnan(estimate.failure)]  # fmt: skip
+def _pointless(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `form` found no design point although samples break limits."""
+    unknown = [pose for result in results if result.method == "form"
+               for pose, estimate in result.estimates.items() if math.isnan(estimate.failure)]  # fmt: skip
     if not unknown:
         return []
     others = f" and at {len(unknown) - 1} more poses" if len(unknown) > 1 else ""
@@ -362,9 +364,9 @@ def _pointless(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     )]  # fmt: skip
 
 
-def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """Where made mechanisms cannot be assembled by the first order, for methods that draw none: the worst pose."""
-    names = ", ".join(each.method for each in found if each.normal is not None)
+def _not_assembled(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning of dead centres near the nominal pose, to the first order, for methods that draw no mechanisms."""
+    names = ", ".join(result.method for result in results if result.normal is not None)
     distance = task.closing.distance().min(axis=0, initial=math.inf)
     poses = np.flatnonzero(distance < _NEAR)
     if not names or not len(poses):
@@ -381,11 +383,11 @@ def _not_assembled(found: Sequence[MethodResult], task: Task) -> list[Caution]:
     )]  # fmt: skip
 
 
-def _unassembled(found: Sequence[MethodResult]) -> list[Caution]:
-    """Where samples drawn about the limits meet what cannot be assembled."""
+def _unassembled(results: Sequence[MethodResult]) -> list[Caution]:
+    """Warnings of importance samples, drawn about the limits, that cannot be assembled."""
     warnings = []
-    for each in found:
-        used = [(METHODS[each.used.get(pose, each.method)], estimate) for pose, estimate in each.estimates.items()]
+    for each in results:
+        used = [(METHODS[each.used.get(pose, each.method)], e) for pose, e in each.estimates.items()]
         drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
@@ -397,10 +399,10 @@ def _unassembled(found: Sequence[MethodResult]) -> list[Caution]:
     return warnings
 
 
-def _of_cycles(found: Sequence[MethodResult], task: Task) -> list[Caution]:
-    """Of made mechanisms that cannot be assembled at some pose, and where `auto` ended too early."""
+def _of_cycles(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of cycles that cannot be assembled at some pose, and where `auto` ended before its precision."""
     warnings = []
-    simulated = {each.method: each.cycle for each in found if each.cycle is not None and each.cycle.samples}
+    simulated = {part.method: part.cycle for part in results if part.cycle is not None and part.cycle.samples}
     first = next(iter(simulated.values()), None)
     if first is not None and first.invalid:
         warnings.append(Caution(

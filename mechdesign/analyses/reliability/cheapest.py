@@ -1,7 +1,7 @@
-"""The cheapest tolerances with which the first-order model reaches what is asked.
+"""The cheapest tolerances with which the first-order model reaches the target.
 
-Minimise sum a_k / T_k^e_k over log T, where the normal errors of the linear model reach the aim at every pose. The cost
-is convex in log T, and so is the variance of every error; poses enter as constraints as far as they are missed.
+Minimise sum a_k / T_k^e_k over log T, where the normal errors of the linear model reach the target at every pose. The
+cost is convex in log T, and so is the variance of every error. A pose becomes a constraint once it misses the target.
 """
 
 from __future__ import annotations
@@ -24,27 +24,28 @@ from mechdesign.study import Study
 from mechdesign.study.schema.allocation import Cost, half_widths
 from mechdesign.study.schema.iso_tolerances import ToleranceClassError
 
-# Digits that allocated numbers are written with, rounded down: what is tighter keeps what was asked.
+# Significant digits of allocated tolerances, rounded down: a tighter tolerance still reaches the target.
 DIGITS = 6
-# Least and largest allocated tolerance, in multiples of the given one.
+# Least and largest allocated tolerance, in multiples of the study's.
 TIGHTEST = 1e-3
 WIDEST = 10.0
-# Step of difference quotients, in log T.
+# Step of the difference quotients in log T.
 _LOG_STEP = 1e-4
-# How far a level may be missed.
+# Largest shortfall of a level that counts as reached.
 _SLACK = 1e-9
-# Poses that become constraints at once, and how often more of them may.
+# Poses that become constraints after a minimisation.
 _POSES_ADDED = 6
+# Most minimisations.
 _MAX_ROUNDS = 30
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The tolerance of one source, in the study's units, without a cost where it is held.
+    """The tolerance of one source, in the study's units; `cost` is None where it is not allocated but held.
 
-    By `kind`, half the width of a ``tolerance``, a ``sigma``, that of ``measured`` values, or a ``clearance``, mean and
-    radial. `middle` is that of a tolerance, and `grades` are the widths it may have, by name, from the finest on; none
-    where it may have any.
+    `given` is, by `kind`: half the width of a ``tolerance``, a ``sigma``, the standard deviation of ``measured``
+    values, or the mean radial ``clearance``. `middle` is the middle of a tolerance. `grades` maps the names of the
+    allowed standard grades onto half their widths, from the finest on; empty where any width is allowed.
     """
 
     name: str
@@ -56,35 +57,36 @@ class Tolerance:
     grades: Mapping[str, float] = field(default_factory=dict)
 
     def price(self, size: float) -> float:
-        """What it costs: a/T^exponent; nan where it is held."""
+        """Cost of a tolerance of this size: a/T^exponent; nan where it is held."""
         return float("nan") if self.cost is None else self.cost.a / size**self.cost.exponent
 
     def size(self, scale: float) -> float:
-        """The tolerance so many times as wide, without the dust of the product."""
+        """The tolerance times a factor, without the rounding error of the product."""
         return float(f"{self.given * scale:.12g}")
 
     def grade(self, scale: float) -> str:
-        """The grade that is so many times as wide as given; empty where it is none."""
+        """Name of the grade whose width is this multiple of the given tolerance; empty where there is none."""
         return next((name for name, half in self.grades.items() if abs(self.given * scale / half - 1.0) < 1e-9), "")
 
     def rounded(self, scale: float) -> float:
-        """The nearest scale, not above, whose tolerance has few digits."""
+        """The factor rounded down so that the tolerance has `DIGITS` significant digits."""
         size = self.given * scale
         unit = 10.0 ** (math.floor(math.log10(size)) + 1 - DIGITS)
         return float(f"{math.floor(size / unit * (1.0 + 1e-7)) * unit:.{DIGITS}g}") / self.given
 
 
 def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
-    """Of all sources, in their order: dimensions are allocated, and what has a cost; other clearances are held.
+    """Tolerances of all sources, in their order.
 
-    In grades those alone that have some.
+    Dimensions are allocated; loads and clearances only where `cost` names them. With grades, dimensions without any
+    are held.
     """
     section = study.reliability
     assert section is not None
     assert section.allocate is not None
-    given, asked = section.allocate.cost, section.allocate.grades
-    millimetre = study.units.convert("1 mm") if asked else 1.0
-    found = []
+    costs, allowed = section.allocate.cost, section.allocate.grades
+    millimetre = study.units.convert("1 mm") if allowed else 1.0
+    rows = []
     for scalar in sources.scalars:
         dimension = section.dimensions[scalar.name]
         low, high = map(float, dimension.ends(study.sizes.get(scalar.name, 0.0)))
@@ -92,26 +94,26 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
         if dimension.measured is not None:
             half = math.sqrt(scalar.law.moments[1]) / scalar.factor
         grades: dict[str, float] = {}
-        if asked:
+        if allowed:
             with suppress(ToleranceClassError):
                 places = study.mechanism.description.places
-                grades = half_widths(scalar.name, dimension, asked, study.parameters, places, millimetre)
-        possible = bool(grades) or not asked
-        allocated = half > 0 and dimension.kind != "measured" and (scalar.kind != "load" or scalar.name in given)
-        cost = given.get(scalar.name, Cost()) if allocated and possible else None
-        found.append(Tolerance(scalar.name, half, 0.5 * (low + high), dimension.kind, scalar.unit or "", cost, grades))
+                grades = half_widths(scalar.name, dimension, allowed, study.parameters, places, millimetre)
+        possible = bool(grades) or not allowed
+        allocated = half > 0 and dimension.kind != "measured" and (scalar.kind != "load" or scalar.name in costs)
+        cost = costs.get(scalar.name, Cost()) if allocated and possible else None
+        rows.append(Tolerance(scalar.name, half, 0.5 * (low + high), dimension.kind, scalar.unit or "", cost, grades))
     for pin in sources.pins:
-        cost = given.get(pin.name) if pin.radius > 0 else None
+        cost = costs.get(pin.name) if pin.radius > 0 else None
         radius = float(pin.radius)
-        found.append(Tolerance(pin.name, radius, 0.0, "clearance", study.units.label("length"), cost))
-    return found
+        rows.append(Tolerance(pin.name, radius, 0.0, "clearance", study.units.label("length"), cost))
+    return rows
 
 
 @dataclass(frozen=True, eq=False)
 class ToleranceModel:
-    """Costs and what is reached by the first-order model, of tolerances so many times as wide as given.
+    """Cost of the tolerances, and the measure that they reach by the first-order model, by factors of the given ones.
 
-    `free` are the sources whose tolerance is allocated, and `widest` their largest factors.
+    `free` are the indices of the sources whose tolerance is allocated, `widest` their largest factors, shape (free,).
     """
 
     task: Task
@@ -121,31 +123,31 @@ class ToleranceModel:
     widest: Floats
 
     def scales(self, x: Floats) -> Floats:
-        """Factor of each source's tolerance; 1 where it is held."""
+        """Factor of each source's tolerance, shape (sources,), from the logarithms x of the free ones; 1 where held."""
         scales = np.ones(len(self.tolerances))
         scales[self.free] = np.exp(x)
         return scales
 
     @cached_property
     def steps(self) -> list[Floats]:
-        """Factors of the grades that each may have, up to the widest; none where all may have any."""
-        each = [(self.tolerances[k], widest) for k, widest in zip(self.free, self.widest, strict=True)]
-        scales = [(np.array([*t.grades.values()]) / t.given, widest) for t, widest in each]
+        """Factors of the grades of each free tolerance, up to its widest; an empty list where any width is allowed."""
+        free = [(self.tolerances[k], widest) for k, widest in zip(self.free, self.widest, strict=True)]
+        scales = [(np.array([*t.grades.values()]) / t.given, widest) for t, widest in free]
         return [part[(part <= widest) | (part == part[0])] for part, widest in scales if len(part)]
 
     @property
     def tightest(self) -> Floats:
-        """Least factors."""
+        """Least factors of the free tolerances, shape (free,)."""
         return np.array([part[0] for part in self.steps]) if self.steps else np.full(len(self.free), TIGHTEST)
 
     def linear(self, scales: Floats) -> FirstOrder:
-        """The linear model of these tolerances."""
+        """The linear error model with tolerances times these factors."""
         return replace(self.task.linear, sources=self.task.sources.widened(scales))
 
     def reached(self, scales: Floats, which: Sequence[int]) -> Floats:
-        """What is reached, by limit, at some of the task's settings, shape (limits, settings).
+        """Measures by the linear model at some of the task's settings, shape (limits, settings).
 
-        Of many choices of tolerances, shape (sources, choices), at all settings of one and then of the next.
+        Of `scales` of shape (sources, choices) those of the first choice at all settings come first, then the next's.
         """
         poses = np.array([self.task.settings[k].pose for k in which])
         many = scales.shape[1] if scales.ndim > 1 else 1
@@ -156,14 +158,14 @@ class ToleranceModel:
         return self.aim.by_model(self.task.question.at(self.task.nominal[:, poses]), linear, closing)
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
-        """Cost of all that is allocated, and its derivatives by x."""
-        each = [self.tolerances[k] for k in self.free.tolist()]
-        prices = np.array([t.price(t.given * scale) for t, scale in zip(each, np.exp(x).tolist(), strict=True)])
-        return float(prices.sum()), -np.array([t.cost.exponent for t in each if t.cost is not None]) * prices
+        """Cost of the allocated tolerances, and its derivatives by x = log(factor)."""
+        free = [self.tolerances[k] for k in self.free.tolist()]
+        prices = np.array([t.price(t.given * scale) for t, scale in zip(free, np.exp(x).tolist(), strict=True)])
+        return float(prices.sum()), -np.array([t.cost.exponent for t in free if t.cost is not None]) * prices
 
 
 def cheapest(model: ToleranceModel, wanted: Floats) -> Floats:
-    """Factors of all tolerances; the tightest where not even these reach the levels wanted, shape (limits, poses)."""
+    """Factors of the cheapest tolerances that reach the levels `wanted`, shape (limits, poses); else the tightest."""
     from scipy.optimize import minimize
 
     count = len(model.free)
@@ -189,12 +191,12 @@ def cheapest(model: ToleranceModel, wanted: Floats) -> Floats:
     active = [int(np.argmin(margins(alike, every).min(axis=0)))]
     for _ in range(_MAX_ROUNDS):
         constraint = {"type": "ineq", "fun": flat, "jac": slopes, "args": (tuple(active),)}
-        found: Any = minimize(
+        optimum: Any = minimize(
             lambda x: model.cost(x)[0] / unit, alike, jac=lambda x: model.cost(x)[1] / unit, method="SLSQP",
             bounds=list(zip(lowest.tolist(), highest.tolist(), strict=True)), constraints=constraint,
             options={"maxiter": 300, "ftol": 1e-12},
         )  # type: ignore[call-overload]  # fmt: skip
-        x = np.clip(found.x, lowest, highest)
+        x = np.clip(optimum.x, lowest, highest)
         left = margins(x, every).min(axis=0)
         broken = [k for k in np.argsort(left).tolist() if left[k] < -_SLACK and k not in active]
         if not broken:
@@ -207,7 +209,7 @@ def cheapest(model: ToleranceModel, wanted: Floats) -> Floats:
 def _shifted(
     margins: Callable[..., Floats], x: Floats, lowest: Floats, highest: Floats, every: Sequence[int]
 ) -> Floats:
-    """All tolerances wider or tighter by one common factor, as far as the poses allow."""
+    """Logarithms x of the tolerances plus the largest common shift at which all poses reach their levels."""
     from scipy.optimize import brentq
 
     reach = float((highest - lowest).max())
@@ -223,6 +225,6 @@ def _shifted(
         def least(shift: float) -> float:
             return float(margins(np.clip(x + shift, lowest, highest), tuple(active)).min())
 
-        # On the safe side of the root.
+        # The root's tolerance lies on the tighter side.
         shift = brentq(least, -reach, reach, xtol=1e-10) - 2e-10
         shifted = np.clip(x + shift, lowest, highest)

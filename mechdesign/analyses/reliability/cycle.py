@@ -1,8 +1,8 @@
 """The probability that one made mechanism keeps every limit at all poses of a motion.
 
-A made mechanism keeps whatever `dimensions` names and the radii of its clearances over the whole motion; only its pins
-lie elsewhere at each pose. It fails where it breaks a limit, or cannot be assembled, at any of the poses asked: what
-happens between two of them is not seen, so the step of a sweep is the resolution of the answer.
+A made mechanism keeps its dimensions and the radii of its clearances over the whole motion; only the places of its pins
+in their holes are drawn anew at each pose. It fails where it breaks a limit, or cannot be assembled, at any pose.
+Failures between two poses are not seen: the step of a sweep is the resolution of the result.
 """
 
 from __future__ import annotations
@@ -22,50 +22,51 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.work.chunks import map_chunks
 
-# Stream of random numbers: no other name has four numbers.
+# Ends the name of this module's streams of random numbers, the only ones of four numbers.
 _STREAM = (3, 0)
-# Mechanisms times poses of a chunk: about a second's work, so that an interrupt is soon heard.
+# Mechanisms times poses of a chunk: about a second's work, so that an interrupt takes effect soon.
 _CHUNK_WORK = 1_500_000
 # Least mechanisms of a chunk.
 _CHUNK_LEAST = 200
 
 
-def with_cycle(found: MethodResult, task: Task, before: Sequence[MethodResult]) -> MethodResult:
-    """What a method says, with its estimate of the whole cycle where one is asked.
+def with_cycle(result: MethodResult, task: Task, before: Sequence[MethodResult]) -> MethodResult:
+    """The result of a method with its estimate of the whole cycle, where there are limits and a motion.
 
-    Methods that sample the errors simulate whole cycles by Monte Carlo, `auto` until its precision is reached; of all
-    others the poses' own estimates give bounds.
+    Methods that sample the errors simulate whole cycles by Monte Carlo, `auto` until its precision is reached. For all
+    others the estimates at the poses give bounds. `before` are the results of the methods before this one.
 
     Raises
     ------
     Partial
-        On an interrupt, with what was counted so far.
+        On an interrupt, with the cycles counted so far.
     """
     if not task.question.limited or not task.poses.motion:
-        return found
-    method = METHODS[found.method]
+        return result
+    method = METHODS[result.method]
     if not method.errors or not task.assembled.all():
-        return replace(found, cycles=bounds(found, task.poses))
-    known = [each.cycles for each in before if METHODS[each.method].errors and not METHODS[each.method].precise]
-    if known and not method.precise:
-        return replace(found, cycles=known[0])
-    return _simulated(found, task)
+        return replace(result, cycles=bounds(result, task.poses))
+    simulated = [past.cycles for past in before if METHODS[past.method].errors and not METHODS[past.method].precise]
+    if simulated and not method.precise:
+        return replace(result, cycles=simulated[0])
+    return _simulated(result, task)
 
 
-def bounds(found: MethodResult, poses: Poses) -> tuple[Estimate, ...]:
-    """Bounds of the cycle of each design, nan where the nominal mechanism itself does not reach some pose.
+def bounds(result: MethodResult, poses: Poses) -> tuple[Estimate, ...]:
+    """Bounds of the cycle's probability of failure by design; nan if the nominal one cannot reach a pose.
 
-    A cycle fails at least as often as the worst pose and at most as their sum, its value [Boole's inequality].
+    A cycle fails at least as often as the worst pose, and at most as often as the sum over the poses [Boole's
+    inequality]. The sum is the estimate's value.
     """
     ends = np.full((2, poses.count), np.nan)
-    ends[:, list(found.estimates)] = np.array([(each.low, each.high) for each in found.estimates.values()]).T
+    ends[:, list(result.estimates)] = np.array([(e.low, e.high) for e in result.estimates.values()]).T
     low, high = ends.reshape(2, poses.designs, -1)
     highest = np.minimum(1.0, high.sum(axis=1)).tolist()
     return tuple(Estimate(most, least, most, 0) for least, most in zip(low.max(axis=1).tolist(), highest, strict=True))
 
 
-def _simulated(found: MethodResult, task: Task) -> MethodResult:
-    precise = METHODS[found.method].precise
+def _simulated(result: MethodResult, task: Task) -> MethodResult:
+    precise = METHODS[result.method].precise
     samples = max(task.samples, task.most // task.poses.count) if precise else task.samples
     settings = [setting.narrowed() for setting in task.settings]
     size = max(_CHUNK_LEAST, min(CHUNK, _CHUNK_WORK // len(settings)))
@@ -84,8 +85,8 @@ def _simulated(found: MethodResult, task: Task) -> MethodResult:
             if precise and reached(task.precision, estimate.failure, estimate.low, estimate.high):
                 break
     except KeyboardInterrupt:
-        raise Partial(replace(found, cycles=(counted(*total.tolist()),) if total[1] else ())) from None
-    return replace(found, cycles=(counted(*total.tolist()),))
+        raise Partial(replace(result, cycles=(counted(*total.tolist()),) if total[1] else ())) from None
+    return replace(result, cycles=(counted(*total.tolist()),))
 
 
 def _counted(settings: Sequence[Setting], sources: Sources, seed: int, samples: int, size: int, chunk: int) -> Ints:
@@ -93,12 +94,12 @@ def _counted(settings: Sequence[Setting], sources: Sources, seed: int, samples: 
 
 
 def count_chunk(settings: Sequence[Setting], sources: Sources, seed: int, chunk: int, count: int) -> Ints:
-    """Draw `count` made mechanisms and move each through all poses; what cannot be assembled moves no further.
+    """Draw `count` made mechanisms and move each through all poses, up to one at which it cannot be assembled.
 
     Returns
     -------
     ndarray of int, shape (4,)
-        Mechanisms that failed, those drawn, those that cannot be assembled somewhere, and poses solved.
+        Mechanisms that failed, those drawn, those that cannot be assembled at some pose, and poses solved.
     """
     drawn = sources.draw(generator(seed, chunk, 0, *_STREAM), count)
     within = np.ones(count, dtype=bool)

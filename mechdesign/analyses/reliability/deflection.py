@@ -1,9 +1,8 @@
 """Elastic deflections among the errors: the stiffness section's mechanism under a load at its point.
 
-A deflection is the compliance of the nominal pose times the load, fixed or random: error += C(pose) F. It is known of
-the points that the stiffness model knows, of the angles of rigid links and of links with two ends, and joins the errors
-of positions and angles; what moves slowly under its load has the velocities and accelerations of the unloaded
-mechanism.
+A deflection is the compliance at the nominal pose times the load, fixed or random: error += C(pose) F. The stiffness
+model gives it for its points, for the angles of rigid links, and for the angles of links with two ends. It is an error
+of positions and angles only: velocities and accelerations are those of the unloaded mechanism.
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ from mechdesign.study.schema.variation import LOADS
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """Errors of channels by each of fx, fy, mz, shape (channels, 3, poses), nan where the load is not held.
+    """Derivatives of channels by fx, fy, mz, shape (channels, 3, poses), nan at poses that do not hold the load.
 
-    `load` is the mean one, shape (3, poses), or (3, 1) where poses do not differ.
+    `load` is the mean load, shape (3, poses), or (3, 1) where all poses have the same.
     """
 
     flexibility: Floats
@@ -46,15 +45,15 @@ class Elastic:
 
     @property
     def held(self) -> Flags:
-        """Poses that hold the load."""
+        """Whether a pose holds the load, shape (poses,)."""
         return np.asarray(np.isfinite(self.flexibility).all(axis=(0, 1)))
 
     def take(self, poses: Sequence[int] | Ints) -> Elastic:
-        """Some of the poses."""
+        """The deflections at these poses."""
         return Elastic(self.flexibility[:, :, poses], _of_poses(self.load, poses))
 
     def only(self, channels: Sequence[int]) -> Elastic:
-        """Some of the channels."""
+        """The deflections of these channels."""
         return replace(self, flexibility=self.flexibility[list(channels)])
 
     def errors(self, loads: Mapping[str, Floats], count: int) -> Floats:
@@ -67,19 +66,18 @@ class Elastic:
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """The loaded mechanism, ready for any number of poses.
+    """The loaded mechanism, from which deflections at poses are computed.
 
     Parameters
     ----------
     ends : mapping of (str, int) to str
-        Points of links, by link and node, whose displacement is known, and the vertices of the stiffness network that
-        bear them; of the ground the empty word.
+        Vertex of the stiffness network that carries a link's point, by link and node; empty for the ground.
     pins : mapping of int to tuple of str
-        Points by their plain names: the vertices in whose middle each lies.
+        Vertices whose mean displacement is that of a point named without its link, by node.
     bodies : mapping of str to str
-        Links that stay straight, and their vertices likewise.
+        Vertex of each rigid link; empty for the ground.
     lines : mapping of str to (int, int)
-        Links that do not: the ends between which their x axis runs.
+        Nodes of the two ends between which the x axis of an elastic link runs.
     """
 
     mechanism: Mechanism
@@ -91,7 +89,7 @@ class Elasticity:
     lines: Mapping[str, tuple[int, int]]
 
     def knows(self, channel: Channel) -> bool:
-        """Whether a channel's deflection is known."""
+        """Whether the stiffness model gives the deflection of a channel."""
         return channel.order == 0 and self._knows(channel.coordinate)
 
     def _knows(self, coordinate: Coordinate) -> bool:
@@ -106,24 +104,24 @@ class Elasticity:
         return kind != "slide" and all(points)
 
     def at(self, configuration: Configuration, channels: Sequence[Channel], poses: Ints | None = None) -> Elastic:
-        """How channels yield in a flat batch of configurations; nan where one is not assembled.
+        """Deflections of channels in a flat batch of configurations; nan where one is not assembled.
 
-        Where poses differ in the load or in what yields, `poses` are those of the batch.
+        `poses` are the rows of the batch where poses differ in their load or stiffness.
         """
         flexibility = np.zeros((len(channels), 3, *configuration.shape))
-        known = [k for k, channel in enumerate(channels) if self.knows(channel)]
+        deflected = [k for k, channel in enumerate(channels) if self.knows(channel)]
         assembled = np.flatnonzero(np.isfinite(configuration.point(self.asked.given.at)))
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
             part = configuration.take(assembled)
             rates, held = self._rates(part, self.asked if poses is None else self.asked.take(poses[assembled]))
-            for k in known:
+            for k in deflected:
                 moved = np.broadcast_to(first(part, channels[k].coordinate, rates), (self.asked.size, len(assembled)))
                 flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load if poses is None else _of_poses(self.load, poses))
 
     def _rates(self, configuration: Configuration, asked: Body) -> tuple[Rates, Flags]:
-        """What moves by unit loads, which are the leading axis, and which poses hold them."""
+        """Displacements by unit loads, which are the leading axis, and whether poses hold them."""
         from mechdesign.analyses.stiffness.analysis import by_forces
 
         loaded = by_forces(asked, configuration)
@@ -152,14 +150,14 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 
 
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
-    """The loaded mechanism of a study, None where nothing loads it, and what is doubtful; of designs at their poses."""
+    """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
     section, stiffness = study.reliability, study.stiffness
     assert section is not None
     section = section if poses is None else poses.section(section)
     if stiffness is None:
         return None, []
-    own = stiffness if poses is None else poses.section(stiffness)
-    loads = own.loads if section.load is None else (section.load,)
+    resolved = stiffness if poses is None else poses.section(stiffness)
+    loads = resolved.loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:
         notes.append(Caution(
@@ -178,14 +176,14 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
     for link, points in network.points.items():
-        borne = {(link, graph.node(point)): vertex for point, vertex in points if vertex in network.paths}
+        carried = {(link, graph.node(point)): vertex for point, vertex in points if vertex in network.paths}
         corners = [(link, graph.node(point)) for point in corners_of(links[link])]
-        if len(borne) == len(points) and len({*borne.values()}) == 1:
-            bodies[link] = next(iter(borne.values()))
-        elif len(corners) == 2 and borne.keys() >= {*corners}:
+        if len(carried) == len(points) and len({*carried.values()}) == 1:
+            bodies[link] = next(iter(carried.values()))
+        elif len(corners) == 2 and carried.keys() >= {*corners}:
             lines[link] = corners[0][1], corners[1][1]
-        ends |= borne
-    # Of the ground where that has the point, else of any link.
+        ends |= carried
+    # The ground's vertex where the ground has the point, else the first link's.
     pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
     if stiffness.at == stiffness.point:
         pins[graph.node(stiffness.at)] = (network.asked,)

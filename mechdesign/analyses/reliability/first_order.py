@@ -1,4 +1,4 @@
-"""Errors to the first order: sensitivities of position, velocity and acceleration, and what follows [S2, S3].
+"""First-order errors: sensitivities of position, velocity and acceleration, their moments and worst cases [S2, S3].
 
 Var(output) = sum over sources of (d output / d source)^2 Var(source)          [S3, eqs. 12-14]
 """
@@ -35,7 +35,7 @@ class FirstOrder:
     components : ndarray, shape (channels, components, poses)
         Derivative of each channel (radians, lengths) by each independent component of the sources.
     offset : ndarray, shape (channels, poses)
-        Values without any deviation: deflections under the mean load; of margins of assembly the nominal ones.
+        Values where no source deviates: deflections under the mean load, or the nominal margins of assembly.
     """
 
     sources: Sources
@@ -44,17 +44,17 @@ class FirstOrder:
 
     @staticmethod
     def unknown(sources: Sources, channels: int, poses: int) -> FirstOrder:
-        """Room for poses, all nan."""
+        """A model with components of nan, to be filled in."""
         count = sum(len(source.directions) for source in sources.all)
         return FirstOrder(sources, np.full((channels, count, poses), np.nan), np.zeros((channels, poses)))
 
     @cached_property
     def owner(self) -> Ints:
-        """The source of each component, shape (components,)."""
+        """Index of the source of each component, shape (components,)."""
         return np.repeat(np.arange(len(self.sources.all)), [len(source.directions) for source in self.sources.all])
 
     def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
-        """Some of the poses."""
+        """The model at these poses."""
         return replace(
             self, sources=self.sources.take(poses), components=self.components[:, :, poses],
             offset=self.offset[:, poses],
@@ -63,15 +63,15 @@ class FirstOrder:
     @cached_property
     def _spread(self) -> tuple[Floats, Floats]:
         """Mean and variance of each component, shape (components, poses); (components, 1) where poses do not differ."""
-        each = [source.spread for source in self.sources.all]
-        mean, variance = (_rows([spread[k] for spread in each])[self.owner] for k in (0, 1))
+        spreads = [source.spread for source in self.sources.all]
+        mean, variance = (_rows([spread[k] for spread in spreads])[self.owner] for k in (0, 1))
         return mean, variance
 
     @cached_property
     def _ends(self) -> tuple[Floats, Floats]:
-        """Lowest and highest deviation of each source, likewise."""
-        each = [source.ends for source in self.sources.all]
-        return _rows([ends[0] for ends in each]), _rows([ends[1] for ends in each])
+        """Lowest and highest deviation of each source, shape (sources, poses) or (sources, 1)."""
+        low, high = zip(*(source.ends for source in self.sources.all), strict=True)
+        return _rows(low), _rows(high)
 
     @cached_property
     def _weighted(self) -> Floats:
@@ -85,7 +85,7 @@ class FirstOrder:
         return np.asarray(sigma * np.einsum("pzy,cyp->czp", correlation, sigma * self.components))
 
     def beside(self, other: FirstOrder) -> FirstOrder:
-        """The channels of both."""
+        """A model with the channels of both."""
         return replace(
             self, components=np.concatenate([self.components, other.components]),
             offset=np.concatenate([self.offset, other.offset]),
@@ -104,32 +104,32 @@ class FirstOrder:
         return np.asarray((self._spread[0] * self.components).sum(axis=1) + self.offset)
 
     def distance(self) -> Floats:
-        """Of each channel from zero, in standard deviations, shape (channels, poses); infinite where not known."""
+        """Mean of each channel in standard deviations, shape (channels, poses); infinite where it is nan."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.nan_to_num(self.shift() / self.deviation(), nan=np.inf, posinf=np.inf, neginf=-np.inf)
 
     @cached_property
     def sensitivity(self) -> Floats:
-        """Per source, shape (channels, sources, poses): the derivative, of a clearance sqrt(s_x^2 + s_y^2)."""
-        each = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
-        return np.stack([own[:, 0] if own.shape[1] == 1 else np.linalg.norm(own, axis=1) for own in each], axis=1)
+        """Derivative by each source, shape (channels, sources, poses); for a clearance sqrt(s_x^2 + s_y^2)."""
+        parts = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
+        return np.stack([part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1) for part in parts], axis=1)
 
     @cached_property
     def _steepest(self) -> Floats:
-        """As `sensitivity`, but of the two ends of a slider, each of which may be at its worst, the sum."""
-        found = self.sensitivity.copy()
+        """As `sensitivity`, but for a slider the sum over its two ends, which may both be at their worst."""
+        steepest = self.sensitivity.copy()
         for k, source in enumerate(self.sources.all):
             if isinstance(source, Pin) and source.kind == "slide":
-                found[:, k] = np.abs(self.components[:, self.owner == k]).sum(axis=1)
-        return found
+                steepest[:, k] = np.abs(self.components[:, self.owner == k]).sum(axis=1)
+        return steepest
 
     def share(self) -> Floats:
         """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
 
-        Of correlated sources each has its covariance with the error, which may be negative.
+        The share of a correlated source is its covariance with the error, which may be negative.
         """
-        each = self.components * self._weighted
-        parts = np.stack([each[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
+        products = self.components * self._weighted
+        parts = np.stack([products[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
         total = parts.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
 
@@ -139,13 +139,13 @@ class FirstOrder:
         return np.asarray((np.abs(self._steepest) * reach).sum(axis=1))
 
     def worst_ends(self) -> tuple[Floats, Floats]:
-        """Lowest and highest error with each source at the end of its tolerance that leads there, (channels, poses)."""
+        """Lowest and highest error with all sources at the worst ends of their tolerances, shape (channels, poses)."""
         low, high = (self._steepest * ends for ends in self._ends)
         return np.minimum(low, high).sum(axis=1) + self.offset, np.maximum(low, high).sum(axis=1) + self.offset
 
 
 def correlation(covariance: Floats) -> Floats:
-    """Correlation of two errors, of shape (..., 2, 2); nan where one does not vary [S2, eq. 11, prints its inverse]."""
+    """Correlation of two errors from their covariance, (..., 2, 2); nan if one is constant [inverse of S2, eq. 11]."""
     with np.errstate(invalid="ignore", divide="ignore"):
         product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
         return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
@@ -182,21 +182,21 @@ def derivatives(
 ) -> Floats:
     """Derivative of each channel by places, drives and loads, shape (channels, names, n), at a flat batch.
 
-    `elastic` is known at these configurations, or at the single pose that all of them are about.
+    `elastic` has these configurations, or the single nominal pose of all of them.
 
     Raises
     ------
     MechanismError
         For the acceleration of a measure that is an expression.
     """
-    # Where loads alone vary, all mechanisms are the single nominal one.
-    found = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
+    # If only loads vary, the batch is the single nominal mechanism.
+    slopes = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
     for row, name in enumerate(names):
         if elastic is not None and name in LOADS:
-            found[:, row] = elastic.flexibility[:, list(LOADS).index(name)]
+            slopes[:, row] = elastic.flexibility[:, list(LOADS).index(name)]
     rows = [row for row, name in enumerate(names) if name not in LOADS]
     if not rows:
-        return found
+        return slopes
     names = [names[row] for row in rows]
     linear = mechanism.linearize(configuration)
     position = linear.sensitivity(names)
@@ -204,7 +204,7 @@ def derivatives(
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-    for row, channel in zip(found, channels, strict=True):
+    for row, channel in zip(slopes, channels, strict=True):
         if channel.order == 0:
             row[rows] = first(configuration, channel.coordinate, position)
         elif channel.order == 1:
@@ -213,7 +213,7 @@ def derivatives(
             row[rows] = acceleration_sensitivity(
                 configuration, channel.coordinate, velocity, acceleration, position, velocity_z, acceleration_z
             )
-    return found
+    return slopes
 
 
 def linear_errors(
@@ -224,7 +224,7 @@ def linear_errors(
     rates: DriveRates,
     elastic: Elastic | None = None,
 ) -> FirstOrder:
-    """Linear error model at a flat batch of nominal configurations, the drives held; raises as `derivatives`."""
+    """Linear error model at a flat batch of nominal configurations with fixed drives; raises as `derivatives`."""
     names, slopes = _directions(sources)
     by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
     offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
@@ -232,9 +232,9 @@ def linear_errors(
 
 
 def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: Sources) -> FirstOrder:
-    """Linear model of the margins of assembly at a flat batch of nominal configurations, the drives held.
+    """Linear model of the margins of assembly at a flat batch of nominal configurations with fixed drives.
 
-    A made mechanism with a negative one cannot be assembled.
+    A made mechanism with a negative margin cannot be assembled.
     """
     names, slopes = _directions(sources)
     moved = [k for k, name in enumerate(names) if name not in LOADS]
@@ -243,18 +243,18 @@ def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: 
 
 
 def _directions(sources: Sources) -> tuple[list[str], Floats]:
-    """Places, drives and loads, and their derivatives by the components of the sources, shape (components, names).
+    """Names of places, drives and loads, and their derivatives by the sources' components, shape (components, names).
 
-    Where these differ from pose to pose (components, names, poses).
+    Of shape (components, names, poses) where poses differ in them.
     """
     directions = [direction for source in sources.all for direction in source.directions]
     names = list(dict.fromkeys(name for direction in directions for name in direction))
-    slopes = np.stack(np.broadcast_arrays(*(each.get(name, 0.0) for each in directions for name in names)))
+    slopes = np.stack(np.broadcast_arrays(*(direction.get(name, 0.0) for direction in directions for name in names)))
     return names, slopes.reshape(len(directions), len(names), *slopes.shape[1:])
 
 
 def _chained(slopes: Floats, by_name: Floats) -> Floats:
-    """Derivatives by components from those by names, shape (channels, names, poses); slopes as of `_directions`."""
+    """Derivatives by components from those by names, (channels, names, poses), and the slopes of `_directions`."""
     if slopes.ndim == 2:
         return np.asarray(slopes @ by_name)
     return np.asarray(np.einsum("znp,cnp->czp", slopes, by_name))

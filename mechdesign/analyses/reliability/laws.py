@@ -1,7 +1,7 @@
-"""Laws of what varies: deviations from nominal, and places of pins in their holes.
+"""Laws (distributions) of deviations from nominal, and of the places of pins in their holes.
 
-Every law maps standard normal variables onto what varies, so that all methods share one space of independent standard
-normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
+Every law maps standard normal variables onto deviations or places, so that all methods share one space of independent
+standard normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study.schema.variation import Dimension
 
-# A tolerance is three standard deviations of a normal law, which `truncated_normal` is cut at [S2, eq. 5].
+# Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].
 SIGMAS = 3.0
 
 
 def _normal_cdf(u: Floats | float) -> Floats:
     """Probability that a standard normal variable is below `u`."""
-    # Moments need no SciPy, whose import takes longer than they do.
+    # Imported here because the moments of laws need no SciPy, and its import takes long.
     from scipy.special import ndtr
 
     return np.asarray(ndtr(u))
 
 
 def _normal_quantile(share: Floats | float) -> Floats:
-    """The standard normal variable that has this probability below it, at least one-dimensional."""
+    """Quantile of the standard normal law, at least one-dimensional."""
     from scipy.special import ndtri
 
     return np.atleast_1d(ndtri(share))
@@ -40,37 +40,38 @@ def _normal_quantile(share: Floats | float) -> Floats:
 
 @dataclass(frozen=True)
 class Marginal(ABC):
-    """The law of one deviation from its nominal value; to the first order of many at once, each number an array.
+    """The law of one deviation from its nominal value. For the first-order analysis its numbers may be arrays of poses.
 
-    The tolerance [low, high] is the worst case: of unbounded laws three standard deviations about the middle.
+    The tolerance [low, high] is the worst case; for unbounded laws three standard deviations to either side.
     """
 
     low: Number
     high: Number
     nominal: Number = 0.0
 
-    # Half the width of the tolerance in standard deviations; central moments of the law of standard deviation 1.
+    # Half the width of the tolerance in standard deviations `sigma`.
     reach: ClassVar[float] = SIGMAS
+    # Second and fourth central moment where `sigma` is 1.
     second: ClassVar[float] = 1.0
     fourth: ClassVar[float] = 3.0
 
     @property
     def numbers(self) -> tuple[Number, ...]:
-        """All that it depends on."""
+        """All numbers that the law depends on."""
         return self.low, self.high, self.nominal
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
-        """Some of many."""
+        """The law at these poses."""
         return replace(self, low=taken(self.low, rows), high=taken(self.high, rows), nominal=taken(self.nominal, rows))
 
     @property
     def mean(self) -> Number:
-        """The middle of the tolerance; of a law that may lean `moments` has the mean."""
+        """The middle of the tolerance; the mean of a law that may be skewed is in `moments`."""
         return 0.5 * (self.low + self.high)
 
     @property
     def sigma(self) -> Number:
-        """Standard deviation, of a truncated law before the cut; of a law that may lean `moments` has it."""
+        """Standard deviation, of a truncated law before the cut; that of a law that may be skewed is in `moments`."""
         return 0.5 * (self.high - self.low) / self.reach
 
     @property
@@ -89,34 +90,36 @@ class Marginal(ABC):
 
     @abstractmethod
     def at(self, u: Floats) -> Floats:
-        """Deviations at values of a standard normal variable, increasing, in the shape of `u`."""
+        """Deviations at values `u` of a standard normal variable, in the shape of `u`; increasing in `u`."""
 
     def _from_ends(self, u: Floats, inward: Floats) -> Floats:
-        """Deviations so far from the end of the tolerance on the side of `u`, where small probabilities keep digits."""
+        """Deviations at a distance `inward` from the end of the tolerance on the side of `u`, to full precision."""
         return np.asarray(np.where(u < 0, self.low + inward, self.high - inward))
 
     def widened(self, factor: Number) -> Self:
-        """The law of a tolerance as many times as wide, about the same middle."""
+        """The law with its tolerance times a factor, about the same middle."""
         half = 0.5 * factor * (self.high - self.low)
         return replace(self, low=self.mean - half, high=self.mean + half)
 
     def scaled(self, factor: Number) -> Self:
-        """The law of so many times nominal + deviation, less so many times the nominal value."""
+        """The law with deviations and nominal value times a factor."""
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
 def taken(value: Number, rows: Sequence[int] | Ints) -> Number:
-    """A number of some of many poses."""
+    """A number at these poses; the number itself where it is the same at all poses."""
     return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
 
 
 def marginal(spread: Dimension, nominal: Number, factor: float = 1.0) -> Marginal:
-    """The law that a study gives in its units; `nominal` is in the core's, `factor` of which are one of the study's.
+    """The law of a deviation that a study gives in its units.
+
+    `nominal` is in the core's units (radians, lengths), and `factor` of these are one unit of the study.
 
     Raises
     ------
     ToleranceClassError
-        Where the tolerance is of a class that is not given for the nominal value.
+        If the tolerance class does not cover the nominal value.
     """
     law = LAWS[spread.distribution]
     low, high = spread.ends(nominal)
@@ -134,12 +137,12 @@ class Normal(Marginal):
         return np.asarray(self.mean + self.sigma * u)
 
 
-# What the tails of a normal variable that is cut at `SIGMAS` have of its variance.
+# Part of the variance that a normal variable loses when its tails are cut at `SIGMAS`.
 _TAIL = 2.0 * SIGMAS * math.exp(-0.5 * SIGMAS**2) / math.sqrt(2.0 * math.pi) / math.erf(SIGMAS / math.sqrt(2.0))
 
 
 class TruncatedNormal(Marginal):
-    """Normal, cut at three standard deviations of what is cut: nothing lies outside the tolerance."""
+    """Normal, cut at three standard deviations of the uncut law: no deviation lies outside the tolerance."""
 
     second = 1.0 - _TAIL
     fourth = 3.0 * second - SIGMAS**2 * _TAIL
@@ -156,7 +159,7 @@ class TruncatedNormal(Marginal):
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtri
 
-        # In the lower tail, where small probabilities keep their digits.
+        # By the lower tail, where small probabilities keep their digits.
         tail = _normal_cdf(-SIGMAS)
         below = ndtri(tail + _normal_cdf(-np.abs(u)) * (1.0 - 2.0 * tail))
         return np.asarray(self.mean + self.sigma * np.copysign(below, u))
@@ -176,13 +179,13 @@ class Uniform(Marginal):
 
 
 class Triangular(Marginal):
-    """Triangular over the tolerance, most likely at the nominal value where the tolerance has it."""
+    """Triangular over the tolerance; the mode is the nominal value, or the end of the tolerance nearest to it."""
 
     reach = math.sqrt(6.0)
 
     @property
     def mode(self) -> Number:
-        """The deviation that is most likely."""
+        """The most likely deviation."""
         return np.minimum(np.maximum(0.0, self.low), self.high)
 
     @property
@@ -228,7 +231,7 @@ class Lognormal(Marginal):
 
 @dataclass(frozen=True)
 class _OfFit(Marginal):
-    """A hole's size less its shaft's, each alike in its own tolerance; `hole` is the hole's part of both tolerances."""
+    """Hole minus shaft, both of the same law over their tolerances; `hole` is the hole's share of the sum of both."""
 
     hole: float = 0.5
 
@@ -238,11 +241,11 @@ class _OfFit(Marginal):
 
 
 class NormalFit(_OfFit, Normal):
-    """Of normal sizes."""
+    """Clearance of a fit whose hole and shaft are normal."""
 
 
 class UniformFit(_OfFit):
-    """Of uniform sizes: a trapezoid."""
+    """Clearance of a fit whose hole and shaft are uniform: trapezoidal."""
 
     reach = Uniform.reach
 
@@ -265,7 +268,7 @@ class UniformFit(_OfFit):
 
 
 def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Marginal:
-    """Law of a radial clearance by half the tolerances of the hole's and the shaft's diameter, about its mean."""
+    """Law of a radial clearance about its mean, from half the diameter tolerances of the hole and the shaft."""
     law = NormalFit if distribution == "normal" else UniformFit
     reach = 0.5 * (hole + shaft)
     return law(-reach, reach, nominal, hole / (hole + shaft))
@@ -273,7 +276,7 @@ def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Mar
 
 @dataclass(frozen=True)
 class Beta(Marginal):
-    """Beta over the tolerance, of two shape parameters: equal ones do not lean, (1, 1) is uniform."""
+    """Beta over the tolerance, with two shape parameters: equal ones are symmetric, (1, 1) is uniform."""
 
     shape: tuple[Number, Number] = (1.0, 1.0)
 
@@ -282,8 +285,8 @@ class Beta(Marginal):
         return *super().numbers, *self.shape
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
-        one, other = self.shape
-        return replace(super().take(rows), shape=(taken(one, rows), taken(other, rows)))
+        a, b = self.shape
+        return replace(super().take(rows), shape=(taken(a, rows), taken(b, rows)))
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:
@@ -307,17 +310,17 @@ class Beta(Marginal):
 
 @dataclass(frozen=True)
 class Measured(Marginal):
-    """The distribution of measured deviations: the k-th of n in order has the share (k - 1/2)/n below it.
+    """The empirical law of measured deviations: the k-th smallest of n is the quantile (k - 1/2)/n.
 
-    Quantiles between them are interpolated; nothing lies beyond the least and the largest. They are stretched a little
-    about their mean, so that the law has the sample's standard deviation (of n - 1).
+    Quantiles between two values are interpolated; no deviation lies beyond the smallest or the largest. The values are
+    stretched a little about their mean, so that the law has the standard deviation of the sample (with n - 1).
     """
 
-    ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)  # beyond the least
+    ordered: Floats = field(default_factory=lambda: np.zeros(1), compare=False)  # above the smallest
 
     @staticmethod
     def of(values: Floats, about: Number, nominal: Number) -> Measured:
-        """The law of the deviations of values that are not all the same from what they are `about`."""
+        """The law of the differences between measured values, which are not all the same, and the value `about`."""
         ordered, mean = np.sort(values), float(values.mean())
         ordered = mean + (ordered - mean) * values.std(ddof=1) / math.sqrt(_interpolated(ordered - mean, 2))
         least, most = float(ordered[0]), float(ordered[-1])
@@ -344,12 +347,12 @@ class Measured(Marginal):
 
     @property
     def _shares(self) -> Floats:
-        """Of the law that is below each value."""
+        """Probability below each value, shape (n,)."""
         return np.asarray((np.arange(len(self.ordered)) + 0.5) / len(self.ordered))
 
 
 def _interpolated(ordered: Floats, power: int) -> float:
-    """Mean power of a variable with these quantiles at the shares (k - 1/2)/n, linear between them."""
+    """Moment E[x^power] of a variable with these quantiles at (k - 1/2)/n, linear between them."""
     low, high = ordered[:-1], ordered[1:]
     between = sum((low**k * high ** (power - k) for k in range(power + 1)), start=np.zeros(len(low))) / (power + 1)
     return float(between.sum() + 0.5 * (ordered[0] ** power + ordered[-1] ** power)) / len(ordered)
@@ -367,14 +370,14 @@ LAWS: dict[str, type[Marginal]] = {
 
 @dataclass(frozen=True)
 class PinLaw:
-    """Law of a pin's place in its hole for a radial clearance of 1, alike in all directions [S2, eqs. 6, 12, 13].
+    """Law of a pin's place in its hole for a radial clearance of 1, isotropic [S2, eqs. 6, 12, 13].
 
     Parameters
     ----------
     variance, fourth : float
-        Of each coordinate: E[x^2] and E[x^4].
+        E[x^2] and E[x^4] of each coordinate.
     stretch : callable
-        Ratio of the offset's length to that of two standard normal variables, of half their squared length.
+        Ratio of the pin's offset to the length of two standard normal variables, from half that length squared.
     """
 
     variance: float
@@ -388,19 +391,19 @@ class PinLaw:
         return self.fourth / 3.0
 
     def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The place at values of two independent standard normal variables, which is not turned."""
+        """The place, in the direction (u, v), at values of two independent standard normal variables."""
         ratio = self.stretch(0.5 * (u * u + v * v))
         return ratio * u, ratio * v
 
 
-# Half the squared radius, in standard deviations, at which a normal pin of sigma 1/3 reaches the unit circle, and the
-# share of the normal law that lies outside.
+# Half the squared radius, in standard deviations, at which a normal pin of sigma 1/3 reaches the unit circle.
 _CUT = 4.5
+# Probability of the normal law outside the circle.
 _OUTSIDE = math.exp(-_CUT)
 
 
 def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tuple[Floats, Floats]:
-    """Of sigma 1/3, drawn anew where half the squared radius is beyond `cut`."""
+    """Normal places of sigma 1/3, drawn again where half the squared radius is beyond `cut`."""
     x, y = rng.standard_normal((2, count))
     outside = np.flatnonzero(x * x + y * y > 2.0 * cut) if math.isfinite(cut) else np.zeros(0, dtype=np.intp)
     while len(outside):
@@ -413,7 +416,7 @@ def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tupl
 
 
 def _turned(rng: np.random.Generator, count: int, *, inside: bool) -> tuple[Floats, Floats]:
-    """Anywhere in the disc, or on its rim."""
+    """Places uniform in the disc, or on its rim."""
     radius = np.sqrt(rng.random(count)) if inside else 1.0
     angle = rng.random(count)
     angle *= 2.0 * np.pi
@@ -421,7 +424,7 @@ def _turned(rng: np.random.Generator, count: int, *, inside: bool) -> tuple[Floa
 
 
 def _stretch(squared: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-    """The ratio from the squared offset; the limit of small ones follows from its own series by a small floor."""
+    """`PinLaw.stretch` from the squared offset as a function of half the squared length; a floor avoids 0/0."""
 
     def ratio(half: Floats) -> Floats:
         half = np.maximum(half, 1e-290)
@@ -435,11 +438,11 @@ def _squared_in_disc(half: Floats) -> Floats:
     return -np.log1p((1.0 - _OUTSIDE) * np.expm1(-half)) / _CUT
 
 
-# Mean squared offset, in units of 1/_CUT, of the exponential law cut at _CUT, and its mean square.
+# Mean and mean square of the exponential law cut at _CUT: of the squared offset in units of 1/_CUT.
 _FIRST = (1.0 - (1.0 + _CUT) * _OUTSIDE) / (1.0 - _OUTSIDE)
 _SECOND = (2.0 - (_CUT**2 + 2.0 * _CUT + 2.0) * _OUTSIDE) / (1.0 - _OUTSIDE)
 
-# In `normal_in_disc` the variance is that of the cut law, which S2 draws but does not use in its formula.
+# The variance of `normal_in_disc` is that of the cut law; S2 draws from it but uses the uncut variance in its formula.
 PIN_LAWS: Mapping[str, PinLaw] = {
     "normal": PinLaw(1.0 / 9.0, 3.0 / 81.0, _normal, lambda half: np.full_like(half, 1.0 / 3.0)),
     "normal_in_disc": PinLaw(
@@ -451,7 +454,7 @@ PIN_LAWS: Mapping[str, PinLaw] = {
 
 
 class Wall(Marginal):
-    """At either end of the tolerance, as often as at the other."""
+    """At the low or the high end of the tolerance, each with probability 1/2."""
 
     reach = 1.0
     fourth = 1.0
@@ -462,13 +465,13 @@ class Wall(Marginal):
 
 @dataclass(frozen=True)
 class SlideLaw:
-    """Law of the two ends of a slider in its guide, each by itself, for a clearance of 1 on either side."""
+    """Law of the two independent ends of a slider in its guide, for a clearance of 1 on either side."""
 
     end: Marginal
 
     @property
     def variance(self) -> float:
-        """Of each end."""
+        """Variance of each end."""
         return float(self.end.moments[1])
 
     @property
@@ -478,7 +481,7 @@ class SlideLaw:
 
     @property
     def mixed(self) -> float:
-        """E[x^2 y^2] of both."""
+        """E[x^2 y^2] of both ends."""
         return self.variance**2
 
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:

@@ -1,7 +1,7 @@
 """Probabilities of normal errors within limits.
 
-All are failure probabilities, summed from positive terms only, so that none loses digits however small it is; the
-reliability is one minus it.
+All are probabilities of failure, summed from positive terms only, so that small ones keep their digits. The reliability
+is one minus the probability of failure.
 """
 
 from __future__ import annotations
@@ -18,20 +18,24 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-# Points of a lattice, and its random shifts.
+# Points of a lattice.
 _LATTICE_POINTS = 8191
+# Random shifts of the lattice.
 _LATTICE_SHIFTS = 8
-# Below this sum of the limits' probabilities a lattice sees too few failures: so many points are drawn beyond them.
+# Sum of the limits' probabilities below which a lattice has too few failures, and points are drawn beyond the limits.
 _RARE = 0.05
+# Points that are drawn beyond the limits.
 _RARE_POINTS = 20_000
-# Less than this part of the probability of failure, or this probability, of not being assembled counts as none.
+# Probability of not being assembled that is neglected, as a share of the probability of failure.
 _NO_PART = 1e-6
+# The same as a probability.
 _LEAST_PART = 1e-15
-# Sides of the polygon in a circle, beyond which points are drawn.
+# Sides of the polygon in a circle whose half-spaces points are drawn from.
 _POLYGON_SIDES = 64
-# Steps round a circle, for each time that its radius or the axis of the errors is their least deviation; most steps.
+# Steps round a circle for each least standard deviation b in its radius or in _OVAL times the largest deviation a.
 _STEPS = 9.0
 _OVAL = 4.0
+# Steps from which on the integral over the width of the circle is used instead.
 _MOST_STEPS = 4096
 
 
@@ -46,41 +50,44 @@ def made_failure(
     linear, closing : FirstOrder
         Errors, and margins of assembly.
     mean, covariance : ndarray, optional
-        As of `failure_probability`, in place of those of `linear`.
+        In place of those of `linear`, in the shapes of `failure_probability`.
     """
     mean = linear.shift().T if mean is None else mean
     covariance = linear.covariance() if covariance is None else covariance
-    found = failure_probability(covariance, bands, discs, mean)
+    failure = failure_probability(covariance, bands, discs, mean)
     parts = ndtr(-closing.distance())
-    counts = parts > np.maximum(_NO_PART * found, _LEAST_PART)
+    counts = parts > np.maximum(_NO_PART * failure, _LEAST_PART)
     count = covariance.shape[-1]
     for pose in np.flatnonzero(counts.any(axis=0)).tolist():
         both = linear.beside(closing).take([pose])
         spread, middle = both.covariance()[0], both.shift()[:, 0]
         spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
-        here = [replace(band, low=low[pose], high=high[pose]) for band in bands
-                for low, high in [[np.broadcast_to(end, found.shape) for end in (band.low, band.high)]]]  # fmt: skip
-        here += [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
-        circles = [replace(disc, radius=np.broadcast_to(disc.radius, found.shape)[pose]) for disc in discs]
-        found[pose] = failure_probability(spread, here, circles, middle)
-    return found
+        limits = [
+            replace(band, low=low[pose], high=high[pose])
+            for band in bands
+            for low, high in [[np.broadcast_to(end, failure.shape) for end in (band.low, band.high)]]
+        ]
+        limits += [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
+        circles = [replace(disc, radius=np.broadcast_to(disc.radius, failure.shape)[pose]) for disc in discs]
+        failure[pose] = failure_probability(spread, limits, circles, middle)
+    return failure
 
 
 def failure_probability(
     covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats | None = None
 ) -> Floats:
-    """Probability that normal errors break any limit, shape (...); nan where they are not known.
+    """Probability that normal errors break any limit, shape (...); nan where a covariance or mean is not finite.
 
     Parameters
     ----------
     covariance : ndarray, shape (..., outputs, outputs)
         May be singular.
     bands, discs
-        All limits must hold; ends of bands may be of shape (...). One or two limited outputs are integrated to about
-        1e-14 of the result; more by a randomised lattice, to about 1e-5 of it, or where they are rarely broken by
-        sampling, to about 1e-3.
+        The limits; ends of bands may be of shape (...). One or two limited outputs are integrated with a relative error
+        of about 1e-14; more by a randomised lattice with about 1e-5, or by sampling with about 1e-3 where failures are
+        rare.
     mean : ndarray, shape (..., outputs), optional
-        Else zero.
+        Zero if left out.
     """
     mean = np.zeros(covariance.shape[:-1]) if mean is None else mean
     if len(bands) <= 2 and not discs:
@@ -88,25 +95,25 @@ def failure_probability(
         if len(ends) < 2:
             return outside(*ends[0])
         pair = [band.output for band in bands]
-        low, high = (np.stack([each[k] for each in ends]) for k in (0, 1))
+        low, high = (np.stack([end[k] for end in ends]) for k in (0, 1))
         return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
-    known = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(mean).all(axis=-1)
-    found = np.full(known.shape, np.nan)
-    limits = [[np.broadcast_to(end, known.shape) for end in (band.low, band.high)] for band in bands]
-    radii = [np.broadcast_to(disc.radius, known.shape) for disc in discs]
+    finite = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(mean).all(axis=-1)
+    failure = np.full(finite.shape, np.nan)
+    limits = [[np.broadcast_to(end, finite.shape) for end in (band.low, band.high)] for band in bands]
+    radii = [np.broadcast_to(disc.radius, finite.shape) for disc in discs]
     if len(discs) == 1 and not bands:
         pair = [discs[0].x, discs[0].y]
-        found[known] = disc_failures(covariance[known][:, pair][..., pair], radii[0][known], mean[known][:, pair])
-        return found
-    for place in filter(np.asarray(known).__getitem__, np.ndindex(found.shape)):
-        here = [replace(b, low=low[place], high=high[place]) for b, (low, high) in zip(bands, limits, strict=True)]
+        failure[finite] = disc_failures(covariance[finite][:, pair][..., pair], radii[0][finite], mean[finite][:, pair])
+        return failure
+    for place in filter(np.asarray(finite).__getitem__, np.ndindex(failure.shape)):
+        at_place = [replace(b, low=low[place], high=high[place]) for b, (low, high) in zip(bands, limits, strict=True)]
         circles = [replace(d, radius=radius[place]) for d, radius in zip(discs, radii, strict=True)]
-        found[place] = _of_several(covariance[place], here, circles, mean[place])
-    return found
+        failure[place] = _of_several(covariance[place], at_place, circles, mean[place])
+    return failure
 
 
 def _standard(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Floats]:
-    """A band's ends in standard deviations; an error that does not vary keeps it or breaks it."""
+    """A band's ends in standard deviations from the mean; infinite ones for an error that does not vary."""
     sigma = np.sqrt(np.maximum(covariance[..., band.output, band.output], 0.0))
     low, high = band.low - mean[..., band.output], band.high - mean[..., band.output]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -117,7 +124,7 @@ def _standard(band: Band, covariance: Floats, mean: Floats) -> tuple[Floats, Flo
 
 
 def _of_several(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean: Floats) -> float:
-    """Of several limits."""
+    """Probability that normal errors at one pose break any of several limits."""
     rare = _rare(covariance, bands, discs, mean)
     if rare is not None:
         return rare
@@ -135,9 +142,9 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
         return None
     squares, axes = np.linalg.eigh(covariance)
     rows = axes * np.sqrt(np.maximum(squares, 0.0))
-    slopes = [way * rows[band.output] for band in bands for way in (1.0, -1.0)]
+    slopes = [sign * rows[band.output] for band in bands for sign in (1.0, -1.0)]
     ends = [end for b in bands for end in (b.high - mean[b.output], mean[b.output] - b.low)]
-    # What is outside a circle is beyond a side of the polygon in it.
+    # A point outside a circle is beyond a side of the polygon in it.
     turns = 2 * np.pi * np.arange(_POLYGON_SIDES) / _POLYGON_SIDES
     for disc in discs:
         for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
@@ -148,10 +155,10 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
     flat = np.count_nonzero(used[: 2 * len(bands)])
 
     def broken(u: Floats, held: Flags) -> Flags:
-        found = np.asarray(held[:flat].any(axis=0))
+        outside_any = np.asarray(held[:flat].any(axis=0))
         for disc in discs:
-            found |= np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y))) > disc.radius
-        return found
+            outside_any |= np.hypot(*(mean[k] + rows[k] @ u for k in (disc.x, disc.y))) > disc.radius
+        return outside_any
 
     return half_spaces(
         np.array(slopes)[used] / size[used, None], np.array(ends)[used] / size[used], broken if discs else None
@@ -159,20 +166,21 @@ def _rare(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], mean
 
 
 def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Flags], Flags] | None = None) -> float:
-    """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to some 1e-3 of it.
+    """Probability that a standard normal point lies in any half-space ``normal . u > distance``, to about 1e-3 of it.
 
     Parameters
     ----------
     normals, distances : ndarray, shape (half-spaces, dimension) and (half-spaces,)
         Unit vectors, and distances from the mean.
     broken : callable, optional
-        Which points count, where not all in the half-spaces do: from points, shape (dimension, n), and the half-spaces
-        that hold them, shape (half-spaces, n).
+        Which points of the half-spaces are failures, all if left out: from points, shape (dimension, n), and whether
+        each half-space holds them, shape (half-spaces, n).
 
     Notes
     -----
-    The sum of their probabilities, times the mean of one over how many of them hold a point that was drawn in one
-    [Owen, Maximov & Chertkov, Importance sampling the union of rare events, 2019].
+    The sum of the half-spaces' probabilities, times the mean of 1/m over points drawn in one of them, where m is the
+    number of half-spaces that hold the point [Owen, Maximov & Chertkov, Importance sampling the union of rare events,
+    2019].
     """
     chances = ndtr(-distances)
     total = float(chances.sum())
@@ -185,7 +193,7 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
     depth = -ndtri(chances[half] * (1.0 - rng.random(_RARE_POINTS)))
     u += normal * (depth - (normal * u).sum(axis=0))
     held = normals @ u > distances[:, None]
-    # Its own half-space holds a point whatever rounding says.
+    # A point lies in the half-space it is drawn from, whatever its rounding.
     held[half, np.arange(_RARE_POINTS)] = True
     weights = 1.0 / held.sum(axis=0)
     if broken is not None:
@@ -194,7 +202,7 @@ def half_spaces(normals: Floats, distances: Floats, broken: Callable[[Floats, Fl
 
 
 def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
-    """P(bivariate normal outside a circle about zero) of many, shape (n,); see `disc_failure`.
+    """P(bivariate normal outside a circle about zero) for n covariances, shape (n,); see `disc_failure`.
 
     Notes
     -----
@@ -202,7 +210,7 @@ def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
     is integrated over r in closed form, and over phi by as many equal steps as its narrowest part needs: the integrand
     is periodic and analytic, and the error of the trapezoidal rule falls exponentially [Trefethen & Weideman, 2014].
     """
-    found = np.full(len(radius), np.nan)
+    failure = np.full(len(radius), np.nan)
     squares, axes = np.linalg.eigh(covariance)
     b, a = np.sqrt(np.maximum(squares, 0.0)).T
     n, m = np.einsum("pij,pi->pj", axes, mean).T
@@ -210,8 +218,8 @@ def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
         steps = _STEPS * np.maximum((radius + np.hypot(n, m)) / b, _OVAL * a / b) + _STEPS
     steps = np.exp2(np.ceil(np.log2(np.where((radius > 0) & (steps < _MOST_STEPS), steps, _MOST_STEPS))))
     for count in np.unique(steps[steps < _MOST_STEPS]).tolist():
-        own = steps == count
-        size, wide, narrow, x, y = (part[own, None] for part in (radius, a, b, m, n))
+        rows = steps == count
+        size, wide, narrow, x, y = (part[rows, None] for part in (radius, a, b, m, n))
         phi = 2 * np.pi * np.arange(count) / count
         along, across = np.cos(phi) / wide, np.sin(phi) / narrow
         root = np.hypot(along, across)
@@ -221,11 +229,11 @@ def disc_failures(covariance: Floats, radius: Floats, mean: Floats) -> Floats:
         apart = np.exp(-0.5 * ((size * np.cos(phi) - x) ** 2 / wide**2 + (size * np.sin(phi) - y) ** 2 / narrow**2))
         with np.errstate(over="ignore", invalid="ignore"):
             tail = apart * (1.0 + nearest * np.sqrt(0.5 * np.pi) * erfcx(beyond / np.sqrt(2.0)))
-            found[own] = (tail / root**2).sum(axis=1) / (count * (a * b)[own])
-    # Errors along a line nearly, or about a mean far outside.
-    for row in np.flatnonzero(np.isnan(found)).tolist():
-        found[row] = disc_failure(covariance[row], float(radius[row]), mean[row])
-    return np.asarray(np.minimum(found, 1.0))
+            failure[rows] = (tail / root**2).sum(axis=1) / (count * (a * b)[rows])
+    # Errors nearly along a line, or with a mean far outside the circle.
+    for row in np.flatnonzero(np.isnan(failure)).tolist():
+        failure[row] = disc_failure(covariance[row], float(radius[row]), mean[row])
+    return np.asarray(np.minimum(failure, 1.0))
 
 
 def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) -> float:
@@ -244,7 +252,7 @@ def disc_failure(covariance: Floats, radius: float, mean: Floats | None = None) 
         half = np.sqrt(radius**2 - n * n) if abs(n) <= radius else 0.0
         return float(outside((-half - m) / a, (half - m) / a)) if half else 1.0
     total = float(outside((-radius - m) / a, (radius - m) / a))
-    begin, end = (np.arcsin(np.clip((m + way * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for way in (-1, 1))
+    begin, end = (np.arcsin(np.clip((m + sign * MAX_DEVIATION * a) / radius, -1.0, 1.0)) for sign in (-1, 1))
     if begin == end:
         return total
     # The chance that y is outside changes within b of where the circle is as high as y's mean: panels shrink there.
@@ -269,7 +277,7 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], c
     """Sequential conditioning (Genz 1992) over a shifted Richtmyer lattice; a disc limits y by the x before it."""
     order: list[tuple[int, float, float, float]] = [(b.output, b.low, b.high, 0.0) for b in bands]
     for disc in discs:
-        low, high = (way * disc.radius - float(centre[disc.x]) for way in (-1, 1))
+        low, high = (sign * disc.radius - float(centre[disc.x]) for sign in (-1, 1))
         order += [(disc.x, low, high, 0.0), (disc.y, low, high, disc.radius)]
     chosen = [output for output, *_ in order]
     root = _pivot_free_cholesky(covariance[np.ix_(chosen, chosen)])
@@ -289,7 +297,7 @@ def _lattice(covariance: Floats, bands: Sequence[Band], discs: Sequence[Disc], c
             lower, upper = low - mean, high - mean
             if radius:
                 chord = np.sqrt(np.maximum(radius * radius - before * before, 0.0))
-                lower, upper = (way * chord - centre[output] - mean for way in (-1, 1))
+                lower, upper = (sign * chord - centre[output] - mean for sign in (-1, 1))
             if root[k, k] > 0:
                 a, b = ndtr(lower / root[k, k]), ndtr(-upper / root[k, k])
                 with np.errstate(divide="ignore"):

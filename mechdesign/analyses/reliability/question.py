@@ -1,4 +1,4 @@
-"""What a reliability section asks: outputs by order, and the limits on their errors."""
+"""The channels and limits of a reliability section: outputs by order, and the limits on their errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mechdesign.study.text import fields
 
 @dataclass(frozen=True)
 class Channel:
-    """One quantity whose error is asked: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+    """One quantity whose error is computed: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
 
     coordinate: Coordinate
     order: int
@@ -39,9 +39,9 @@ class Channel:
 
 @dataclass(frozen=True)
 class Band:
-    """Error number `output` within [low, high]; either may be infinite, and both may be of many poses.
+    """Limits low <= error <= high of the channel with the index `output`; either may be infinite, or an array of poses.
 
-    Where it is `absolute` they limit the value itself.
+    If `absolute`, they limit the value of the channel instead of its error.
     """
 
     output: int
@@ -52,7 +52,7 @@ class Band:
 
 @dataclass(frozen=True)
 class Disc:
-    """Errors number `x` and `y` within a circle about zero; its radius may be of many poses."""
+    """A circle about zero that limits the errors of the channels `x` and `y`; its radius may be an array of poses."""
 
     x: int
     y: int
@@ -63,7 +63,7 @@ class Disc:
 class ReliabilityQuestion:
     """Channels (outputs order by order, all positions first), and the limits on their errors.
 
-    `pair` are the two limited channels, where there are just two; without limits, the two outputs.
+    `pair` are the two limited channels, or without limits the two outputs, where there are exactly two.
     """
 
     channels: tuple[Channel, ...]
@@ -73,25 +73,25 @@ class ReliabilityQuestion:
 
     @property
     def limited(self) -> bool:
-        """Whether a reliability is asked."""
+        """Whether there are limits, and so a reliability."""
         return bool(self.bands or self.discs)
 
     def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
-        """The question at some poses, where limits are those of many."""
+        """The question at these poses, where limits are arrays of poses."""
         bands = tuple(replace(band, low=taken(band.low, poses), high=taken(band.high, poses)) for band in self.bands)
         discs = tuple(replace(disc, radius=taken(disc.radius, poses)) for disc in self.discs)
         return replace(self, bands=bands, discs=discs)
 
     @property
     def single(self) -> list[ReliabilityQuestion]:
-        """The same with one limit at a time, in the order of `kept`."""
+        """One question for each limit, in the order of `kept`."""
         alone = [replace(self, bands=(band,), discs=()) for band in self.bands]
         return alone + [replace(self, bands=(), discs=(disc,)) for disc in self.discs]
 
     def at(self, nominal: Sequence[Any] | Floats) -> ReliabilityQuestion:
-        """The question at poses where the channels have these values: all limits are those of errors.
+        """The question with limits of errors only, at poses where the channels have these nominal values.
 
-        Two limits of an angle are those at the turn nearest to its value.
+        An angle is taken at the turn nearest to the middle of its two absolute limits.
         """
         bands = tuple(self._about(band, nominal[band.output]) if band.absolute else band for band in self.bands)
         return replace(self, bands=bands)
@@ -104,12 +104,12 @@ class ReliabilityQuestion:
 
     @cached_property
     def limited_channels(self) -> list[int]:
-        """Channels that have limits."""
+        """Indices of the channels that have limits."""
         return sorted({b.output for b in self.bands} | {k for d in self.discs for k in (d.x, d.y)})
 
     @cached_property
     def narrowed(self) -> ReliabilityQuestion:
-        """The same with the limited channels alone."""
+        """The question with the limited channels only."""
         place = {channel: k for k, channel in enumerate(self.limited_channels)}
         return ReliabilityQuestion(
             tuple(self.channels[k] for k in self.limited_channels),
@@ -119,9 +119,9 @@ class ReliabilityQuestion:
         )
 
     def kept(self, errors: Floats) -> Flags:
-        """Which limits (bands, then discs) errors of shape (channels, n) keep, shape (limits, n).
+        """Whether errors of shape (channels, n) keep each limit (bands, then discs), shape (limits, n).
 
-        What is not assembled is nan and keeps none.
+        Errors of a mechanism that is not assembled are nan and keep no limit.
         """
         kept = np.ones((len(self.bands) + len(self.discs), errors.shape[1]), dtype=bool)
         with np.errstate(invalid="ignore"):
@@ -135,27 +135,27 @@ class ReliabilityQuestion:
 
     @property
     def _ends(self) -> list[tuple[int, float, float]]:
-        """Finite ends of the bands: error, end, and 1 of an upper one, -1 of a lower one."""
-        return [(b.output, end, way) for b in self.bands for end, way in ((b.high, 1.0), (b.low, -1.0))
+        """Finite ends of the bands: channel, end, and 1 for an upper or -1 for a lower end."""
+        return [(b.output, end, sign) for b in self.bands for end, sign in ((b.high, 1.0), (b.low, -1.0))
                 if np.isfinite(end)]  # fmt: skip
 
     def margins(self, errors: Floats) -> Floats:
-        """How far errors, of shape (channels, n), are from each limit, negative beyond it, shape (limits, n)."""
-        found = [way * (end - errors[output]) for output, end, way in self._ends]
-        return np.stack([*found, *(disc.radius - np.hypot(errors[disc.x], errors[disc.y]) for disc in self.discs)])
+        """Distances of errors, shape (channels, n), from the finite ends and circles, negative beyond, (margins, n)."""
+        bands = [sign * (end - errors[output]) for output, end, sign in self._ends]
+        return np.stack([*bands, *(disc.radius - np.hypot(errors[disc.x], errors[disc.y]) for disc in self.discs)])
 
     def margin_slopes(self, errors: Floats, slopes: Floats) -> Floats:
-        """Derivatives of the margins, from those of the errors of shape (channels, dimension, n)."""
-        found = [-way * slopes[output] for output, _, way in self._ends]
+        """Derivatives of the margins from those of the errors, shape (channels, dimension, n)."""
+        gradients = [-sign * slopes[output] for output, _, sign in self._ends]
         for disc in self.discs:
             x, y = errors[disc.x], errors[disc.y]
             with np.errstate(invalid="ignore", divide="ignore"):
-                found.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
-        return np.stack(found)
+                gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
+        return np.stack(gradients)
 
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
-    """Channels and limits of a section, perhaps with the numbers of many poses; limited coordinates are outputs too."""
+    """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
     mechanism = study.mechanism
     limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
     limited = [
@@ -165,21 +165,21 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     ]
     names = section.outputs or (() if limited else default_outputs(mechanism))
     outputs = expand_outputs(study, tuple(names))
-    known = [output.name for output in outputs]
-    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in known)))
-    known = [output.name for output in outputs]
+    listed = [output.name for output in outputs]
+    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in listed)))
+    places = [output.name for output in outputs]
     orders = 3 if section.rates or section.accelerations or section.speed else 1
     bands, discs = [], []
     for base, order, limit in limits:
         begin = order * len(outputs)
         if limit.radius is not None:
-            discs.append(Disc(begin + known.index(f"{base}.x"), begin + known.index(f"{base}.y"), limit.radius))
+            discs.append(Disc(begin + places.index(f"{base}.x"), begin + places.index(f"{base}.y"), limit.radius))
         else:
             low, high = (
                 radians(study, mechanism.coordinate(base), value) if value is not None else bound
                 for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
             )
-            bands.append(Band(begin + known.index(base), low, high, limit.absolute))
+            bands.append(Band(begin + places.index(base), low, high, limit.absolute))
     pair: tuple[int, int] | None = None
     if len(bands) == 2 and not discs:
         pair = (bands[0].output, bands[1].output)
@@ -192,15 +192,15 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
-    """The coordinate or point of a limit, and the order that is limited."""
+    """Name of the limited coordinate or point, and the order (0 position, 1 velocity, 2 acceleration)."""
 
-    def known(name: str) -> bool:
+    def exists(name: str) -> bool:
         try:
             return mechanism.graph.is_point(name) or bool(mechanism.coordinate(name))
         except MechanismError:
             return False
 
-    return split_order(name, known)
+    return split_order(name, exists)
 
 
 def unsaid(study: Study, question: ReliabilityQuestion) -> list[Caution]:
@@ -227,7 +227,7 @@ def _named(name: str, point: str) -> bool:
 
 
 def holders(study: Study, coordinate: Coordinate) -> str:
-    """The links whose points a coordinate is about, as far as their pins have clearances or give."""
+    """Names of the links whose points a coordinate uses, for points with a clearance or an elastic bearing."""
     graph = study.mechanism.graph
     names = [
         link or " ".join(links)

@@ -22,37 +22,38 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.work.chunks import map_chunks
 
-# Samples drawn together.
+# Samples of a chunk.
 CHUNK = 20_000
-# Cells and half width, in standard deviations, of the density's grid [S2, Fig. 4].
+# Cells of the density's grid along each axis [S2, Fig. 4].
 CELLS = 25
+# Half the width of the grid, in standard deviations.
 REACH = 3.0
-# Chunks that the density is counted over: a million samples.
+# Chunks over which the density is counted: a million samples.
 _DENSITY_CHUNKS = 50
-# The trend of the means is followed in steps of this many samples through the first chunks, whose errors are kept for a
-# histogram too, then at powers of two.
+# Samples between two entries of the trend in the first chunks; after these it has entries at powers of two.
 _TREND_STEP = 1000
+# First chunks, whose errors are also kept for the histogram.
 _TREND_CHUNKS = 16
-# Step of the difference quotients of what varies, in standard deviations.
+# Step of the difference quotients by the standard normal variables, in standard deviations.
 _SOURCE_STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """One pose, at which made mechanisms are solved; the drives and their rates are held.
+    """One pose at which made mechanisms are solved, with the nominal drives and their rates.
 
     Parameters
     ----------
     pose : int
-        Row of the pose; names its streams.
+        Row of the pose, which also names its streams of random numbers.
     plan : Plan
-        That of the drives, in the assembly of the pose.
+        The drives' plan with the assembly modes of the pose.
     nominal, centres
-        The nominal mechanism, and values of its channels.
+        The nominal mechanism, and the nominal values of the channels.
     scale : two of (float, float) or None
-        Means and standard deviations for the density of the pair; None where no density is wanted.
+        Mean and standard deviation of each error of the pair, for its density; None without a density.
     followed : bool
-        Whether to follow the means and the failures, and to keep the errors of the first chunks.
+        Whether to record the trend of means and failures, and to keep the errors of the first chunks.
     """
 
     question: ReliabilityQuestion
@@ -67,7 +68,7 @@ class Setting:
     followed: bool = False
 
     def narrowed(self) -> Setting:
-        """The same pose with the limited channels only: nothing else needs to be computed."""
+        """The same pose with the limited channels only, which suffice for the limits."""
         channels = self.question.limited_channels
         return replace(
             self, question=self.question.narrowed, centres=[self.centres[k] for k in channels], scale=None,
@@ -78,8 +79,8 @@ class Setting:
 def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
     """The drives' plan with the assembly modes of a single solved pose.
 
-    A pose given by outputs is solved with the inverse problem's modes, and may lie in another assembly of the drives
-    than the sketch. Groups are tried in order, each in both modes, since a group depends on those before it only.
+    A pose given by outputs is solved with the assembly modes of the inverse problem, and may be in another assembly
+    mode of the drives than the sketch. Each group is tried in both modes, in order: it depends only on those before it.
     """
     forward = mechanism.forward
     drives = [configuration.value(mechanism.coordinate(name)) for name in mechanism.drives]
@@ -88,21 +89,21 @@ def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
         errors = {}
         for mode in (modes[index], -modes[index]) if modes[index] else ():
             modes[index] = mode
-            found = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
-            errors[mode] = sum(abs(found.rotations[k] - configuration.rotations[k]) for k in group.angles)
-            errors[mode] += sum(abs(found.slides[k] - configuration.slides[k]) for k in group.slides)
-        # A pose that is not found (nan) is as far as can be.
+            solved = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
+            errors[mode] = sum(abs(solved.rotations[k] - configuration.rotations[k]) for k in group.angles)
+            errors[mode] += sum(abs(solved.slides[k] - configuration.slides[k]) for k in group.slides)
+        # A mode that cannot be assembled has nan and comes last.
         modes[index] = min(errors, key=lambda mode: (np.isnan(errors[mode]), errors[mode]), default=modes[index])
     return forward if tuple(modes) == forward.modes else Plan(mechanism, forward.structure, modes)
 
 
 def solve(setting: Setting, made: Made) -> Configuration:
-    """Made mechanisms with the drives at the pose, and their errors; angles on the branch of the nominal pose."""
+    """Made mechanisms at the pose, drives with their errors; angles at the turn nearest to the nominal pose."""
     mechanism, nominal = setting.mechanism, setting.nominal
-    given: list[Value] = [
+    drives: list[Value] = [
         nominal.value(mechanism.coordinate(name)) + made.drives.get(name, 0.0) for name in mechanism.drives
     ]
-    solved = setting.plan.solve(given, made.places, start=nominal, limits=False)
+    solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
     return solved.beside(nominal, [channel.coordinate for channel in setting.question.channels])
 
 
@@ -120,15 +121,15 @@ def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
 
 
 def problem_of(setting: Setting, sources: Sources) -> Problem:
-    """Margins of the limits, nan where the mechanism cannot be assembled, and derivatives where these are closed."""
+    """Margins of the limits, nan where the mechanism cannot be assembled, with gradients where the model has them."""
     setting = setting.narrowed()
     question = setting.question
 
     def margins(u: Floats) -> Floats:
         errors, valid = errors_of(setting, sources.made(sources.at(u, directed=True)), u.shape[1])
-        found = question.margins(errors)
-        found[:, ~valid] = np.nan
-        return found
+        distances = question.margins(errors)
+        distances[:, ~valid] = np.nan
+        return distances
 
     def gradients(u: Floats) -> tuple[Floats, Floats]:
         made = sources.made(sources.at(u, directed=True))
@@ -138,9 +139,9 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
             setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic
         )
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _SOURCE_STEP))
-        found = question.margins(errors)
-        found[:, ~valid] = np.nan
-        return found, question.margin_slopes(errors, by_variable)
+        distances = question.margins(errors)
+        distances[:, ~valid] = np.nan
+        return distances, question.margin_slopes(errors, by_variable)
 
     def varying(u: Floats) -> Floats:
         """Places, drives and loads, shape (names, n)."""
@@ -155,7 +156,7 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
 
 
 def generator(seed: int, *stream: int) -> np.random.Generator:
-    """The stream of this name; each chunk of each pose has its own, whatever the threads and the samples to follow."""
+    """The stream of random numbers of this name; chunks of poses have their own, so that `jobs` changes no number."""
     return np.random.Generator(np.random.SFC64(np.random.SeedSequence(entropy=seed, spawn_key=stream)))
 
 
@@ -168,9 +169,9 @@ class Sums:
     broken : ndarray of int, shape (limits,)
         Samples that break each limit, in the order of `ReliabilityQuestion.kept`.
     density : ndarray of int, shape (CELLS * CELLS,) or (0,)
-        Samples in each cell, over `counted` samples.
+        Samples in each cell, of `counted` samples.
     trend : ndarray, shape (steps, 3 + channels)
-        Samples, valid ones, failures and sums of errors after each step, from the begin of the chunk.
+        Numbers of samples, valid ones and failures, and sums of errors, cumulated step by step.
     kept : ndarray, shape (channels, n)
         Errors of valid samples of the first chunks.
     """
@@ -201,12 +202,12 @@ class Sums:
 
     @property
     def estimate(self) -> Estimate:
-        """Estimate from counted failures."""
+        """Probability of failure from counted failures."""
         return counted(self.failures, self.samples, self.samples - self.valid, self.samples)
 
     @staticmethod
     def total(parts: Sequence[Sums]) -> Sums:
-        """Those of chunks that follow each other."""
+        """The sum of consecutive chunks."""
         return reduce(Sums.__add__, parts)
 
     def __add__(self, other: Sums) -> Sums:
@@ -229,12 +230,12 @@ def simulate(
     settings: Sequence[Setting], sources: Sources, seed: int, samples: int, sums: dict[int, Sums],
     jobs: int | None = 1, progress: Progress = NULL,
 ) -> None:  # fmt: skip
-    """Fill `sums` by pose, all poses chunk by chunk, so that an interrupt leaves something of each."""
+    """Fill `sums` by pose: every chunk at all poses before the next one, so that an interrupt keeps every pose."""
     work = partial(_simulated, settings, sources, seed, samples)
     items = range(-(-samples // CHUNK) * len(settings))
-    for pose, found in map_chunks(work, items, jobs, travels=True):
-        sums[pose] = sums[pose] + found if pose in sums else found
-        progress.update(found.samples)
+    for pose, part in map_chunks(work, items, jobs, travels=True):
+        sums[pose] = sums[pose] + part if pose in sums else part
+        progress.update(part.samples)
 
 
 def _simulated(
@@ -252,7 +253,7 @@ def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, co
 
 
 def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
-    """Sums over made mechanisms; of the first chunks also the density, the trend and the errors."""
+    """Sums over made mechanisms; the first chunks also have the density, the trend and the errors."""
     errors, valid = errors_of(setting, made, count)
     kept = setting.question.kept(errors)
     within = np.asarray(kept.all(axis=0))

@@ -5,8 +5,8 @@ Two sets of points A, B and, for each source, A with that source's variables fro
     first_i = E[f(B) (f(AB_i) - f(A))] / V      [Saltelli et al., Variance based sensitivity analysis, 2010, tab. 2b]
     total_i = E[(f(A) - f(AB_i))^2] / (2 V)     [Jansen, Analysis of variance designs for model output, 1999]
 
-Of a linear model both are known. It stands beside the other as a control variate: what is sampled is how far that
-departs from it. Independent replicates give Student's intervals of the ratios.
+The indices of the linear model have a closed form. It is the control variate: only the difference between the exact
+model and the linear one is sampled. Independent replicates give Student's intervals of the ratios.
 """
 
 from __future__ import annotations
@@ -28,13 +28,15 @@ from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.work.chunks import map_chunks
 
-# Least number of replicates, and the most points of one.
+# Least number of replicates.
 _REPLICATES = 16
+# Points of a replicate from which on there are more replicates.
 _REPLICATE_POINTS = 4_000
-# Mechanisms solved a pose, and poses, where the study does not say how many points.
+# Mechanisms solved at each pose where the study gives no number of points.
 _POSE_MECHANISMS = 8_000
+# Listed poses that have indices where the study gives no number of points.
 _POSES = 4
-# Stream of random numbers, besides those of the methods.
+# Name of this module's stream of random numbers; the methods have streams 1 and 2.
 _STREAM = 3
 
 
@@ -42,8 +44,8 @@ _STREAM = 3
 class SobolIndices:
     """Indices at one pose, shape (3, channels, sources): value, lower and upper end of its interval at 99.7 %.
 
-    nan of a source without indices of its own and where nothing varies. Of the `samples` evaluated those are left out
-    as `invalid` where a mechanism cannot be assembled.
+    nan for a correlated source, which has no indices, and where nothing varies. `samples` counts all points, `invalid`
+    those that are left out because a mechanism cannot be assembled.
     """
 
     first: Floats
@@ -54,16 +56,16 @@ class SobolIndices:
 
 @dataclass(frozen=True, eq=False)
 class Replicate:
-    """Sums over the points of one replicate, the model's first, the linear model's second.
+    """Sums over the points of one replicate; axis of length 2: the exact model, then the linear one.
 
     Parameters
     ----------
     products : ndarray, shape (3, 2, channels, sources)
-        Of f(B) (f(AB_i) - f(A)), f(AB_i) - f(A) and (f(A) - f(AB_i))^2.
+        Sums of f(B) (f(AB_i) - f(A)), f(AB_i) - f(A) and (f(A) - f(AB_i))^2.
     sums, squares : ndarray, shape (2, channels)
-        Of f and its square, over A and B.
+        Sums of f and of its square over A and B.
     kept, points : int
-        Points of A that enter, and all.
+        Points at which all mechanisms are assembled, and all points.
     """
 
     products: Floats
@@ -82,26 +84,26 @@ def sample(
     Parameters
     ----------
     model : callable
-        From standard normal variables, shape (dimension, n), to the values of the model and of the linear model (zero
-        without one), shape (2, channels, n); nan where there is none.
+        From standard normal variables, shape (dimension, n), to the values of the exact and of the linear model (zero
+        where there is no linear one), shape (2, channels, n); nan where a mechanism is not assembled.
     rows : sequence of sequences of int
-        The variables of each source; one without has no indices.
+        The variables of each source; empty for a source that gets no indices.
     """
-    asked = [k for k, own in enumerate(rows) if len(own)]
-    points = np.empty((dimension, 2 + len(asked), count))
+    independent = [k for k, variables in enumerate(rows) if len(variables)]
+    points = np.empty((dimension, 2 + len(independent), count))
     points[:, :2] = rng.standard_normal((2, dimension, count)).swapaxes(0, 1)
     points[:, 2:] = points[:, :1]
-    for place, k in enumerate(asked):
-        own = list(rows[k])
-        points[own, 2 + place] = points[own, 1]
+    for place, k in enumerate(independent):
+        variables = list(rows[k])
+        points[variables, 2 + place] = points[variables, 1]
     flat = points.reshape(dimension, -1)
     parts = [model(flat[:, begin : begin + POINTS_TOGETHER]) for begin in range(0, flat.shape[1], POINTS_TOGETHER)]
-    found = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(asked), count)
-    keep = np.isfinite(found).all(axis=(0, 1, 2))
-    found = found[..., keep]
-    of_a, of_b, change = found[:, :, 0], found[:, :, 1], found[:, :, 2:] - found[:, :, :1]
-    products = np.full((3, *found.shape[:2], len(rows)), np.nan)
-    products[..., asked] = [values.sum(axis=-1) for values in (of_b[:, :, None] * change, change, change * change)]
+    values = np.concatenate(parts, axis=-1).reshape(*parts[0].shape[:2], 2 + len(independent), count)
+    keep = np.isfinite(values).all(axis=(0, 1, 2))
+    values = values[..., keep]
+    of_a, of_b, change = values[:, :, 0], values[:, :, 1], values[:, :, 2:] - values[:, :, :1]
+    products = np.full((3, *values.shape[:2], len(rows)), np.nan)
+    products[..., independent] = [terms.sum(axis=-1) for terms in (of_b[:, :, None] * change, change, change * change)]
     sums, squares = of_a.sum(axis=-1) + of_b.sum(axis=-1), (of_a * of_a + of_b * of_b).sum(axis=-1)
     return Replicate(products, sums, squares, int(keep.sum()), count)
 
@@ -109,20 +111,20 @@ def sample(
 def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | None = None) -> SobolIndices:
     """Indices and their intervals from independent replicates.
 
-    `linear` are variances of the linear model: of each source, shape (channels, sources), and of all together.
+    `linear` are the variances of the linear model by source, shape (channels, sources), and in all, shape (channels,).
     """
-    points = sum(each.points for each in replicates)
-    full = [each for each in replicates if each.kept]
-    kept = sum(each.kept for each in full)
+    points = sum(replicate.points for replicate in replicates)
+    full = [replicate for replicate in replicates if replicate.kept]
+    kept = sum(replicate.kept for replicate in full)
     if len(full) < 2:
-        nowhere = np.full((3, *replicates[0].products.shape[2:]), np.nan)
-        return SobolIndices(nowhere, nowhere, points, points - kept)
-    # About the common mean, or a large mean would drown the products.
-    centre = sum((each.sums for each in full), np.zeros_like(full[0].sums)) / (2 * kept)
-    first = np.stack([(each.products[0] - centre[..., None] * each.products[1]) / each.kept for each in full])
-    total = np.stack([0.5 * each.products[2] / each.kept for each in full])
-    whole = np.stack([each.squares / (2 * each.kept) - centre * (each.sums / each.kept - centre) for each in full])
-    # The linear model's variances are those over all points; without those that cannot be assembled they are others.
+        missing = np.full((3, *replicates[0].products.shape[2:]), np.nan)
+        return SobolIndices(missing, missing, points, points - kept)
+    # Products are taken about the common mean: a large mean would cost them their digits.
+    centre = sum((part.sums for part in full), np.zeros_like(full[0].sums)) / (2 * kept)
+    first = np.stack([(part.products[0] - centre[..., None] * part.products[1]) / part.kept for part in full])
+    total = np.stack([0.5 * part.products[2] / part.kept for part in full])
+    whole = np.stack([part.squares / (2 * part.kept) - centre * (part.sums / part.kept - centre) for part in full])
+    # The linear model's variances are over all points, so they correct the sampled ones only if no point is left out.
     if linear is not None and kept == points:
         first, total = (part[:, 0] - part[:, 1] + linear[0] for part in (first, total))
         whole = whole[:, 0] - whole[:, 1] + linear[1]
@@ -132,7 +134,7 @@ def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | Non
 
 
 def _ratio(parts: Floats, whole: Floats) -> Floats:
-    """Ratio of means over replicates and its interval: value, low, high; what is below 0 or above 1 is moved there."""
+    """Ratio of the means over replicates, and its interval (value, low, high), clipped to 0 and 1."""
     # SciPy takes a quarter of a second to import, and reading a study does not need it.
     from mechdesign.numerics.statistics import student
 
@@ -145,7 +147,7 @@ def _ratio(parts: Floats, whole: Floats) -> Floats:
 
 
 def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
-    """Indices by pose: of all poses where the study says of how many points, else of the first listed ones."""
+    """Indices by pose: at all poses where the study gives the number of points, else at the first listed ones."""
     settings, count = task.settings, section.sobol
     if count is None:
         sampled = any(METHODS[method].sampled for method in section.methods)
@@ -157,15 +159,15 @@ def indices(task: Task, section: ReliabilitySection) -> dict[int, SobolIndices]:
     rows = [np.flatnonzero(owners == s.name).tolist() if s.name in alone else [] for s in sources.all]
     points = _POSE_MECHANISMS // (sum(map(bool, rows)) + 2) if count is None else count
     replicates = max(_REPLICATES, -(-points // _REPLICATE_POINTS))
-    each = max(2, points // replicates)
+    size = max(2, points // replicates)
     task.progress.start(len(settings) * replicates, "replicates")
-    work = partial(_replicate, settings, sources, linear, rows, task.seed, each)
-    found: dict[int, list[Replicate]] = {setting.pose: [] for setting in settings}
+    work = partial(_replicate, settings, sources, linear, rows, task.seed, size)
+    parts: dict[int, list[Replicate]] = {setting.pose: [] for setting in settings}
     items = [(place, replicate) for place in range(len(settings)) for replicate in range(replicates)]
     for (place, _), part in zip(items, map_chunks(work, items, task.jobs, travels=True), strict=True):
-        found[settings[place].pose].append(part)
+        parts[settings[place].pose].append(part)
         task.progress.update(1)
-    return {pose: combine(parts, _variances(linear, pose)) for pose, parts in found.items()}
+    return {pose: combine(sums, _variances(linear, pose)) for pose, sums in parts.items()}
 
 
 def _replicate(
@@ -178,15 +180,15 @@ def _replicate(
 
 
 def uncorrelated(sources: Sources) -> set[str]:
-    """Sources that vary by themselves; only they have indices of their own."""
+    """Names of the sources that are correlated with no other; only they have indices."""
     if sources.correlation is None:
         return set(sources.owners)
-    lonely = np.count_nonzero(sources.correlation.coefficients, axis=0) == 1
-    return {s.name for s, own in zip(sources.scalars, lonely, strict=True) if own} | {p.name for p in sources.pins}
+    alone = np.count_nonzero(sources.correlation.coefficients, axis=0) == 1
+    return {s.name for s, single in zip(sources.scalars, alone, strict=True) if single} | {p.name for p in sources.pins}
 
 
 def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[Caution]:
-    """Which sources have no indices, and where made mechanisms are left out of them."""
+    """Warnings of sources without indices, and of points that are left out."""
     if not found:
         return []
     notes = []
@@ -220,9 +222,9 @@ def _both_models(setting: Setting, sources: Sources, linear: FirstOrder) -> Call
 
 
 def _variances(linear: FirstOrder, pose: int) -> tuple[Floats, Floats] | None:
-    """Variances of the linear model with the pins as they are sampled: of each source, and of all together."""
+    """Variances of the linear model by source and in all, with the laws of pins that are sampled; None if unknown."""
     pins = tuple(replace(pin, analytic=pin.sampled) for pin in linear.sources.pins)
     model = replace(linear.take([pose]), sources=replace(linear.sources, pins=pins))
     whole = model.deviation()[:, 0] ** 2
-    own = np.nan_to_num(model.share()[:, :, 0]) * whole[:, None]
-    return (own, whole) if np.isfinite(whole).all() else None
+    parts = np.nan_to_num(model.share()[:, :, 0]) * whole[:, None]
+    return (parts, whole) if np.isfinite(whole).all() else None

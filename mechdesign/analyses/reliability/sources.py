@@ -1,4 +1,4 @@
-"""What varies when a mechanism is made: dimensions, clearances, drives and loads, mapped onto the geometry."""
+"""The random sources of a made mechanism: dimensions, clearances, drives and loads, mapped onto the geometry."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ MAX_LOAD = 1e100
 class Scalar:
     """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
-    `moves` has the derivative of each place, drive or load that it changes (radians, lengths), and its quantity.
-    `factor` are radians, lengths or loads in one `unit` of the study; that of a parameter may be unknown.
+    `moves` maps each place, drive or load that it changes onto the derivative (radians, lengths) and the quantity.
+    `factor` is one `unit` of the study in radians, lengths or loads; the unit of a parameter may be unknown (None).
     """
 
     name: str
@@ -62,12 +62,12 @@ class Scalar:
 
     @property
     def directions(self) -> list[dict[str, Number]]:
-        """Of the single component, derivatives of places, drives and loads."""
+        """Derivatives of places, drives and loads by the single component."""
         return [{name: slope for name, (slope, _) in self.moves.items()}]
 
     @property
     def spread(self) -> tuple[Number, Number]:
-        """Mean and variance."""
+        """Mean and variance of the deviation."""
         return self.law.moments[:2]
 
     @property
@@ -80,10 +80,10 @@ class Scalar:
 class Pin:
     """A clearance of a pin or a slide: its mean radius, and the law of its deviation.
 
-    `analytic` and `sampled` name the laws of its place, of the analytic methods and of those that sample. The place has
-    two components, x and y of a pin or the two ends of a slider; `directions` are the derivatives of the places of the
-    geometry by as many of them as move something: the offsets of the pin's point in its link, the link's length, or
-    the slide's offset and angle. `kind` is ``offset``, ``length`` or ``slide``.
+    `analytic` and `sampled` name the laws of its place for the analytic methods and for those that sample. The place
+    has two components: x and y of a pin, or the two ends of a slider. `directions` has, for each component that changes
+    the geometry, the derivatives of the places: of the offsets of the pin's point in its link, of the link's length, or
+    of the slide's offset and angle. `kind` is ``offset``, ``length`` or ``slide``.
     """
 
     name: str
@@ -96,7 +96,9 @@ class Pin:
 
     def take(self, rows: Sequence[int] | Ints) -> Pin:
         """At some of many poses."""
-        directions = tuple({name: taken(slope, rows) for name, slope in each.items()} for each in self.directions)
+        directions = tuple(
+            {name: taken(slope, rows) for name, slope in direction.items()} for direction in self.directions
+        )
         law = None if self.law is None else self.law.take(rows)
         return replace(self, radius=taken(self.radius, rows), law=law, directions=directions)
 
@@ -107,7 +109,7 @@ class Pin:
 
     @property
     def directed(self) -> bool:
-        """Whether the direction of its place alone counts: a pin in contact."""
+        """Whether its place has only a random direction: a pin in contact."""
         return self.sampled == "contact" and self.kind != "slide"
 
     @property
@@ -124,13 +126,13 @@ class Pin:
 
     @property
     def ends(self) -> tuple[Number, Number]:
-        """The largest radial clearance in any direction, or of each end of a slider."""
+        """Lowest and highest deviation: the largest clearance, in any direction or at each end of a slider."""
         largest = self.radius + (0.0 if self.law is None else self.law.high)
         return -largest, largest
 
 
 class Made(NamedTuple):
-    """Made mechanisms: places that vary (radians, lengths), errors of drives and loads, by name, of shape (count,)."""
+    """Made mechanisms: varying places (radians, lengths), errors of drives and of loads, by name, shape (count,)."""
 
     places: dict[str, Floats]
     drives: dict[str, Floats]
@@ -139,7 +141,7 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True)
 class Sources:
-    """All that varies in a study, or to the first order at poses of many designs of it: then numbers are arrays.
+    """All random sources of a study; for the first order at poses of many designs their numbers are arrays of poses.
 
     Draws have the shape (variables, count): deviations of the scalars in their order (parameters first, then places,
     drives and loads), then each pin's radial clearance, and x and y of its place for a radial clearance of 1.
@@ -152,7 +154,7 @@ class Sources:
 
     @property
     def all(self) -> tuple[Scalar | Pin, ...]:
-        """Each with its name, as the study gives it."""
+        """Scalars, then pins, in the order of components."""
         return *self.scalars, *self.pins
 
     @property
@@ -163,27 +165,27 @@ class Sources:
 
     @property
     def circles(self) -> list[tuple[int, int]]:
-        """The variables of `at` of which the direction alone counts: the places of pins in contact."""
+        """Pairs of variables of `at` that are random directions: the places of pins in contact."""
         owners = self.owners
         ends = [len(owners) - owners[::-1].index(pin.name) for pin in self.pins if pin.directed]
         return [(end - 2, end - 1) for end in ends]
 
     def take(self, rows: Sequence[int] | Ints) -> Sources:
         """At some of many poses."""
-        scalars, pins = tuple(each.take(rows) for each in self.scalars), tuple(each.take(rows) for each in self.pins)
+        scalars, pins = tuple(s.take(rows) for s in self.scalars), tuple(pin.take(rows) for pin in self.pins)
         correlation = None if self.correlation is None else self.correlation.take(rows)
         return replace(self, scalars=scalars, pins=pins, correlation=correlation)
 
     def widened(self, factors: Sequence[Number] | Floats) -> Sources:
-        """The same where tolerances are as many times as wide; of a clearance, the radius and its tolerance.
+        """The sources with tolerances times factors, shape (sources,); of a clearance the radius and its tolerance.
 
-        Where factors are arrays, shape (sources, poses), at as many poses.
+        Factors of shape (sources, poses) give sources at these poses.
         """
-        each: list[Number] = [float(factor) if np.ndim(factor) == 0 else np.asarray(factor) for factor in factors]
-        scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, each, strict=False))
+        numbers: list[Number] = [float(factor) if np.ndim(factor) == 0 else np.asarray(factor) for factor in factors]
+        scalars = tuple(replace(s, law=s.law.widened(f)) for s, f in zip(self.scalars, numbers, strict=False))
         pins = tuple(
             replace(p, radius=f * p.radius, law=None if p.law is None else p.law.scaled(f))
-            for p, f in zip(self.pins, each[len(scalars) :], strict=True)
+            for p, f in zip(self.pins, numbers[len(scalars) :], strict=True)
         )
         return replace(self, scalars=scalars, pins=pins)
 
@@ -194,14 +196,14 @@ class Sources:
         """
         if self.correlation is None:
             return None
-        given, count = self.correlation.coefficients, len(self.scalars)
+        coefficients, count = self.correlation.coefficients, len(self.scalars)
         size = count + sum(len(pin.directions) for pin in self.pins)
-        found = np.array(np.broadcast_to(np.eye(size), (*given.shape[:-2], size, size)))
-        found[..., :count, :count] = given
-        return found
+        matrix = np.array(np.broadcast_to(np.eye(size), (*coefficients.shape[:-2], size, size)))
+        matrix[..., :count, :count] = coefficients
+        return matrix
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Draw what varies in `count` mechanisms."""
+        """Draws of `count` mechanisms, shape (variables, count)."""
         if self.correlation is None:
             rows: list[Floats | float] = [scalar.law.draw(rng, count) for scalar in self.scalars]
         else:
@@ -213,16 +215,16 @@ class Sources:
         return np.array([np.broadcast_to(row, (count,)) for row in rows])
 
     def redraw_pins(self, drawn: Floats, rng: np.random.Generator) -> Floats:
-        """The same mechanisms with their pins elsewhere in their holes."""
+        """Draws of the same mechanisms with new places of their pins in their holes."""
         drawn = drawn.copy()
         for pin, (_, *place) in zip(self.pins, self._by_pin(drawn), strict=True):
             place[0][:], place[1][:] = pin.laws[pin.sampled].draw(rng, drawn.shape[1])
         return drawn
 
     def at(self, u: Floats, *, directed: bool = False) -> Floats:
-        """What varies at values of independent standard normal variables, shape (len(owners), count).
+        """Draws at values of independent standard normal variables, shape (len(owners), count).
 
-        Where `directed`, the two of a pin in contact are the cosine and sine of its direction.
+        If `directed`, the two variables of a pin in contact are the cosine and sine of its direction.
         """
         count = len(self.scalars)
         normal = u[:count] if self.correlation is None else self.correlation.root @ u[:count]
@@ -245,7 +247,7 @@ class Sources:
         return np.array([*drawn[: len(self.scalars)], *pins])
 
     def made(self, drawn: Floats) -> Made:
-        """The mechanisms that are made so."""
+        """The made mechanisms of these draws, shape (variables, count)."""
         study, nominal = self.study, self.study.mechanism.nominal
         by_kind: dict[str, dict[str, Floats]] = {"parameter": {}, "place": {}, "drive": {}, "load": {}}
         for scalar, deviation in zip(self.scalars, drawn, strict=False):
@@ -271,12 +273,12 @@ class Sources:
 def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[Caution]]:
     """Sources of a study, and warnings about parameters that vary several places together.
 
-    Where designs differ, at their `poses`: to the first order.
+    `poses` of designs give numbers that are arrays of poses, for the first order.
 
     Raises
     ------
     StudyError
-        If nothing varies, the correlations do not go together, or numbers of a design make no tolerance.
+        If nothing varies, the correlations contradict each other, or the numbers of a design give no tolerance.
     """
     section = study.reliability
     if section is None or not (section.dimensions or section.clearances):
@@ -343,7 +345,7 @@ def _quantity(mechanism: Mechanism, name: str) -> str:
 
 
 def _check_sizes(sources: Sources) -> None:
-    """Refuse deviations so large that their squares overflow."""
+    """Raise a StudyError for deviations so large that their squares overflow."""
     study, size = sources.study, sources.study.mechanism.size or 1.0
     loads = (MAX_LOAD, "1e100")
     most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads, "none": loads}
@@ -374,11 +376,10 @@ def _twice(study: Study, place: str, varying: Collection[str]) -> list[Caution]:
 
 
 def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Correlation | None:
-    given = section.correlation
-    if not given:
+    if not section.correlation:
         return None
     place = {scalar.name: k for k, scalar in enumerate(scalars)}
-    pairs = {(place[pair.one], place[pair.other]): pair.coefficient for pair in given}
+    pairs = {(place[pair.one], place[pair.other]): pair.coefficient for pair in section.correlation}
     return Correlation.of([scalar.law for scalar in scalars], pairs)
 
 
@@ -390,17 +391,17 @@ def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
     if clearance.fit is not None:
         law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
     kind = "slide" if name in joints else clearance.effect
-    found = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
+    pin = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
     if kind == "slide":
-        return replace(found, directions=_slider(joints[name], clearance.length))
+        return replace(pin, directions=_slider(joints[name], clearance.length))
     if clearance.link is None:
         raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
     moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
-    return replace(found, directions=tuple({place: 1.0} for place in moved))
+    return replace(pin, directions=tuple({place: 1.0} for place in moved))
 
 
 def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...]:
-    """Of the rear and the front end of a slider: it shifts by their mean and tilts by their difference over its length.
+    """Directions of the rear and front end of a slider: it shifts by their mean and tilts by their difference/length.
 
     A pin in a slot only shifts.
     """
@@ -411,5 +412,5 @@ def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...
 
 
 def _geometric(values: Mapping[str, Number]) -> dict[str, Number]:
-    """Leave out the limits of motion: they are judged on the nominal mechanism."""
+    """Values without the limits of motion, which apply to the nominal mechanism only."""
     return {name: value for name, value in values.items() if not name.startswith("limits.")}

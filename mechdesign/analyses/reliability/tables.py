@@ -1,4 +1,4 @@
-"""Tables of the reliability question, from the linear error model, what each method says, and what it drew."""
+"""Tables of the reliability question from the linear error model, the results of the methods, and their samples."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from mechdesign.results import Column, Table
 
 # Bins of a histogram.
 _BINS = 60
-# Farthest errors in it, in standard deviations.
+# Largest distance of its errors from the mean, in standard deviations.
 _FARTHEST = 6.0
-# Standard deviation, as a part of the size, up to which an error does not vary.
+# Standard deviation, as a share of the output's size, up to which it is rounding and the output constant.
 _CONSTANT = 1e-12
-# Where nothing was computed.
+# Estimate at poses that were not computed.
 _UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
 
 
@@ -49,20 +49,20 @@ def _channels(task: Task, channels: Ints) -> dict[str, Strings]:
     return {"output": output[channels], "order": order[channels]}
 
 
-def _with_moments(task: Task, found: Sequence[MethodResult]) -> Sequence[MethodResult]:
-    """Methods that have moments; where none has, the first order."""
-    return [each for each in found if each.sums or each.normal] or [methods.run("analytic", task)]
+def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[MethodResult]:
+    """Results with moments of the errors; the first order's where no method has any."""
+    return [result for result in results if result.sums or result.normal] or [methods.run("analytic", task)]
 
 
-def moments(task: Task, found: Sequence[MethodResult]) -> Table:
+def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = _with_moments(task, found)
-    each_mean, each_covariance = zip(*(each.moments(task) for each in known), strict=True)
+    known = _with_moments(task, results)
+    means, covariances = zip(*(result.moments(task) for result in known), strict=True)
     scale, linear = task.scale[:, None], task.linear
     shape = (task.poses.count, len(known), len(scale))
     pose, method, channel = (index.ravel() for index in np.indices(shape))
-    mean = np.stack(each_mean)[method, channel, pose] * scale[channel, 0]
-    variance = np.stack(each_covariance)[method, pose, channel, channel]
+    mean = np.stack(means)[method, channel, pose] * scale[channel, 0]
+    variance = np.stack(covariances)[method, pose, channel, channel]
     sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
@@ -74,15 +74,15 @@ def moments(task: Task, found: Sequence[MethodResult]) -> Table:
     ))  # fmt: skip
 
 
-def success(task: Task, found: Sequence[MethodResult]) -> Table:
+def success(task: Task, results: Sequence[MethodResult]) -> Table:
     """Reliability of every pose by every method, and of the whole cycle."""
     entries = []
     length = task.poses.count // task.poses.designs
     for design in range(task.poses.designs):
         first = design * length
         entries += [(pose, each, each.estimates.get(pose, _UNKNOWN), each.used.get(pose, each.method), False)
-                    for pose in range(first, first + length) for each in found]  # fmt: skip
-        cycles = [(each, each.cycles[design]) for each in found if each.cycles]
+                    for pose in range(first, first + length) for each in results]  # fmt: skip
+        cycles = [(each, each.cycles[design]) for each in results if each.cycles]
         entries += [(first, each, cycle, "monte_carlo" if cycle.samples else "bounds", True) for each, cycle in cycles]
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
@@ -106,7 +106,7 @@ def success(task: Task, found: Sequence[MethodResult]) -> Table:
     if task.question.pair is not None:
         pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
         values = np.full(len(whole), np.nan)
-        values[~whole] = np.stack([correlation(each.moments(task)[1][pair]) for each in found], axis=1).ravel()
+        values[~whole] = np.stack([correlation(result.moments(task)[1][pair]) for result in results], axis=1).ravel()
         columns += RELIABILITY.columns({}, rho=values)
     all_valid = (task.reason == 0).reshape(task.poses.designs, -1).all(axis=1)
     valid = np.where(whole, all_valid[pose // length], task.reason[pose] == 0)
@@ -120,18 +120,18 @@ def _sigma_level(failure: Floats) -> Floats:
     return np.asarray(-ndtri(failure))
 
 
-def capability(task: Task, found: Sequence[MethodResult]) -> Table:
+def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     """Process capability of each limited output by itself, at every pose by every method that has moments [ISO 22514].
 
     Limits of errors are those of the value about its nominal one.
     """
-    known, question = _with_moments(task, found), task.question.at(task.nominal)
+    known, question = _with_moments(task, results), task.question.at(task.nominal)
     single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
     shape = (task.poses.count, len(known), len(single))
     pose, method, limit = (index.ravel() for index in np.indices(shape))
     scale = task.scale[rows]
-    means, covariances = (np.stack(part) for part in zip(*(each.moments(task) for each in known), strict=True))
-    # nan of circles, whose limits are about a point.
+    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in known), strict=True))
+    # Circles have no value and no limits of a value: nan.
     nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
     nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
     mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
@@ -145,9 +145,9 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
     upper = np.where(np.isfinite(high), nominal + high, np.nan)
     for k, disc in enumerate(question.discs, bands):
         upper[..., k] = np.reshape(disc.radius, (-1, 1))
-    estimates = [_each_limit(task, each, single) for each in known]
+    estimates = [_by_limit(task, result, single) for result in known]
     failure, least, most = (
-        np.array([[[getattr(each.get(row, _UNKNOWN), name) for each in of] for of in estimates]
+        np.array([[[getattr(by_pose.get(row, _UNKNOWN), name) for by_pose in limits] for limits in estimates]
                   for row in range(len(nominal))])
         for name in ("failure", "low", "high")
     )  # fmt: skip
@@ -162,15 +162,15 @@ def capability(task: Task, found: Sequence[MethodResult]) -> Table:
     ))  # fmt: skip
 
 
-def _each_limit(task: Task, found: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
-    """Estimates by pose for each limit by itself; of methods that count failures from their plain samples."""
-    if len(single) == 1 and found.estimates:
-        return [found.estimates]
-    if found.normal is not None:
-        return [methods.of_normal(task, question, *found.normal) for question in single]
+def _by_limit(task: Task, result: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
+    """Estimates by pose for each limit alone: from normal errors, or from the failures counted among plain samples."""
+    if len(single) == 1 and result.estimates:
+        return [result.estimates]
+    if result.normal is not None:
+        return [methods.of_normal(task, question, *result.normal) for question in single]
     return [
         {pose: counted(int(sums.broken[k]), sums.samples, sums.samples - sums.valid, sums.samples)
-         for pose, sums in found.sums.items()}
+         for pose, sums in result.sums.items()}
         for k in range(len(single))
     ]  # fmt: skip
 
@@ -182,10 +182,12 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     names = np.array([source.name for source in task.sources.all])
     pins, study = len(task.sources.pins), task.study
     factors = np.array([scalar.factor for scalar in task.sources.scalars] + [1.0] * pins)
-    # What has no known unit stands by its name.
+    # A parameter without a known unit appears by its name in the derivative's unit.
     below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
     below += [study.units.label("length")] * pins
-    units = np.array([[study.units.ratio(unit, each) for each in below] for unit in task.labels[2].tolist()])
+    units = np.array(
+        [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
+    )
     links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
     return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
@@ -207,21 +209,21 @@ def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Errors of made mechanisms at the pose that is shown, in the study's units.
+    """Errors of sampled mechanisms at the pose that is shown, in the study's units.
 
     Parameters
     ----------
     outputs, orders, units : ndarray of str, shape (channels,)
     errors : ndarray, shape (channels, n)
-        Of samples that can be assembled.
+        Errors of the samples that can be assembled.
     kept : ndarray of bool, shape (n,)
-        Which of them keep every limit.
+        Whether a sample keeps every limit.
     bands, discs
-        The limits as those of errors: channel, lowest and highest error; channels of x and y, radius.
+        The limits of errors: (channel, lowest, highest error); (channel of x, channel of y, radius).
     pair : (int, int) or None
         The two channels whose density is drawn.
     mean, covariance : ndarray, shapes (channels,) and (channels, channels)
-        Of the errors to the first order.
+        Mean and covariance of the errors to the first order.
     """
 
     pose: int
@@ -239,7 +241,7 @@ class Samples:
 
 def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
     """The samples that pictures show; None where no errors are drawn."""
-    setting = next((each for each in task.settings if each.followed), None)
+    setting = next((setting for setting in task.settings if setting.followed), None)
     if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
         return None
     pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
@@ -252,18 +254,18 @@ def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
 
 
 def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
-    """Density, histogram, convergence and estimate, as far as there is something to say; sums by pose."""
-    made = [_density(task, sums), _histogram(task, sums)]
-    followed = next(((row, each) for row, each in sorted(sums.items()) if len(each.trend)), None)
+    """Density, histogram, convergence and estimate tables, those that `sums` by pose have data for."""
+    built = [_density(task, sums), _histogram(task, sums)]
+    followed = next(((row, part) for row, part in sorted(sums.items()) if len(part.trend)), None)
     if followed is not None:
-        made += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
-    return [table for table in made if table is not None]
+        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
+    return [table for table in built if table is not None]
 
 
 def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
     """Density of the two outputs within 3 standard deviations: bivariate normal beside the simulated one [S2]."""
     pair = list(task.question.pair or ())
-    rows = [row for row, each in sorted(sums.items()) if pair and len(each.density) and each.counted]
+    rows = [row for row, part in sorted(sums.items()) if pair and len(part.density) and part.counted]
     blocks = task.linear.covariance()[rows][:, pair][:, :, pair] if rows else np.zeros((0, 2, 2))
     rho = correlation(blocks)
     kept = np.flatnonzero(1.0 - rho**2 > 0)
@@ -290,14 +292,14 @@ def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
 
 def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
     """Each output's error at the pose that is shown, beside the normal law of the same mean and deviation."""
-    row = next((row for row, each in sorted(sums.items()) if each.kept.shape[1] > 1), None)
+    row = next((row for row, part in sorted(sums.items()) if part.kept.shape[1] > 1), None)
     if row is None:
         return None
     units, nominal = task.labels[2], np.abs(task.nominal[:, row] * task.scale)
     varying, parts = [], []
     for k, error in enumerate(sums[row].kept * task.scale[:, None]):
         mean, sigma = float(error.mean()), float(error.std(ddof=1))
-        # What does not vary has rounding for its deviation: of the size of what it is computed from.
+        # The deviation of a constant output is rounding, which scales with the lengths it is computed from.
         size = task.study.mechanism.size if units[k] == task.study.units.label("length") else 0.0
         if not sigma > _CONSTANT * max(size, float(nominal[units == units[k]].max())):
             continue
@@ -319,7 +321,7 @@ def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
 
 
 def _convergence(task: Task, row: int, sums: Sums) -> Table:
-    """Mean of each output after so many samples, at the pose that is shown [S3, Fig. 4]."""
+    """Mean of each output by the number of samples, at the pose that is shown [S3, Fig. 4]."""
     trend = sums.trend[sums.trend[:, 1] > 0]
     means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
     step, channel = (index.ravel() for index in np.indices(means.shape))
@@ -330,7 +332,7 @@ def _convergence(task: Task, row: int, sums: Sums) -> Table:
 
 
 def _estimate(task: Task, row: int, sums: Sums) -> Table:
-    """Share of failures after so many samples, with its interval, at the pose that is shown."""
+    """Share of failures by the number of samples, with its interval, at the pose that is shown."""
     samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
     interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
     columns = ESTIMATE.columns(

@@ -1,4 +1,4 @@
-"""What the methods of reliability are asked, and what each says."""
+"""The common input of all methods of reliability, and the result of a method."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ from mechdesign.study.schema.reliability import Precision
 
 Strings = NDArray[np.str_]
 
-# Most samples of `auto` where the study says nothing, and its precision as a share of the probability.
+# Most samples of `auto` where the study gives no number.
 MAX_SAMPLES = 2_000_000
+# Its coefficient of variation of the probability of failure where the study gives no precision.
 RELATIVE_PRECISION = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What all methods are asked, and the nominal mechanism at every pose.
+    """The common input of all methods: the question, and the nominal mechanism at every pose.
 
     Parameters
     ----------
@@ -42,12 +43,14 @@ class Task:
         See `mechdesign.mechanism.Reason`.
     nominal : ndarray, shape (channels, poses)
         Values of the channels (radians, lengths).
+    linear : FirstOrder
+        The linear error model of the channels.
     closing : FirstOrder
         Margins of assembly, see `first_order.linear_margins`.
     settings : sequence of Setting
-        Poses that can be assembled, in their order; none where only the first order is asked.
+        Poses that can be assembled, in their order; empty where only the first order is computed.
     most : int
-        Samples of methods that end where their precision is reached.
+        Most samples of methods that end at a precision.
     """
 
     study: Study
@@ -68,12 +71,12 @@ class Task:
     progress: Progress = NULL
 
     def __getstate__(self) -> dict[str, Any]:
-        """Where it travels to, nobody looks at its progress."""
+        """A copy in a worker process shows no progress and starts no processes."""
         return self.__dict__ | {"progress": NULL, "jobs": 1}
 
     @cached_property
     def assembled(self) -> Flags:
-        """Poses that can be computed, those outside the limits of motion included."""
+        """Poses that can be assembled, inside or outside the limits of motion."""
         return np.isin(self.reason, (Reason.OK, Reason.LIMIT))
 
     @cached_property
@@ -99,21 +102,23 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class MethodResult:
-    """What a method finds, by pose, and over the whole `cycle`.
+    """The result of a method, by pose, and over the whole cycle.
 
     Parameters
     ----------
     estimates : dict of int to Estimate
-        Where there are limits.
+        Probability of failure, where there are limits.
     sums : dict of int to Sums
-        Of methods that sample the errors.
+        Sums of the sampled errors, of methods that sample them.
     used : dict of int to str
-        The method that the value comes from, where it is not this one.
+        The method that the value comes from, where it is another one.
     rungs : dict of int to dict of str to Estimate
-        Those of the methods tried before.
+        Estimates of all methods that `auto` tried.
     normal : (ndarray, ndarray) or None
         Mean, shape (channels, poses), and covariance, shape (poses, channels, channels), of errors that are not drawn
         (radians, lengths); None where the method gives none.
+    cycles : tuple of Estimate
+        One for each design; empty where no cycle is estimated.
     """
 
     method: str
@@ -126,11 +131,11 @@ class MethodResult:
 
     @property
     def cycle(self) -> Estimate | None:
-        """Of the whole cycle, where one is asked."""
+        """Estimate of the first design's whole cycle, if there is one."""
         return self.cycles[0] if self.cycles else None
 
     def moments(self, task: Task) -> tuple[Floats, Floats]:
-        """Mean and covariance of the errors, as `normal` has them, or of those that were drawn; nan where unknown."""
+        """Mean and covariance of the errors, in the shapes of `normal`, or those of the samples; nan where unknown."""
         if self.normal is not None:
             return self.normal
         channels, poses = task.nominal.shape
@@ -141,7 +146,7 @@ class MethodResult:
         return mean, covariance
 
     def add(self, other: MethodResult) -> None:
-        """Join what is said of other poses."""
+        """Add the results of other poses."""
         self.estimates.update(other.estimates)
         self.sums.update(other.sums)
         self.used.update(other.used)
@@ -151,6 +156,6 @@ class MethodResult:
 class Partial(KeyboardInterrupt):
     """An interrupted method, and its result so far."""
 
-    def __init__(self, found: MethodResult) -> None:
+    def __init__(self, result: MethodResult) -> None:
         super().__init__()
-        self.found = found
+        self.result = result

@@ -1,4 +1,4 @@
-"""The methods declared in the schema, one a file: ``run(task)`` says what each finds at every pose."""
+"""The methods declared in the schema, one a file, each with a function ``run(task)`` that returns its result."""
 
 from __future__ import annotations
 
@@ -16,31 +16,29 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.work.chunks import map_chunks
 
-# Streams of random numbers, besides those of the plain samples.
+# Names of streams of random numbers: of searches for design points, and of quasi-Monte Carlo's scrambling.
 SEARCH, QUASI = 1, 2
 
 
 def run(name: str, task: Task) -> MethodResult:
-    """What a method says."""
-    found: MethodResult = import_module(METHODS[name].place).run(task)
-    return found
+    """The result of a method."""
+    result: MethodResult = import_module(METHODS[name].place).run(task)
+    return result
 
 
 def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodResult:
-    """Normal errors of these means, shape (channels, poses), and covariances, shape (poses, channels, channels).
+    """Result for normal errors with these means, shape (channels, poses), and covariances, (poses, channels, channels).
 
-    No interval is claimed.
+    Its estimates have no interval.
     """
-    found = MethodResult(name, normal=(mean, covariance))
-    if task.question.limited:
-        found.estimates.update(of_normal(task, task.question, mean, covariance))
-    return found
+    estimates = of_normal(task, task.question, mean, covariance) if task.question.limited else {}
+    return MethodResult(name, estimates, normal=(mean, covariance))
 
 
 def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covariance: Floats) -> dict[int, Estimate]:
-    """Estimates by pose from normal errors, as of `normal`, for the limits of a question about the task's channels.
+    """Estimates by pose from normal errors as of `normal`, for the limits of a question about the task's channels.
 
-    What cannot be assembled breaks them.
+    A mechanism that cannot be assembled is a failure.
     """
     # SciPy takes a quarter of a second to import, and a study without limits does not need it.
     from mechdesign.analyses.reliability.probability import made_failure
@@ -53,20 +51,20 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
 
 
 def pose_by_pose(name: str, task: Task, work: Callable[[Task, Setting], MethodResult]) -> MethodResult:
-    """What `work`, a function of a module, says of each pose; an interrupt keeps the poses that are finished."""
-    found = MethodResult(name)
+    """Results of `work`, a function of a module, at all poses; an interrupt keeps the poses that are finished."""
+    result = MethodResult(name)
     task.progress.start(len(task.settings), "poses")
     try:
         for part in map_chunks(partial(_at, work, task), range(len(task.settings)), task.jobs, travels=True):
-            found.add(part)
+            result.add(part)
             task.progress.update(1)
     except KeyboardInterrupt:
-        raise Partial(found) from None
-    return found
+        raise Partial(result) from None
+    return result
 
 
 def of_limits(name: str, task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
-    """What `work`, a function of a module, estimates at each pose; nothing where there are no limits."""
+    """Estimates by `work`, a function of a module, at all poses; an empty result where there are no limits."""
     if not task.question.limited:
         return MethodResult(name)
     return pose_by_pose(name, task, partial(_estimated, name, work))

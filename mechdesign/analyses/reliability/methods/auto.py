@@ -1,4 +1,4 @@
-"""The cheapest method that reaches the precision asked, each step checked by those below; moments of plain samples."""
+"""The cheapest method that reaches the precision, checked by the cheaper ones; moments from plain Monte Carlo."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import Precision
 
-# Plain samples that every rung is checked with, and up to how many of them need no other method.
+# Plain Monte Carlo samples that every rung is checked against.
 PILOT = 4000
+# Plain samples up to which no other method is tried.
 FEW = 40_000
-# Failures from which on their share is known well enough to plan by.
+# Failures from which on their share is precise enough to predict the samples needed.
 _ENOUGH_FAILURES = 30
-# A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision.
-# None says nothing; an estimate without samples claims no interval, and checks those that do.
+# A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision to
+# an estimate, or None where the step does not apply. An estimate without samples has no interval and is only a check.
 Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
-# Two methods disagree where their intervals are farther apart than this factor.
+# Ratio of the ends of two methods' intervals from which on they disagree.
 FACTOR = 1.5
 
 
 def rungs() -> dict[str, Rung]:
-    """Of the methods that are declared as steps, in their order."""
+    """Rungs of the methods that the schema declares as steps, in their order."""
     steps = sorted((method for method in METHODS.values() if method.step), key=lambda method: method.step)
     return {method.name: import_module(method.place).rung for method in steps}
 
@@ -43,9 +44,8 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
     drawn: list[Sums] = []
 
     def plain(count: int) -> Estimate:
-        while (have := sum(part.samples for part in drawn)) < count:
-            # The first chunk is the pilot, the following ones are whole.
-            size = min(PILOT if not drawn else FEW, count - have)
+        while (done := sum(part.samples for part in drawn)) < count:
+            size = min(PILOT if not drawn else FEW, count - done)
             drawn.append(simulate_chunk(setting, task.sources, task.seed, len(drawn), size))
         return Sums.total(drawn).estimate
 
@@ -53,11 +53,11 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
         plain(min(FEW, task.most))
         return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
     rng = generator(task.seed, setting.pose, SEARCH, 2)
-    # Where nothing else helps, plain samples are as many in all.
+    # Plain samples at all poses together are at most about `task.most`.
     problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
-    estimate, used, said = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
+    estimate, used, tried = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
     pose = setting.pose
-    return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: said})
+    return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: tried})
 
 
 def climb(
@@ -69,63 +69,63 @@ def climb(
     most: int,
     most_plain: int,
 ) -> tuple[Estimate, str, dict[str, Estimate]]:
-    """Probability of failure to a precision.
+    """Probability of failure with a given precision.
 
     Parameters
     ----------
     plain : callable
-        Monte Carlo with so many samples in all; keeps what it has drawn before.
+        Monte Carlo with this number of samples in all; samples drawn before are kept.
     rungs : mapping of str to Rung
         The methods that are tried in this order where plain samples do not suffice.
     most, most_plain : int
-        Samples that are drawn at most by any method, and by Monte Carlo.
+        Most samples of any method, and of Monte Carlo.
 
     Returns
     -------
-    estimate, used, said
-        The estimate, with the evaluations of all rungs; the method that it comes from; those of all methods tried.
+    estimate, used, tried
+        The estimate, with the evaluations of all rungs; the method that it comes from; the estimates of all methods.
     """
-    said = {"monte_carlo": plain(min(PILOT, most, most_plain))}
+    tried = {"monte_carlo": plain(min(PILOT, most, most_plain))}
 
     def plainly(count: float) -> Estimate:
-        said["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
-        return said["monte_carlo"]
+        tried["monte_carlo"] = plain(int(min(most, most_plain, max(count, PILOT))))
+        return tried["monte_carlo"]
 
     def precise(estimate: Estimate) -> bool:
         return reached(precision, estimate.failure, estimate.low, estimate.high)
 
     def enough(estimate: Estimate) -> float:
-        # Of few failures the interval's end is the safe number to plan with.
+        # With few failures their share is uncertain: the upper end of its interval is used.
         share = estimate.failure if estimate.failures >= _ENOUGH_FAILURES else estimate.high
         return 1.1 * needed(precision, share, share * (1.0 - share))
 
-    found, used = said["monte_carlo"], "monte_carlo"
-    if not precise(found) and enough(found) <= FEW:
-        found = plainly(enough(found))
-    if not precise(found):
+    best, used = tried["monte_carlo"], "monte_carlo"
+    if not precise(best) and enough(best) <= FEW:
+        best = plainly(enough(best))
+    if not precise(best):
         points = find(problem, rng)
         candidates: dict[str, Estimate] = {}
         for name, rung in rungs.items():
-            tried = rung(problem, points, rng, most, precision)
-            if tried is None:
+            estimate = rung(problem, points, rng, most, precision)
+            if estimate is None:
                 continue
-            said[name] = tried
-            # Plain samples see every failure: what they exclude has missed some of them.
-            if tried.failures and tried.high >= found.low:
-                candidates[name] = tried
-                if precise(tried):
+            tried[name] = estimate
+            # Plain samples miss no kind of failure; an estimate below their interval does.
+            if estimate.failures and estimate.high >= best.low:
+                candidates[name] = estimate
+                if precise(estimate):
                     break
         if not any(map(precise, candidates.values())):
-            found = plainly(enough(found) if found.failures >= _ENOUGH_FAILURES else np.inf)
-        for name, tried in candidates.items():
-            if precise(tried) or tried.high - tried.low < found.high - found.low:
-                found, used = tried, name
-    total = problem.evaluations + said["monte_carlo"].evaluations
-    return replace(found, evaluations=total), used, said
+            best = plainly(enough(best) if best.failures >= _ENOUGH_FAILURES else np.inf)
+        for name, estimate in candidates.items():
+            if precise(estimate) or estimate.high - estimate.low < best.high - best.low:
+                best, used = estimate, name
+    total = problem.evaluations + tried["monte_carlo"].evaluations
+    return replace(best, evaluations=total), used, tried
 
 
 def disagree(one: Estimate, other: Estimate) -> float:
-    """How many times two estimates are apart beyond their intervals; 1 where these overlap."""
+    """Ratio of the nearest ends of two estimates' intervals, at least 1; 1 where they overlap."""
     low, high = max(one.low, other.low), min(one.high, other.high)
     if not low > high:
         return 1.0

@@ -7,16 +7,16 @@ from mechdesign.analyses.reliability.task import MethodResult, Partial, Task
 
 
 def run(task: Task) -> MethodResult:
-    """As many samples as asked at each pose; an interrupt leaves what was drawn so far."""
+    """`samples` of the study at each pose; an interrupt keeps the samples drawn so far."""
     sums: dict[int, Sums] = {}
     task.progress.start(len(task.settings) * task.samples, "samples")
     try:
         simulate(task.settings, task.sources, task.seed, task.samples, sums, task.jobs, task.progress)
     except KeyboardInterrupt:
-        raise Partial(_found(task, sums)) from None
-    return _found(task, sums)
+        raise Partial(_result(task, sums)) from None
+    return _result(task, sums)
 
 
-def _found(task: Task, sums: dict[int, Sums]) -> MethodResult:
-    estimates = {pose: each.estimate for pose, each in sums.items()} if task.question.limited else {}
+def _result(task: Task, sums: dict[int, Sums]) -> MethodResult:
+    estimates = {pose: part.estimate for pose, part in sums.items()} if task.question.limited else {}
     return MethodResult("monte_carlo", estimates, sums)

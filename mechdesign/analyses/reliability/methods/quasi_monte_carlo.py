@@ -19,12 +19,12 @@ from mechdesign.numerics.arrays import Floats
 
 NAME = "quasi_monte_carlo"
 REPLICATES = 16
-# Of fewer failures the means of the replicates are far from normal, and the interval is the wider one of plain samples.
+# With fewer failures the replicates' means are far from normal, and the wider binomial interval is used.
 _FEW_FAILURES = 200
 
 
 def run(task: Task) -> MethodResult:
-    """About as many points as asked at each pose."""
+    """About as many points at each pose as the study gives samples."""
     return pose_by_pose(NAME, task, _at_pose)
 
 
@@ -39,18 +39,18 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
             for block, u in enumerate(points(len(sources.owners), count, seed))
         ])  # fmt: skip
     total = Sums.total([part for replicate in parts for part in replicate])
-    # Points that are spread evenly have no trend.
-    found = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
+    # Evenly spread points have no trend with their number.
+    result = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
     if task.question.limited:
         broken = [sum(part.failures for part in replicate) for replicate in parts]
-        found.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)
-    return found
+        result.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)
+    return result
 
 
 def replicates(samples: int) -> list[int]:
-    """Points of each replicate: powers of two, about as many as asked in all."""
-    each = max(1, round(np.log2(max(samples / REPLICATES, 2))))
-    return [2**each] * REPLICATES
+    """Points of each replicate: the power of two that makes about `samples` in all."""
+    exponent = max(1, round(np.log2(max(samples / REPLICATES, 2))))
+    return [2**exponent] * REPLICATES
 
 
 def points(dimension: int, count: int, seed: int) -> Iterator[Floats]:
@@ -60,7 +60,7 @@ def points(dimension: int, count: int, seed: int) -> Iterator[Floats]:
 
     sequence = qmc.Sobol(dimension, scramble=True, rng=np.random.default_rng(seed))
     for begin in range(0, count, POINTS_TOGETHER):
-        # The scrambling leaves points at 0 a chance of one in 2^30.
+        # A scrambled point is 0 with a probability of 2^-30, and its quantile would be infinite.
         yield ndtri(np.clip(sequence.random(min(POINTS_TOGETHER, count - begin)), 2.0**-32, 1 - 2.0**-32)).T
 
 
