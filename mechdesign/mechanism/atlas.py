@@ -15,7 +15,7 @@ from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason, hide
 from mechdesign.mechanism.continuation import MAX_CHANGE, scale_of, table_of
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.state import State
+from mechdesign.mechanism.solve import State
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import SKETCH
-from mechdesign.mechanism.solve import loop_vectors
-from mechdesign.mechanism.state import State
+from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
 
@@ -79,10 +78,8 @@ def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
     if not plan.iterative or regularity(Linearization(plan.structure, core.geometry, configuration)) > STALLED:
         return
     equations, count = core.equations, len(plan.structure.given)
-    nodes = np.array([complex(node) for node in configuration.nodes])
-    angles = np.array([np.angle(turn) for turn in configuration.rotations])
-    slides = np.array([float(slide) for slide in configuration.slides])
-    real, middle = equations.mobility(equations.pack(nodes, angles, slides))
+    x = equations.pack(configuration.nodes, configuration.rotations, configuration.slides)
+    real, middle = equations.mobility(x)
     if real > count:
         raise over_constrained(core.description, equations, middle, count, real, count)
 
@@ -98,13 +95,12 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
         return MechanismError(
             f"the sketch is at a singular position: with its drives held, {free}; draw another", SKETCH
         )
-    nodes, _, slides = equations.unpack(x)
-    if not plan.iterative or any(slides[slide] <= 0 for slide in graph.telescopic):
+    found = equations.at(x)
+    if not plan.iterative or any(found.slides[slide] <= 0 for slide in graph.telescopic):
         return None
-    places = nodes * equations.size
     moving = [
         f"{point}: [{place.real:.6g}, {place.imag:.6g}]"
-        for point, place in zip(graph.nodes, places, strict=True)
+        for point, place in zip(graph.nodes, found.nodes, strict=True)
         if ":" not in point and (GROUND, point) not in graph.points
     ]
     return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", SKETCH)
@@ -132,7 +128,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     if group.form == "two slides":
         one, two = slides
         return f"the slides '{one}' and '{two}' are parallel, which holds nothing along them", "change a direction"
-    known, vectors, directions = loop_vectors(state, group)
+    known, vectors, directions = state.dyad(group)
     # By the angle that they turn with: links with the distance of the joints that they hold apart, and these joints.
     links: dict[int, str] = {}
     ends: dict[int, list[int]] = {}

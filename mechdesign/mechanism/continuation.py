@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, wrap
-from mechdesign.mechanism.state import NEWTON_STEPS, State
+from mechdesign.mechanism.solve import NEWTON_STEPS, State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 

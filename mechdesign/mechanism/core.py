@@ -115,9 +115,8 @@ class Core:
     @cached_property
     def size(self) -> float:
         """A characteristic length: the largest rigid vector of the mechanism, for tolerances and steps only."""
-        return max(
-            [abs(complex(w)) for w in self.geometry.nominal.w] + [abs(x) for x in self.sketch.nodes if x] + [0.0]
-        )
+        vectors = [*self.geometry.nominal.w, *(node for node in self.sketch.nodes if node is not None)]
+        return max((abs(complex(vector)) for vector in vectors), default=0.0)
 
     @property
     def equations(self) -> Equations:

@@ -1,12 +1,8 @@
 """Velocities, accelerations, Jacobians and sensitivities at a solved configuration, all in closed form.
 
-One edge is e = m U with m = w + s d and U = exp(i theta). Every derivative of it, of any order, in time or with
-respect to a dimension z, has the highest derivatives of theta and s in the same two places,
-
-    e^ = i m U theta^ + d U s^ + rest
-
-so all of them solve the loop equations of a group with the same small matrix and different right-hand sides
-[S3, eqs. 9-12]. Below, x' is a time derivative and x_z a derivative with respect to a dimension:
+All of them solve the loop equations of a group with the same small matrix and different right-hand sides
+[S3, eqs. 9-12]: those of the `rest` of each edge e = m U, m = w + s d (see `mechdesign.mechanism.loops`). Below, x' is
+a time derivative and x_z a derivative with respect to a dimension:
 
     e'    rest = 0
     e''   rest = (2 i theta' s' d - theta'^2 m) U
@@ -32,9 +28,9 @@ from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet, times
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.loops import Loops, gap_of, nothing, rows_of, tied, walk
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.solve import solve_linear
-from mechdesign.mechanism.state import State, columns, scalars
 from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.numerics.arrays import Floats
 
@@ -45,7 +41,7 @@ STALLED = 1e-6
 Entries = Sequence[Sequence[Value]]
 
 
-class Linearization(State):
+class Linearization(Loops):
     """The loop equations of the drives' groups at a configuration, ready to be solved for any right-hand side."""
 
     def __init__(self, structure: Structure, geometry: Geometry, configuration: Configuration) -> None:
@@ -69,7 +65,7 @@ class Linearization(State):
     def loop_columns(self, index: int, group: Group) -> list[list[Value]]:
         """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
         if index not in self._columns:
-            self._columns[index] = [columns(self, group, loop.edges)[1] for loop in group.loops]
+            self._columns[index] = [self.columns(group, loop.edges)[1] for loop in group.loops]
         return self._columns[index]
 
     @cached_property
@@ -92,7 +88,7 @@ class Linearization(State):
         lines = self.loop_columns(index, group)
         if len(lines) > 1:
             sides = [part for value in right for part in (-np.real(value), -np.imag(value))]
-            return solve_linear(_rows(lines), sides)[0]
+            return solve_linear(rows_of(lines), sides)[0]
         a, b = lines[0]
         if index not in self._scales:
             self._scales[index] = -1 / cross(a, b)
@@ -105,32 +101,20 @@ class Linearization(State):
     ) -> Rates:
         """Derivatives of all positions from those of the drives, the `rest` of each edge's, and of body offsets."""
         structure, offsets = self.structure, offsets or {}
-        angles: list[Any] = []
-        for tie in structure.ties:
-            total: Value = 0.0
-            for sign, k in tie.given:
-                total = total + sign * given[k]
-            for sign, body in tie.offsets:
-                total = total + sign * offsets.get(body, 0.0)
-            angles.append(total)
-        slides: list[Any] = [0.0] * len(self.slides)
+        angles = [tied(tie, given, offsets) for tie in structure.ties]
+        slides: list[Value] = [0.0] * len(self.slides)
         for slide, k in structure.known_slides:
             slides[slide] = given[k]
         nodes: list[Any] = [0.0, *[None] * (len(self.nodes) - 1)]
 
         def step(k: int) -> Value:
-            edge, total = structure.edges[k], rest[k]
-            if not _nothing(angles[edge.frame]):
-                total = plus(total, 1, self.edge(k) * (1j * angles[edge.frame]))
-            if edge.slide is not None and not _nothing(slides[edge.slide]):
-                total = plus(total, 1, slides[edge.slide] * self.direction(k))
-            return total
+            return self.change(k, angles, slides, rest[k])
 
         for index, group in enumerate(structure.groups):
             if group.form != "place":
                 right = []
                 for loop in group.loops:
-                    total = 0.0 if loop.start == loop.end else plus(nodes[loop.start], -1, nodes[loop.end])
+                    total = gap_of(loop, nodes)
                     for k, sign in loop.edges:
                         total = plus(total, sign, step(k))
                     right.append(total)
@@ -141,12 +125,7 @@ class Linearization(State):
                             angles[frame] = plus(angles[frame], 1, unknown)
                 for slide, unknown in zip(group.slides, unknowns[len(group.angles) :], strict=True):
                     slides[slide] = unknown
-            for k, sign in group.tree:
-                edge = structure.edges[k]
-                if sign > 0:
-                    nodes[edge.head] = plus(nodes[edge.tail], 1, step(k))
-                else:
-                    nodes[edge.tail] = plus(nodes[edge.head], -1, step(k))
+            walk(structure.edges, group.tree, nodes, step)
         return Rates(nodes, angles, slides, offsets)
 
     def velocity(self, rates: Sequence[Value]) -> Rates:
@@ -166,7 +145,7 @@ class Linearization(State):
         for k, edge in enumerate(self.structure.edges):
             omega = velocity.angles[edge.frame]
             total: Value = 0.0
-            if not _nothing(omega):
+            if not nothing(omega):
                 total = self.edge(k) * (-omega * omega)
                 if edge.slide is not None:
                     total = total + self.direction(k) * (2j * omega * velocity.slides[edge.slide])
@@ -180,10 +159,7 @@ class Linearization(State):
         Drives may be among them: the derivative is then that with respect to the drive.
         """
         given, explicit, offsets = self._explicit(places)
-        rest = [
-            self.turned(plus(w, 1, times(s, d)), edge.frame)
-            for (w, d), s, edge in zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
-        ]
+        rest = self._rests(explicit)
         axes = (1,) * len(self.configuration.shape)
         parameters = {
             name: np.array([float(place == own) for place in places]).reshape(-1, *axes)
@@ -225,26 +201,21 @@ class Linearization(State):
     def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Value]]:
         """Derivatives of `loop_columns` with respect to dimensions; `position` from `sensitivity`."""
         _, explicit, _ = self._explicit(places)
-        s, s_z = self._along(self.slides), self._along(position.slides)
-        found = []
-        for loop in group.loops:
-            by_root, by_slide = dict.fromkeys(group.angles, 0j), dict.fromkeys(group.slides, 0j)
-            for k, sign in loop.edges:
-                edge, (w_z, d_z) = self.structure.edges[k], explicit[k]
-                turn_z, root = 1j * position.angles[edge.frame], self.structure.ties[edge.frame].root
-                if root in by_root:
-                    arm_z = w_z + s[k] * d_z + s_z[k] * self.vectors.d[k]
-                    step = self.turned(arm_z, edge.frame) + turn_z * self.edge(k)
-                    by_root[root] = by_root[root] + sign * 1j * step
-                if edge.slide is not None and edge.slide in by_slide:
-                    step = self.turned(d_z, edge.frame) + turn_z * self.direction(k)
-                    by_slide[edge.slide] = by_slide[edge.slide] + sign * step
-            found.append([*by_root.values(), *by_slide.values()])
-        return found
+        rest = self._rests(explicit)
 
-    def direction(self, k: int) -> Value:
-        """World direction of an edge's slide; zero of an edge that has none."""
-        return self.turned(self.vectors.d[k], self.structure.edges[k].frame)
+        def edge_z(k: int) -> Value:
+            return self.change(k, position.angles, position.slides, rest[k])
+
+        def direction_z(k: int) -> Value:
+            frame = self.structure.edges[k].frame
+            return self.turned(explicit[k][1], frame) + 1j * position.angles[frame] * self.direction(k)
+
+        return [self.columns(group, loop.edges, edge_z, direction_z)[1] for loop in group.loops]
+
+    def _rests(self, explicit: Sequence[tuple[Value, Value]]) -> list[Value]:
+        """By edge, its derivatives with respect to dimensions without those of its angle and slide."""
+        pairs = zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
+        return [self.turned(plus(w, 1, times(s, d)), edge.frame) for (w, d), s, edge in pairs]
 
     def _along(self, slides: Sequence[Value]) -> list[Value]:
         """Displacements, or derivatives of them, by edge; zero for edges without a slide."""
@@ -277,15 +248,6 @@ class Linearization(State):
         return given, explicit, offsets
 
 
-def _nothing(value: Value) -> bool:
-    return isinstance(value, float) and value == 0.0
-
-
-def _rows(loop_columns: list[list[Value]]) -> list[list[Value]]:
-    """Loop equations of a group as rows of a real matrix."""
-    return [row for line in loop_columns for row in scalars(line)]
-
-
 def determinants(linearization: Linearization) -> list[Value]:
     """Per group of the drives' structure, the determinant of its loop equations; zero at a forward singularity."""
     found = []
@@ -293,7 +255,7 @@ def determinants(linearization: Linearization) -> list[Value]:
         if group.form == "place":
             continue
         lines = linearization.loop_columns(index, group)
-        found.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(_rows(lines), [0.0] * 2 * len(lines))[1])
+        found.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
     return found
 
 

@@ -289,7 +289,7 @@ def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
     ]
     sliding = [name for k, name in enumerate(graph.slides) if motion[angles + k]]
     legs = {graph.slides[k] for k in graph.telescopic}
-    moving = np.any(motion[inner:].reshape(2, -1) != 0, axis=0)
+    moving = np.any(motion[inner:].reshape(-1, 2) != 0, axis=1)
     moves = {graph.nodes[k + 1] for k in np.flatnonzero(moving)}
     frames = {graph.bodies[body][0] for body in turning}
     pivots = [(body, point) for body, point in graph.points if graph.bodies[body][0] in frames and point not in moves]

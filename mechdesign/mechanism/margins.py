@@ -11,10 +11,10 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, cross, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.loops import Unknowns, rows_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
-from mechdesign.mechanism.solve import equations, run, set_unknowns, solve_linear
-from mechdesign.mechanism.state import State, Unknowns, scalars, start_state
+from mechdesign.mechanism.solve import State, run, solve_linear
 from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
@@ -154,8 +154,7 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
             continue
         lines, changes = linear.loop_columns(index, group), linear.column_sensitivity(group, places, position)
         if group.form == "newton":
-            rows = [row for line in lines for row in scalars(line)]
-            changed = [row for line in changes for row in scalars(line)]
+            rows, changed = rows_of(lines), rows_of(changes)
             logarithmic: Value = 0.0
             for k in range(len(rows)):
                 column, column_z = [row[k] for row in rows], [row[k] for row in changed]
@@ -232,15 +231,15 @@ def _fold(
     def state_at(unknowns: Floats) -> State:
         """Everything up to the group, with its unknowns and the place in their own scales."""
         values = [np.asarray(value) for value in given(place + reach * unknowns[-1])]
-        state = start_state(plan.core.graph, plan.structure, near.vectors, values)
+        state = State.start(plan.core.graph, plan.structure, near.vectors, values)
         state.size = size
         run(state, plan.modes_at(values)[:index], guess)
-        set_unknowns(state, group, unknowns[:-1] * weights)
+        state.put(group, unknowns[:-1] * weights)
         return state
 
     def system(unknowns: Floats) -> tuple[Floats, float]:
         """Errors of the group's equations and their determinant, lengths in parts of the mechanism's size."""
-        rows, right = equations(state_at(unknowns), group)
+        rows, right = state_at(unknowns).equations(group)
         matrix = np.array(rows, dtype=float) * weights / size
         return np.array(right, dtype=float) / size, float(np.linalg.det(matrix))
 

@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, angle_of, nearest, quiet
+from mechdesign.mechanism.algebra import Value, nearest, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
 from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.core import Core
 from mechdesign.mechanism.geometry import Vectors
-from mechdesign.mechanism.solve import as_configuration, run
-from mechdesign.mechanism.state import CONVERGED, NEWTON_STEPS, State, Unknowns, start_state
+from mechdesign.mechanism.loops import Unknowns, unknowns_of
+from mechdesign.mechanism.solve import CONVERGED, NEWTON_STEPS, State, run
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.work.chunks import map_chunks, worker_count
@@ -81,7 +81,7 @@ class Plan:
         turns: Sequence[Value] | Floats = (),
     ) -> State:
         """Solve all groups, in the assembly as drawn unless `modes` says another; `turns` are near to `angles`."""
-        state = start_state(self.core.graph, self.structure, vectors, given)
+        state = State.start(self.core.graph, self.structure, vectors, given)
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
         state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
@@ -103,12 +103,8 @@ class Plan:
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.core.graph.edges) + position]
             rotations.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
-        found: list[Value] = []
-        for group in (self.structure.groups[index] for index in self.structure.unknowns):
-            found += [angle_of(np.asarray(rotations[root])) for root in group.angles]
-            found += [at.slides[slide] for slide in group.slides]
-            found += [part for base in group.bases for part in (np.real(at.nodes[base]), np.imag(at.nodes[base]))]
-        return found
+        groups = [self.structure.groups[index] for index in self.structure.unknowns]
+        return [value for group in groups for value in unknowns_of(group, at.nodes, rotations, at.slides)]
 
     def solve(
         self,
@@ -245,7 +241,7 @@ class Plan:
             at: Sequence[Value], sizes: Mapping[str, Value], guess: Floats, steps: int, near: Floats
         ) -> tuple[State, Floats]:
             state = self.run(at, geometry.vectors(sizes), guess, self.modes_at(at), steps, PATH_PRECISION, turns=near)
-            there = as_configuration(state)
+            there = state.pose()
             turned = [np.broadcast_to(there.value(angle), near.shape[1:]) for angle in self.angles]
             return state, np.array(turned).reshape(near.shape)
 

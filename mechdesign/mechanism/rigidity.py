@@ -10,20 +10,19 @@ depend on each other, the states of self-stress, the left one [Pellegrino and Ca
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import vector, wrap
-from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.algebra import Value, vector, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
-from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.loops import Loops, unknowns_of
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Structure, Undetermined
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.mechanism.structure import Structure, Undetermined, whole
+from mechdesign.numerics.arrays import Complexes, Floats
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7
@@ -47,19 +46,6 @@ class Equations:
     geometry: Geometry
     size: float
 
-    @cached_property
-    def _ends(self) -> tuple[Ints, Ints, Ints, Ints]:
-        edges = self.graph.edges
-        slides = [-1 if edge.slide is None else edge.slide for edge in edges]
-        columns = ([e.tail for e in edges], [e.head for e in edges], [e.frame for e in edges], slides)
-        tail, head, frame, slide = (np.array(column, dtype=np.intp) for column in columns)
-        return tail, head, frame, slide
-
-    @cached_property
-    def _arms(self) -> tuple[Complexes, Complexes]:
-        vectors = self.geometry.nominal
-        return np.array(vectors.w, dtype=np.complex128) / self.size, np.array(vectors.d, dtype=np.complex128)
-
     @property
     def angles(self) -> int:
         """Number of unknown angles, which come first."""
@@ -67,19 +53,26 @@ class Equations:
 
     @property
     def inner(self) -> int:
-        """Number of unknown angles and slides; the x of all nodes but the first follow, then the y."""
+        """Number of unknown angles and slides; x and y of each node but the first follow."""
         return self.angles + len(self.graph.slides)
 
-    def pack(self, nodes: Complexes, angles: Floats, slides: Floats) -> Floats:
-        """Unknowns from positions (lengths as in the study), angles of all classes and slides."""
-        scaled = nodes[1:] / self.size
-        return np.concatenate([angles[1:], slides / self.size, scaled.real, scaled.imag])
+    @cached_property
+    def _units(self) -> Floats:
+        """Radians and lengths that unknowns are counted in."""
+        unknowns = self.inner + 2 * (len(self.graph.nodes) - 1)
+        return np.where(np.arange(unknowns) < self.angles, 1.0, self.size)
 
-    def unpack(self, x: Floats) -> tuple[Complexes, Floats, Floats]:
-        """Positions as fractions of the size, angles of all classes, slides as fractions of the size."""
-        places = x[self.inner :].reshape(2, -1)
-        nodes = np.concatenate([[0j], vector(places[0], places[1])])
-        return nodes, np.concatenate([[0.0], x[: self.angles]]), x[self.angles : self.inner]
+    def pack(self, nodes: Sequence[Value], rotations: Sequence[Value], slides: Sequence[Value]) -> Floats:
+        """Unknowns from positions (lengths as in the study)."""
+        (group,) = whole(self.graph).groups
+        return np.array(unknowns_of(group, nodes, rotations, slides), dtype=float) / self._units
+
+    def at(self, x: Floats, held: Sequence[Coordinate] = ()) -> Loops:
+        """The loops at given unknowns, lengths as in the study, with held coordinates that should be zero."""
+        structure = whole(self.graph, held)
+        loops = Loops.start(self.graph, structure, self.geometry.nominal, [0.0] * len(held))
+        loops.put(structure.groups[0], x * self._units)
+        return loops
 
     def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
         """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
@@ -87,35 +80,29 @@ class Equations:
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
         known = np.isfinite(drawn)
         anywhere = self.size * vector(*rng.uniform(-0.5, 0.5, (2, len(drawn))))
-        nodes = np.where(known, drawn, drawn[known].mean() + anywhere)
+        nodes = list(np.where(known, drawn, drawn[known].mean() + anywhere))
         turns = [np.exp(1j * rng.uniform(-3, 3)) if turn is None else turn for turn in sketch.rotations]
-        angles = np.angle(np.array(turns, dtype=complex))
-        tail, head, frame, slide = self._ends
-        w, d = self._arms
-        slides = np.zeros(len(self.graph.slides))
-        for k in np.flatnonzero(slide >= 0):
-            along = (nodes[head[k]] - nodes[tail[k]]) * np.exp(-1j * angles[frame[k]]) - w[k] * self.size
-            slides[slide[k]] = (along * d[k].conjugate()).real
-        x = self.pack(nodes, angles, slides)
+        loops = replace(sketch, nodes=nodes, rotations=turns, slides=[*sketch.slides])
+        for k, edge in enumerate(self.graph.edges):
+            if edge.slide is not None:
+                loops.slides[edge.slide] = loops.displacement(k)
+        x = self.pack(nodes, turns, loops.slides)
         return x + spread * rng.uniform(-1, 1, len(x))
-
-    def _spans(self, x: Floats) -> tuple[Complexes, Complexes, Complexes]:
-        nodes, angles, slides = self.unpack(x)
-        tail, head, frame, slide = self._ends
-        w, d = self._arms
-        turn = np.exp(1j * angles[frame])
-        reach = np.append(slides, 0.0)[slide]
-        spans = (w + reach * d) * turn
-        return nodes[tail] + spans - nodes[head], spans, d * turn
 
     def gaps(self, x: Floats) -> Complexes:
         """By how much each edge misses its head, in the study's lengths."""
-        return self._spans(x)[0] * self.size
+        return self._system(self.at(x))[0].view(np.complex128) * self.size
 
     def jacobian(self, x: Floats, held: Sequence[Coordinate] = ()) -> Floats:
         """Derivatives of the equations (x and y of each edge, then the held coordinates) by the unknowns."""
-        _, spans, directions = self._spans(x)
-        return np.vstack([self._edge_rows(spans, directions), *(self._row(x, coordinate) for coordinate in held)])
+        return self._system(self.at(x, held))[1]
+
+    def _system(self, loops: Loops) -> tuple[Floats, Floats]:
+        """Errors of the equations and values of the held coordinates, lengths as fractions, and their derivatives."""
+        rows, errors = loops.equations(loops.structure.groups[0])
+        held = [self.size if c.quantity == "length" else 1.0 for c in loops.structure.given]
+        units = np.array([self.size] * 2 * len(self.graph.edges) + held)
+        return np.array(errors, dtype=float) / units, np.array(rows, dtype=float) * self._units / units[:, None]
 
     def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
         """The Jacobian for dimensions without any special relation (but the directions of slides).
@@ -129,43 +116,10 @@ class Equations:
 
     def drawn(self, held: Sequence[Coordinate], seed: int) -> Floats:
         """The Jacobian for dimensions drawn at random (but the directions of slides)."""
-        rng = np.random.default_rng(seed)
-        x = rng.uniform(-1, 1, self.inner + 2 * (len(self.graph.nodes) - 1))
-        tail, head, *_ = self._ends
-        nodes = self.unpack(x)[0]
-        rows = self._edge_rows(nodes[head] - nodes[tail], self._spans(x)[2])
-        return np.vstack([rows, *(self._row(x, coordinate) for coordinate in held)])
-
-    def _edge_rows(self, spans: Complexes, directions: Complexes) -> Floats:
-        tail, head, frame, slide = self._ends
-        count, nodes = len(tail), len(self.graph.nodes)
-        turning = np.zeros((count, self.graph.classes), dtype=complex)
-        rows = np.arange(count)
-        turning[rows, frame] = 1j * spans
-        sliding = np.zeros((count, len(self.graph.slides) + 1), dtype=complex)
-        sliding[rows, slide] = directions
-        placing = np.zeros((count, nodes))
-        placing[rows, tail] += 1
-        placing[rows, head] -= 1
-        inner = np.hstack([turning[:, 1:], sliding[:, :-1]])
-        none = np.zeros((count, nodes - 1))
-        both = [np.hstack([inner.real, placing[:, 1:], none]), np.hstack([inner.imag, none, placing[:, 1:]])]
-        return np.stack(both, axis=1).reshape(2 * count, -1)
-
-    def _configuration(self, x: Floats) -> Configuration:
-        nodes, angles, slides = self.unpack(x)
-        return Configuration(
-            self.graph, self.geometry.nominal, (), list(nodes * self.size), list(np.exp(1j * angles)),
-            list(slides * self.size), [], np.zeros((), dtype=np.int8), {},
-        )  # fmt: skip
-
-    def _row(self, x: Floats, coordinate: Coordinate) -> Floats:
-        every = [self.unpack(unit) for unit in np.eye(len(x))]
-        nodes, angles, slides = (np.array(part).T for part in zip(*every, strict=True))
-        # A length's derivative is that of its fraction of the size.
-        rates = Rates(list(nodes * self.size), list(angles), list(slides * self.size), {})
-        scale = self.size if coordinate.quantity == "length" else 1.0
-        return np.asarray(first(self._configuration(x), coordinate, rates)) / scale
+        loops = self.at(np.random.default_rng(seed).uniform(-1, 1, len(self._units)), held)
+        for k, edge in enumerate(self.graph.edges):
+            loops.w[k] += np.conj(loops.rotations[edge.frame]) * (loops.chord(k) - loops.edge(k))
+        return self._system(loops)[1]
 
     def solve(
         self, x: Floats, held: Sequence[tuple[Coordinate, float]] = (), step: Floats | None = None
@@ -182,21 +136,17 @@ class Equations:
         start = x if step is None else x + step
 
         def residual(y: Floats) -> Floats:
-            gaps = self._spans(y)[0]
-            misses = [self._miss(y, coordinate, value) for coordinate, value in held]
-            return np.concatenate([gaps.view(float), misses, ahead @ (y - start)])
+            errors, count = self._system(self.at(y, coordinates))[0], 2 * len(self.graph.edges)
+            for k, (coordinate, value) in enumerate(held, start=count):
+                miss = errors[k] - value / (self.size if coordinate.quantity == "length" else 1.0)
+                errors[k] = wrap(miss) if coordinate.quantity == "angle" else miss
+            return np.concatenate([errors, ahead @ (y - start)])
 
         def slope(y: Floats) -> Floats:
             return np.vstack([self.jacobian(y, coordinates), ahead])
 
         found = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
         return found.x, float(np.abs(found.fun).max(initial=0.0))
-
-    def _miss(self, x: Floats, coordinate: Coordinate, value: float) -> float:
-        miss = float(self._configuration(x).value(coordinate)) - value
-        if coordinate.quantity == "angle":
-            return float(wrap(miss))
-        return miss / self.size if coordinate.quantity == "length" else miss
 
     def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
@@ -240,13 +190,12 @@ class Equations:
 
         And how many more equations than unknowns are left.
         """
-        left = [k for k in range(len(self.graph.edges)) if k not in edges]
-        tail, head, _, slide = self._ends
-        placed = {int(node) for k in left for node in (tail[k], head[k])}
-        lonely = {int(node) for k in edges for node in (tail[k], head[k])} - placed - {0}
-        nodes = len(self.graph.nodes) - 1
-        gone = {frame - 1 for frame in classes} | {self.angles + int(slide[k]) for k in edges if slide[k] >= 0}
-        gone |= {self.inner + part + node - 1 for node in lonely for part in (0, nodes)}
+        every = self.graph.edges
+        left = [k for k in range(len(every)) if k not in edges]
+        placed, once = ({node for k in part for node in (every[k].tail, every[k].head)} for part in (left, edges))
+        slides = {slide for k in edges if (slide := every[k].slide) is not None}
+        gone = {frame - 1 for frame in classes} | {self.angles + slide for slide in slides}
+        gone |= {self.inner + 2 * (node - 1) + part for node in once - placed - {0} for part in (0, 1)}
         kept = [column for column in range(jacobian.shape[1]) if column not in gone]
         rows = [2 * k + part for k in left for part in (0, 1)]
         return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1]), len(rows) - len(kept)

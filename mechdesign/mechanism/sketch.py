@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import cross, dot
+from mechdesign.mechanism.algebra import cross
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
+from mechdesign.mechanism.loops import Loops, walk
 from mechdesign.mechanism.model import Description
-from mechdesign.mechanism.structure import Group, Structure
+from mechdesign.mechanism.structure import Group, Structure, whole
 
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01
@@ -21,45 +22,9 @@ SKETCH = "mechanism.sketch"
 _WITHOUT_MODE = ("place", "newton", "two slides")
 
 
-@dataclass(frozen=True)
-class Sketch:
+@dataclass
+class Sketch(Loops):
     """World position of each node and rotation of each angle class, `None` where the sketch does not tell."""
-
-    graph: Graph
-    geometry: Geometry
-    nodes: list[complex | None]
-    rotations: list[complex | None]
-
-    def lay_along_slide(self) -> bool:
-        """Lay a class that nothing else shows along one of its slides, taken as positive; False where there is none."""
-        for edge, d in zip(self.graph.edges, self.geometry.nominal.d, strict=True):
-            tail, head = self.nodes[edge.tail], self.nodes[edge.head]
-            if edge.slide is None or tail is None or head is None or tail == head:
-                continue
-            if self.rotations[edge.frame] is None:
-                self.rotations[edge.frame] = (head - tail) / abs(head - tail) * complex(d).conjugate()
-                return True
-        return False
-
-    def fit(self, frame: int) -> complex:
-        """Direction of a class as the least-squares fit to all points drawn on its links; 0 of fewer than two."""
-        total = 0j
-        for body, (its_frame, _) in self.graph.bodies.items():
-            if its_frame != frame:
-                continue
-            pairs = [
-                (complex(self.geometry.local(body, point, {})) * self.geometry.nominal.offsets[body], place)
-                for owner, point in self.graph.points
-                if owner == body and (place := self.nodes[self.graph.node(point)]) is not None
-            ]
-            if len(pairs) > 1:
-                middle = [sum(part, 0j) / len(pairs) for part in zip(*pairs, strict=True)]
-                total += sum(((place - middle[1]) * (local - middle[0]).conjugate() for local, place in pairs), 0j)
-        for k, edge in enumerate(self.graph.edges):
-            tail, head = self.nodes[edge.tail], self.nodes[edge.head]
-            if edge.frame == frame and edge.slide in self.graph.telescopic and tail is not None and head is not None:
-                total += (head - tail) * complex(self.geometry.nominal.d[k]).conjugate()
-        return total
 
     def modes(self, structure: Structure) -> tuple[int, ...]:
         """Assembly mode (+1 or -1) of each group of a structure as drawn; 0 for groups that have none.
@@ -88,28 +53,18 @@ class Sketch:
         if group.form in _WITHOUT_MODE:
             return 0
         (loop,) = group.loops
-        spans = dict.fromkeys(group.angles, 0j)
-        for k, sign in loop.edges:
-            edge = structure.edges[k]
-            root = structure.ties[edge.frame].root
-            if root in spans:
-                tail, head = self.nodes[edge.tail], self.nodes[edge.head]
-                assert tail is not None
-                assert head is not None
-                spans[root] += sign * (head - tail)
+        # A direction is unknown only where the whole link is drawn at one place, which decides nothing whatever it is.
+        turns = [1.0 if turn is None else turn for turn in self.rotations]
+        nodes = [np.nan if node is None else node for node in self.nodes]
+        drawn = replace(self, structure=structure, nodes=nodes, rotations=turns)
+        a, b = drawn.columns(group, loop.edges, drawn.chord)[1]
         if group.form == "two angles":
-            first, second = spans.values()
-            side, size = cross(first + second, first), abs(first + second) * min(abs(first), abs(second))
+            side, size = cross(a + b, a), abs(a + b) * min(abs(a), abs(b))
             ends = [self.graph.nodes[node] for node in (loop.start, loop.end)]
             line = f"the line {'-'.join(ends)}" if ends[0] != ends[1] and ":" not in "".join(ends) else "the line"
         else:
-            (span,), (slide,) = spans.values(), group.slides
-            k, sign = next((k, sign) for k, sign in loop.edges if structure.edges[k].slide == slide)
-            turn = self.rotations[structure.edges[k].frame]
-            # Unknown only where the whole link is drawn at one place, which decides nothing whatever the direction.
-            direction = sign * complex(self.geometry.nominal.d[k]) * (1.0 if turn is None else turn)
-            side, size = dot(span, direction if group.form == "angle and turning slide" else -direction), abs(span)
-            line = f"the perpendicular to slide '{self.graph.slides[slide]}'"
+            side, size = cross(b, a) if group.form == "angle and turning slide" else cross(a, b), abs(a)
+            line = f"the perpendicular to slide '{self.graph.slides[group.slides[0]]}'"
         if abs(side) <= UNDECIDED * size:
             names = " or ".join(f"'{name}'" for name in deciding_joints(self.graph, group))
             raise MechanismError(
@@ -126,14 +81,11 @@ class Sketch:
                 turn = self.rotations[self.graph.bodies[body][0]]
                 if turn is None:
                     return None
-                turns.append(turn * self.geometry.nominal.offsets[body])
+                turns.append(turn * self.vectors.offsets[body])
             return float(np.angle(turns[0] * np.conj(turns[1])))
         k, edge = next((k, e) for k, e in enumerate(self.graph.edges) if e.slide == coordinate.slide)
-        tail, head, turn = self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame]
-        if tail is None or head is None or turn is None:
-            return None
-        w, d = complex(self.geometry.nominal.w[k]), complex(self.geometry.nominal.d[k])
-        return float(dot(head - tail - w * turn, d * turn))
+        known = (self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame])
+        return None if any(value is None for value in known) else float(self.displacement(k))
 
     def unknowns(self, structure: Structure) -> list[float]:
         """Angles and slides of the groups without a closed form as drawn: where Newton's method starts."""
@@ -159,37 +111,63 @@ class Sketch:
 
 def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch:
     """Place whole links from the points drawn, and further points from the links so placed."""
-    nodes: list[complex | None] = [None] * len(graph.nodes)
-    rotations: list[complex | None] = [None] * graph.classes
-    nodes[0], rotations[0] = 0j, 1 + 0j
-    vectors = geometry.nominal
+    sketch = Sketch.start(graph, whole(graph), geometry.nominal, ())
+    nodes, rotations = sketch.nodes, sketch.rotations
     for k, name in enumerate(graph.nodes):
         if name in description.sketch:
             nodes[k] = description.sketch[name]
-    for edge, w in zip(graph.edges, vectors.w, strict=True):
+    for k, edge in enumerate(graph.edges):
         if edge.frame == 0 and edge.slide is None and edge.tail == 0:
-            nodes[edge.head] = complex(w)
-    sketch, changed = Sketch(graph, geometry, nodes, rotations), True
+            nodes[edge.head] = sketch.edge(k)
+    changed = True
     while changed:
         changed = False
         for frame in range(1, graph.classes):
             if rotations[frame] is None:
-                fit = sketch.fit(frame)
+                fit = _fit(sketch, geometry, frame)
                 if abs(fit) > 0:
                     rotations[frame] = fit / abs(fit)
                     changed = True
-        for edge, w in zip(graph.edges, vectors.w, strict=True):
-            turn = rotations[edge.frame]
-            if edge.slide is None and turn is not None:
-                tail, head = nodes[edge.tail], nodes[edge.head]
-                if tail is not None and head is None:
-                    nodes[edge.head] = tail + complex(w) * turn
-                    changed = True
-                elif head is not None and tail is None:
-                    nodes[edge.tail] = head - complex(w) * turn
-                    changed = True
-        changed = changed or sketch.lay_along_slide()
+        for k, edge in enumerate(graph.edges):
+            known = [nodes[end] is not None for end in (edge.tail, edge.head)]
+            if edge.slide is None and rotations[edge.frame] is not None and any(known) and not all(known):
+                walk(graph.edges, [(k, 1 if known[0] else -1)], nodes, sketch.edge)
+                changed = True
+        changed = changed or _lay_along_slide(sketch)
     return sketch
+
+
+def _lay_along_slide(sketch: Sketch) -> bool:
+    """Lay a class that nothing else shows along one of its slides, taken as positive; False where there is none."""
+    for k, edge in enumerate(sketch.graph.edges):
+        tail, head = sketch.nodes[edge.tail], sketch.nodes[edge.head]
+        if edge.slide is None or tail is None or head is None or tail == head:
+            continue
+        if sketch.rotations[edge.frame] is None:
+            sketch.rotations[edge.frame] = (head - tail) / abs(head - tail) * complex(sketch.vectors.d[k]).conjugate()
+            return True
+    return False
+
+
+def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
+    """Direction of a class as the least-squares fit to all points drawn on its links; 0 of fewer than two."""
+    graph, nodes, vectors, total = sketch.graph, sketch.nodes, sketch.vectors, 0j
+    for body, (its_frame, _) in graph.bodies.items():
+        if its_frame != frame:
+            continue
+        pairs = [
+            (complex(geometry.local(body, point, {})) * vectors.offsets[body], place)
+            for owner, point in graph.points
+            if owner == body and (place := nodes[graph.node(point)]) is not None
+        ]
+        if len(pairs) > 1:
+            middle = [sum(part, 0j) / len(pairs) for part in zip(*pairs, strict=True)]
+            total += sum(((place - middle[1]) * (local - middle[0]).conjugate() for local, place in pairs), 0j)
+    for k, edge in enumerate(graph.edges):
+        tail, head = nodes[edge.tail], nodes[edge.head]
+        if edge.frame == frame and edge.slide in graph.telescopic and tail is not None and head is not None:
+            total += (head - tail) * complex(vectors.d[k]).conjugate()
+    return total
 
 
 def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:

@@ -18,21 +18,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import reduce
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, dot, norm2, plus, rotation, times, vector
-from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.outputs import Rates, first
-from mechdesign.mechanism.state import State, Unknowns, columns, scalars
+from mechdesign.mechanism.algebra import Value, cross, dot, norm2, plus, times, vector
+from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
 
-# Dividing by a vector that has shrunk to nothing gives inf, where Python's own zero would raise.
-ZERO = np.float64(0.0)
 # In products of complex arrays a temporary stands first, or `np.multiply` is called: of long arrays NumPy's operator
 # computes the product in the temporary's place, with the factors exchanged if it is the second, and in other last bits.
 
@@ -42,7 +38,39 @@ CLOSURE_ROUNDING = 4e-15
 # Up to this many unknowns equations are solved by minors, array by array; more of them matrix by matrix.
 MINORS_ORDER = 4
 
+NEWTON_STEPS = 10
+# After a correction this small (radians, or parts of the mechanism's size) another one would be below rounding.
+CONVERGED = 1e-8
+
 Solution = tuple[Value, Value, tuple[Value, ...]]
+
+
+@dataclass
+class State(Loops):
+    """What is known of a mechanism while its groups are solved one after another.
+
+    Groups with a closed form leave their `closures`, with `beyond` also stretched or folded. The others are solved by
+    at most `steps` of Newton's corrections, until one is below `enough` (radians, or parts of the length `size`), and
+    leave their unknowns, which poses converged, and the determinant of their equations.
+    """
+
+    size: float = 1.0
+    steps: int = NEWTON_STEPS
+    enough: float = CONVERGED
+    beyond: bool = False
+    closures: list[Value] = field(default_factory=list)
+    unknowns: list[Value] = field(default_factory=list)
+    converged: list[Flags] = field(default_factory=list)
+    determinants: list[Value] = field(default_factory=list)
+
+    def solved(self, shape: tuple[int, ...], signs: Sequence[Value] | None = None) -> Flags:
+        """Which poses of a batch converged in all groups, with determinants of these signs."""
+        found = np.ones(shape, dtype=bool)
+        for converged in self.converged:
+            found &= converged
+        for determinant, sign in zip(self.determinants, signs or (), strict=False):
+            found &= np.sign(determinant) == sign
+        return found
 
 
 def solve_newton(state: State, index: int, guess: Unknowns) -> None:
@@ -56,8 +84,8 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(state.steps):
-        set_unknowns(state, group, found)
-        solution, determinant = solve_linear(*equations(state, group))
+        state.put(group, found)
+        solution, determinant = solve_linear(*state.equations(group))
         turned, moved = (reduce(np.maximum, map(np.abs, part), 0.0) for part in (solution[:count], solution[count:]))
         moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
@@ -67,76 +95,10 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
         active = np.asarray(moving)
         if not active.any():
             break
-    set_unknowns(state, group, found)
+    state.put(group, found)
     state.unknowns += found
     state.converged.append(~active)
     state.determinants.append(determinant)
-
-
-def set_unknowns(state: State, group: Group, unknowns: Unknowns) -> None:
-    """Put a group's angles, slides and, behind the slides, the x and y of its bases into a state."""
-    rest = iter(unknowns)
-    for root, value in zip(group.angles, rest, strict=False):
-        state.turn(root, rotation(value))
-    for slide, value in zip(group.slides, rest, strict=False):
-        state.slides[slide] = value
-    for base, x, y in zip(group.bases, rest, rest, strict=False):
-        state.nodes[base] = vector(x, y)
-
-
-def equations(state: State, group: Group) -> tuple[list[list[Value]], list[Value]]:
-    """Matrix (a list of rows) and errors of a group's equations at the state's angles and slides."""
-    rows: list[list[Value]] = []
-    errors: list[Value] = []
-    for loop in group.loops:
-        total, derivatives = columns(state, group, loop.edges)
-        rows += [[*row, *([0.0] * 2 * len(group.bases))] for row in scalars(derivatives)]
-        gap = plus(state.gap(loop), 1, total)
-        errors += [gap.real, gap.imag]
-    if group.conditions:
-        state.place(group)
-        configuration = as_configuration(state)
-        moves = _moves(state, group)
-        for which in group.conditions:
-            coordinate: Coordinate = state.structure.given[which]
-            rows.append([first(configuration, coordinate, move) for move in moves])
-            errors.append(configuration.value(coordinate) - state.given[which])
-    return rows, errors
-
-
-def as_configuration(state: State) -> Configuration:
-    """What is known of a state, as poses whose coordinates have values."""
-    return Configuration(
-        state.graph, state.vectors, (), state.nodes, state.rotations, state.slides, [], np.zeros((), np.int8), {},
-        state.near,
-    )  # fmt: skip
-
-
-def _moves(state: State, group: Group) -> list[Rates]:
-    """Derivatives of every position with respect to each of a group's unknowns."""
-    structure = state.structure
-    lengths = len(group.slides) + 2 * len(group.bases)
-    nodes: list[list[Value]] = [[0.0j] * len(state.nodes) for _ in range(len(group.angles) + lengths)]
-    into: dict[int, tuple[tuple[int, int], ...]] = {}
-    begun = {base: base for base in group.bases}
-    for k, sign in group.tree:
-        edge = structure.edges[k]
-        tail, head = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
-        into[head] = (*into.get(tail, ()), (k, sign))
-        _, derivatives = columns(state, group, into[head])
-        for j, value in enumerate(derivatives):
-            nodes[j][head] = value
-        if tail in begun:
-            begun[head] = begun[tail]
-    for node, base in begun.items():
-        j = len(group.angles) + len(group.slides) + 2 * group.bases.index(base)
-        nodes[j][node], nodes[j + 1][node] = 1.0 + 0.0j, 1.0j
-    angles = [[float(tie.root == root) for tie in structure.ties] for root in group.angles]
-    slides = [[float(slide == own) for slide in range(len(state.slides))] for own in group.slides]
-    still, held = [0.0] * len(structure.ties), [0.0] * len(state.slides)
-    turns = [*angles, *([still] * lengths)]
-    shifts = [*([held] * len(group.angles)), *slides, *([held] * 2 * len(group.bases))]
-    return [Rates(*each, {}) for each in zip(nodes, turns, shifts, strict=True)]
 
 
 def solve_linear(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:
@@ -214,33 +176,8 @@ def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, beg
     return state
 
 
-def loop_vectors(state: State, group: Group) -> tuple[Value, dict[int, Value], dict[int, Value]]:
-    """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d."""
-    structure = state.structure
-    loop = group.loops[0]
-    k: Value = ZERO if loop.start == loop.end else state.gap(loop)
-    z: dict[int, Value] = dict.fromkeys(group.angles, ZERO)
-    d: dict[int, Value] = {}
-    for index, sign in loop.edges:
-        edge = structure.edges[index]
-        root = structure.ties[edge.frame].root
-        unknown_slide = edge.slide is not None and edge.slide in group.slides
-        arm = state.w[index] if unknown_slide else state.arm(index)
-        if root in z:
-            arm = arm if isinstance(state.ties[edge.frame], float) else arm * state.ties[edge.frame]
-            z[root] = plus(z[root], sign, arm)
-            if unknown_slide:
-                direction = state.vectors.d[index]
-                d[edge.slide or 0] = sign * direction * state.ties[edge.frame]
-        else:
-            k = plus(k, sign, state.turned(arm, edge.frame))
-            if unknown_slide:
-                d[edge.slide or 0] = sign * state.turned(state.vectors.d[index], edge.frame)
-    return k, z, d
-
-
 def _closed_form(state: State, group: Group, mode: Value) -> None:
-    k, z, d = loop_vectors(state, group)
+    k, z, d = state.dyad(group)
     if group.form == "two angles":
         first, second = group.angles
         u1, u2, closures = two_angles(k, z[first], z[second], mode, state.beyond)

@@ -158,6 +158,16 @@ class _Ties:
         self.parent[a.root] = Tie(b.root, b.given + step.given + back.given, b.offsets + step.offsets + back.offsets)
 
 
+def whole(graph: Graph, given: Sequence[Coordinate] = ()) -> Structure:
+    """All unknowns of a graph as one group, every edge a loop between its ends, given coordinates conditions."""
+    loops = tuple(Loop(edge.tail, edge.head, ((k, 1),)) for k, edge in enumerate(graph.edges))
+    angles, slides, bases = (
+        tuple(range(*ends)) for ends in ((1, graph.classes), (0, len(graph.slides)), (1, len(graph.nodes)))
+    )
+    group = Group("newton", angles, slides, loops, (), tuple(range(len(given))), bases)
+    return Structure(tuple(given), graph.edges, tuple(Tie(k) for k in range(graph.classes)), (), (), (), (group,))
+
+
 def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
     """Decompose a graph for given coordinates.
 

@@ -1,0 +1,284 @@
+"""The loop equations of a mechanism: edges, what closes round a loop, and derivatives of both.
+
+One edge is e = (w + s d) U with U = exp(i theta). Every derivative of it, by an unknown, a drive or a dimension or in
+time, has those of the angle and of the slide in the same two places, and a rest that contains neither:
+
+    e^ = i e theta^ + d U s^ + rest
+
+A loop is a signed sum of edges between two nodes whose places are known, X_start + sum(sign e) - X_end = 0. The columns
+of its derivatives by the angles that edges turn with and by slides along them are thus sums of i e and of d U. Edges of
+a tree place the other nodes, and with the derivatives of edges in their place give those of the nodes. All that solves
+the equations, differentiates them, judges their rank or reads a sketch takes them from here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Self
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, angle_of, dot, plus, rotation, vector
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.geometry import Vectors
+from mechdesign.mechanism.graph import Edge, Graph
+from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.structure import Group, Loop, Structure, Tie
+from mechdesign.numerics.arrays import Floats
+
+# The unknowns of groups, one after another: angles, slides, then x and y of each base (see `Structure.unknowns`).
+Unknowns = Sequence[Value] | Floats
+# A vector of each edge, by its number.
+OfEdges = Callable[[int], Value]
+# Dividing by a vector that has shrunk to nothing gives inf, where Python's own zero would raise.
+ZERO = np.float64(0.0)
+
+
+@dataclass
+class Loops:
+    """The edges of a structure at positions found so far (`None` where not known yet), for coordinates `given`.
+
+    `w` are the vectors of the edges, given distances among them, and `ties` the rotations of classes against their
+    roots. `near` are values within half a turn of which angles in given expressions lie.
+    """
+
+    graph: Graph
+    structure: Structure
+    vectors: Vectors
+    w: list[Value]
+    nodes: list[Any]
+    rotations: list[Any]
+    ties: list[Value]
+    slides: list[Any]
+    given: Sequence[Value] = ()
+    near: Mapping[str, Value] = field(default_factory=dict)
+
+    @classmethod
+    def start(cls, graph: Graph, structure: Structure, vectors: Vectors, given: Sequence[Value]) -> Self:
+        """What is known before the first group: the ground, the given coordinates, and the ties between classes."""
+        nodes: list[Any] = [0.0, *[None] * (len(graph.nodes) - 1)]
+        slides: list[Any] = [None] * len(graph.slides)
+        ties: list[Value] = []
+        for tie in structure.ties:
+            turn: Value = rotation(tied(tie, given, {})) if tie.given else 1.0
+            for sign, body in tie.offsets:
+                offset = vectors.offsets[body]
+                if not isinstance(offset, float):
+                    turn = np.multiply(turn, offset if sign > 0 else np.conj(offset))
+            ties.append(turn)
+        rotations = [turn if tie.root == 0 else None for tie, turn in zip(structure.ties, ties, strict=True)]
+        for slide, k in structure.known_slides:
+            slides[slide] = given[k]
+        for k, coordinate in enumerate(structure.given):
+            # Half a point may stand in an expression before the other half is known.
+            if coordinate.kind in ("x", "y"):
+                pair = (given[k], np.nan) if coordinate.kind == "x" else (np.nan, given[k])
+                nodes[coordinate.node] = vector(*pair)
+        for node, x, y in structure.known_nodes:
+            nodes[node] = vector(given[x], given[y])
+        w = [*vectors.w, *(given[k] for _, k in structure.spans)]
+        return cls(graph, structure, vectors, w, nodes, rotations, ties, slides, given)
+
+    def arm(self, k: int) -> Value:
+        """Vector w + s d of an edge in the frame of its class."""
+        slide = self.structure.edges[k].slide
+        return self.w[k] if slide is None else self.w[k] + self.slides[slide] * self.vectors.d[k]
+
+    def turned(self, arm: Value, frame: int) -> Value:
+        """A vector of a class's frame in the world."""
+        turn = self.rotations[frame]
+        return arm if isinstance(turn, float) else arm * turn
+
+    def edge(self, k: int) -> Value:
+        """World vector of an edge whose rotation and slide are known."""
+        return self.turned(self.arm(k), self.structure.edges[k].frame)
+
+    def direction(self, k: int) -> Value:
+        """World direction of an edge's slide; zero of an edge that has none."""
+        return self.turned(self.vectors.d[k], self.structure.edges[k].frame)
+
+    def chord(self, k: int) -> Value:
+        """World vector between the ends of an edge where these are known."""
+        edge = self.structure.edges[k]
+        return self.nodes[edge.head] - self.nodes[edge.tail]
+
+    def displacement(self, k: int) -> Value:
+        """Displacement of an edge's slide between its ends where these and its rotation are known."""
+        frame = self.structure.edges[k].frame
+        return dot(self.chord(k) - self.turned(self.w[k], frame), self.direction(k))
+
+    def change(self, k: int, angles: Sequence[Value], slides: Sequence[Value], rest: Value = 0.0) -> Value:
+        """Derivative of an edge's world vector from those of all classes' angles and slides, and from its `rest`."""
+        edge = self.structure.edges[k]
+        if not nothing(angles[edge.frame]):
+            rest = plus(rest, 1, self.edge(k) * (1j * angles[edge.frame]))
+        if edge.slide is not None and not nothing(slides[edge.slide]):
+            rest = plus(rest, 1, slides[edge.slide] * self.direction(k))
+        return rest
+
+    def turn(self, root: int, turn: Value) -> None:
+        """Set the rotation of a root and of the classes tied to it."""
+        for frame, tie in enumerate(self.structure.ties):
+            if tie.root == root:
+                self.rotations[frame] = turn if isinstance(self.ties[frame], float) else turn * self.ties[frame]
+
+    def put(self, group: Group, unknowns: Unknowns) -> None:
+        """Set a group's angles, slides and, behind the slides, the x and y of its bases."""
+        rest = iter(unknowns)
+        for root, value in zip(group.angles, rest, strict=False):
+            self.turn(root, rotation(value))
+        for slide, value in zip(group.slides, rest, strict=False):
+            self.slides[slide] = value
+        for base, x, y in zip(group.bases, rest, rest, strict=False):
+            self.nodes[base] = vector(x, y)
+
+    def place(self, group: Group) -> None:
+        """Place the nodes of a group whose angles and slides are known."""
+        walk(self.structure.edges, group.tree, self.nodes, self.edge)
+
+    def columns(
+        self, group: Group, path: Sequence[tuple[int, int]], edge: OfEdges | None = None, along: OfEdges | None = None
+    ) -> tuple[Value, list[Value]]:
+        """Sum of the signed edges along `path`, and its derivatives with respect to a group's angles and slides.
+
+        Where `edge` and `along` give other vectors than those of the edges and their slides' directions, such as
+        derivatives of these, the sums are of them.
+        """
+        edge, along = edge or self.edge, along or self.direction
+        total: Value = 0.0
+        by_root: dict[int, Value] = dict.fromkeys(group.angles, 0.0)
+        by_slide: dict[int, Value] = dict.fromkeys(group.slides, 0.0)
+        for k, sign in path:
+            frame, slide = self.structure.edges[k].frame, self.structure.edges[k].slide
+            root, step = self.structure.ties[frame].root, edge(k)
+            total = plus(total, sign, step)
+            if root in by_root:
+                by_root[root] = plus(by_root[root], sign, step)
+            if slide is not None and slide in by_slide:
+                by_slide[slide] = plus(by_slide[slide], sign, along(k))
+        return total, [_quarter_turn(value) for value in by_root.values()] + list(by_slide.values())
+
+    def equations(self, group: Group) -> tuple[list[list[Value]], list[Value]]:
+        """Matrix (a list of rows) and errors of a group's equations at its angles, slides and bases."""
+        rows: list[list[Value]] = []
+        errors: list[Value] = []
+        for loop in group.loops:
+            total, derivatives = self.columns(group, loop.edges)
+            ends = [float((base == loop.start) - (base == loop.end)) for base in group.bases]
+            rows += rows_of([derivatives + [part for end in ends for part in (end, end * 1j)]])
+            gap = plus(gap_of(loop, self.nodes), 1, total)
+            errors += [gap.real, gap.imag]
+        if group.conditions:
+            self.place(group)
+            configuration = self.pose()
+            moves = self._moves(group)
+            for which in group.conditions:
+                coordinate = self.structure.given[which]
+                rows.append([first(configuration, coordinate, move) for move in moves])
+                errors.append(configuration.value(coordinate) - self.given[which])
+        return rows, errors
+
+    def _moves(self, group: Group) -> list[Rates]:
+        """Derivatives of every position with respect to each of a group's unknowns."""
+        moves = []
+        count = len(group.angles) + len(group.slides)
+        for j in range(count + 2 * len(group.bases)):
+            own = iter([float(j == k) for k in range(count)])
+            roots, slides = dict(zip(group.angles, own, strict=False)), dict(zip(group.slides, own, strict=False))
+            angles = [roots.get(tie.root, 0.0) for tie in self.structure.ties]
+            shifts = [slides.get(slide, 0.0) for slide in range(len(self.slides))]
+            nodes: list[Value] = [0.0j] * len(self.nodes)
+            if j >= count:
+                nodes[group.bases[(j - count) // 2]] = 1j if (j - count) % 2 else 1.0 + 0j
+            walk(self.structure.edges, group.tree, nodes, partial(self.change, angles=angles, slides=shifts))
+            moves.append(Rates(nodes, angles, shifts, {}))
+        return moves
+
+    def dyad(self, group: Group) -> tuple[Value, dict[int, Value], dict[int, Value]]:
+        """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d.
+
+        They are in the frames of the unknown angles' roots, where the unknowns themselves do not enter.
+        """
+        structure = self.structure
+        loop = group.loops[0]
+        k: Value = ZERO if loop.start == loop.end else gap_of(loop, self.nodes)
+        z: dict[int, Value] = dict.fromkeys(group.angles, ZERO)
+        d: dict[int, Value] = {}
+        for index, sign in loop.edges:
+            edge = structure.edges[index]
+            root = structure.ties[edge.frame].root
+            unknown_slide = edge.slide is not None and edge.slide in group.slides
+            arm = self.w[index] if unknown_slide else self.arm(index)
+            if root in z:
+                arm = arm if isinstance(self.ties[edge.frame], float) else arm * self.ties[edge.frame]
+                z[root] = plus(z[root], sign, arm)
+                if unknown_slide:
+                    direction = self.vectors.d[index]
+                    d[edge.slide or 0] = sign * direction * self.ties[edge.frame]
+            else:
+                k = plus(k, sign, self.turned(arm, edge.frame))
+                if unknown_slide:
+                    d[edge.slide or 0] = sign * self.direction(index)
+        return k, z, d
+
+    def pose(self) -> Configuration:
+        """What is known, as poses whose coordinates have values."""
+        return Configuration(
+            self.graph, self.vectors, (), self.nodes, self.rotations, self.slides, [], np.zeros((), np.int8), {},
+            self.near,
+        )  # fmt: skip
+
+
+def tied(tie: Tie, given: Sequence[Value], offsets: Mapping[str, Value]) -> Value:
+    """Angle of a class against its root, or a derivative of it, from those of coordinates and of bodies' offsets."""
+    total: Value = 0.0
+    for sign, k in tie.given:
+        total = plus(total, sign, given[k])
+    for sign, body in tie.offsets:
+        total = plus(total, sign, offsets.get(body, 0.0))
+    return total
+
+
+def gap_of(loop: Loop, nodes: Sequence[Value]) -> Value:
+    """Known part of a loop's closure error, or a derivative of it: from the node where it ends to that of its start."""
+    return 0.0 if loop.start == loop.end else plus(nodes[loop.start], -1, nodes[loop.end])
+
+
+def walk(edges: Sequence[Edge], tree: Sequence[tuple[int, int]], nodes: list[Value], step: OfEdges) -> None:
+    """Place nodes, or derivatives of their places, along signed edges from nodes that are known."""
+    for k, sign in tree:
+        begin, end = (edges[k].tail, edges[k].head) if sign > 0 else (edges[k].head, edges[k].tail)
+        nodes[end] = plus(nodes[begin], sign, step(k))
+
+
+def unknowns_of(
+    group: Group, nodes: Sequence[Value], rotations: Sequence[Value], slides: Sequence[Value]
+) -> list[Value]:
+    """A group's angles, slides, and x and y of its bases, at given positions; see `Loops.put`."""
+    found: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
+    found += [slides[slide] for slide in group.slides]
+    return found + [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
+
+
+def nothing(value: Value) -> bool:
+    """Whether a value is the plain zero of what does not depend on anything."""
+    return isinstance(value, float) and value == 0.0
+
+
+def _quarter_turn(value: Value) -> Value:
+    """i times a vector; a vector that no edge contributes to stays the plain zero."""
+    return value if isinstance(value, float) else vector(-value.imag, value.real)
+
+
+def rows_of(lines: Sequence[Sequence[Value]]) -> list[list[Value]]:
+    """Loop equations as rows of a real matrix: of each line of columns real and imaginary parts, each contiguous."""
+    return [[_part(column, name) for column in line] for line in lines for name in ("real", "imag")]
+
+
+def _part(value: Value, name: str) -> Value:
+    if isinstance(value, float):
+        return value if name == "real" else 0.0
+    part = getattr(value, name)
+    return np.ascontiguousarray(part) if np.ndim(part) else part
