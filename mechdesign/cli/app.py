@@ -230,7 +230,9 @@ def new(
 def _words(incomplete: str) -> list[str]:
     """Commands and options that a word may become; those of the study would take a second to find."""
     commands = _group().commands
-    options = {flag for command in commands.values() for each in command.params for flag in each.opts if flag[0] == "-"}
+    options = {
+        flag for command in commands.values() for param in command.params for flag in param.opts if flag[0] == "-"
+    }
     return sorted(word for word in {*commands, *options} if word.startswith(incomplete))
 
 

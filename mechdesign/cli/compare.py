@@ -141,7 +141,7 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
     found = Comparison(notes=[f"{folder}: {note}" for note in folders.notes(before, after)])
     folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
     again, listed = after["files"], content["files"]
-    told = {each.table for each in found.differences}
+    told = {difference.table for difference in found.differences}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
         table, digest = name.removesuffix(".csv"), listed.get(name, "")
@@ -196,12 +196,16 @@ def _junit(found: Comparison, command: str) -> str:
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    cases = dict.fromkeys([*found.cases, *((each.folder, each.table) for each in found.differences)])
+    cases = dict.fromkeys([*found.cases, *((difference.folder, difference.table) for difference in found.differences)])
     for folder in dict.fromkeys(folder for folder, _ in cases):
         suite = TestSuite(folder)
         for table in [name for where, name in cases if where == folder]:
             case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
-            wrong = [each for each in found.differences if (each.folder, each.table) == (folder, table)]
+            wrong = [
+                difference
+                for difference in found.differences
+                if (difference.folder, difference.table) == (folder, table)
+            ]
             if wrong:
                 failure = Failure(str(wrong[0]), type_="difference")
                 failure.text = "\n".join(map(str, wrong))

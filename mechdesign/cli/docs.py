@@ -75,7 +75,7 @@ def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
                 before = options[flag, given.help].where if (flag, given.help) in options else ()
                 takes = "" if given.is_flag else f"{flag} {given.metavar or given.type.name.upper()}"
                 options[flag, given.help] = Entry(flag, "option", given.help, takes=takes, where=(*before, name))
-        arguments = [each.metavar for each in command.params if each.param_type_name == "argument"]
+        arguments = [param.metavar for param in command.params if param.param_type_name == "argument"]
         some = ["[OPTIONS]"] * (len(command.params) > len(arguments))
         usage = " ".join(["mechdesign", name, *arguments, *some])
         yield Entry(name, "command", " ".join(command.help.split()), takes=usage)

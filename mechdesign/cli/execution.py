@@ -183,7 +183,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         journal.discard()
     shards.remove(directory)
-    warnings = [*(Caution("suspect", str(each)) for each in study.warnings), *result.warnings, *undrawn]
+    warnings = [*(Caution("suspect", str(warning)) for warning in study.warnings), *result.warnings, *undrawn]
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,

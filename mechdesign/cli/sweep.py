@@ -73,7 +73,7 @@ class Matrix:
 
 def _listed(texts: Sequence[str]) -> str:
     """Names with commas between them."""
-    return in_yaml([name.strip() for each in texts for name in each.split(",")])
+    return in_yaml([name.strip() for text in texts for name in text.split(",")])
 
 
 def _varied(text: str) -> tuple[str, Any]:
@@ -94,7 +94,7 @@ def _varied(text: str) -> tuple[str, Any]:
 def _as_typed(error: StudyError) -> StudyError:
     """The same mistakes under the options that say what `Matrix.overrides` made of them."""
     written = re.compile(r"--set matrix\.(?:best\.)?(\w+)=.*")
-    return StudyError([replace(each, file=written.sub(r"--\1", each.file)) for each in error.problems])
+    return StudyError([replace(problem, file=written.sub(r"--\1", problem.file)) for problem in error.problems])
 
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:

@@ -157,10 +157,10 @@ class Sheet:
 
     def answered(self) -> Answered:
         """All that was found."""
-        codes = np.array([max(each.values(), default=0) for each in self._reasons], dtype=float)
+        codes = np.array([max(reason.values(), default=0) for reason in self._reasons], dtype=float)
         codes = np.maximum(codes, ~self._met.all(axis=1))
         reasons: dict[str, int] = {"": 0}
-        number = [reasons.setdefault("; ".join(each), len(reasons)) for each in self._reasons]
+        number = [reasons.setdefault("; ".join(reason), len(reasons)) for reason in self._reasons]
         judged = np.stack([self._worst, self._met], axis=2).reshape(len(codes), -1)
         table = np.column_stack([codes, self._warnings, number, self._numbers, judged])
         return Answered(

@@ -120,7 +120,7 @@ class Answer:
 
 def commands_of(study: Study, wanted: Iterable[Wanted]) -> tuple[str, ...]:
     """The commands that a study's requirements and what is wanted need."""
-    needed = {command_of(each) for each in study.requirements} | {each.command for each in wanted}
+    needed = {command_of(requirement) for requirement in study.requirements} | {each.command for each in wanted}
     return tuple(command for command in COMMANDS if command in needed)
 
 

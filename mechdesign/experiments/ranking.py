@@ -37,9 +37,9 @@ def goals_of(best: Best | None) -> dict[Goal, int]:
     """What is to be large, with the sign -1, or small, with the sign 1."""
     chosen = [] if best is None else [("maximize", -1, best.maximize), ("minimize", 1, best.minimize)]
     return {
-        Goal(each.result, tuple(each.where.items()), ("matrix", "best", key, k)): sign
+        Goal(result.result, tuple(result.where.items()), ("matrix", "best", key, k)): sign
         for key, sign, results in chosen
-        for k, each in enumerate(results)
+        for k, result in enumerate(results)
     }
 
 

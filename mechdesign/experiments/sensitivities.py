@@ -68,9 +68,9 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
     wanted = wanted_in(SENSITIVITIES.name, section.results)
     found: list[Changing] = []
     problems: list[Problem] = []
-    for k, each in enumerate(section.parameters):
+    for k, parameter in enumerate(section.parameters):
         try:
-            changing = _changing(study, each)
+            changing = _changing(study, parameter)
             if changing.name in [other.name for other in found]:
                 raise StudyError(f"{changing.given} is listed twice")
             found.append(changing)
@@ -115,7 +115,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
-    cases = [Case(()), *(case for each in numbers for case in each.cases())]
+    cases = [Case(()), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
     tally = Tally(cases, len(wanted), 0)
     for answered in answers(plain, cases, wanted, jobs=jobs):
@@ -159,32 +159,32 @@ class Row:
 def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
     values = np.column_stack([tally.result(k)[0] for k in range(len(wanted))])
     middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(wanted))
-    slopes = [slope(middle, pair[0], pair[1], each.step) for each, pair in zip(numbers, sides, strict=True)]
+    slopes = [slope(middle, pair[0], pair[1], number.step) for number, pair in zip(numbers, sides, strict=True)]
     count = 2 * len(STEPS)
     reasons = [next(filter(None, map(tally.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
                for k in range(len(numbers))]  # fmt: skip
     for k, result in enumerate(wanted):
-        for each, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
+        for number, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
             value, error, below, above = (float(part[k]) for part in found_slope)
-            scale = abs(middle[k]) * _NOTHING / each.step
+            scale = abs(middle[k]) * _NOTHING / number.step
             doubt = ""
             if not math.isnan(below):
-                doubt = f"has a kink here; its slope is {below:.6g} below {each.value:g} and {above:.6g} above"
+                doubt = f"has a kink here; its slope is {below:.6g} below {number.value:g} and {above:.6g} above"
             elif math.isnan(value):
-                doubt = f"is not known near {each.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
+                doubt = f"is not known near {number.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
                 # Roughness wants longer steps, a curve that bends within them shorter ones.
-                other = each.step * 10 if each.step <= _PART * abs(each.value) else each.step / 10
+                other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "
-                    f"(few samples); another step may help, {{parameter: {each.given}, step: {other:g}}}"
+                    f"(few samples); another step may help, {{parameter: {number.given}, step: {other:g}}}"
                 )
-            yield Row(result.title, each.given, float(middle[k]), each.value, value, error, below, above, doubt)
+            yield Row(result.title, number.given, float(middle[k]), number.value, value, error, below, above, doubt)
 
 
 def _table(rows: Sequence[Row], result_units: Sequence[str], numbers: Sequence[Changing]) -> Table:
     units = [unit for unit in result_units for _ in numbers]
-    by = [each.unit for _ in result_units for each in numbers]
+    by = [number.unit for _ in result_units for number in numbers]
     ratio = [Units.ratio(one, other) for one, other in zip(units, by, strict=True)]
 
     def of(name: str) -> Floats:

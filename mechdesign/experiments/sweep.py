@@ -112,7 +112,7 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
 
 def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, Any]:
     """What pictures show: the entries that vary, the results with what is required of them, and which are goals."""
-    bounds = [(each.at_least, each.at_most) for each in study.requirements]
+    bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
     results = limits | {each.title: (None, None) for each in wanted}
     entries = [name for name, _ in tally.cases[0].changes]
@@ -155,10 +155,10 @@ def _array(units: Units, values: Sequence[Any]) -> NDArray[Any]:
 
 def requirement_names(study: Study) -> list[str]:
     """Columns of the requirements: the result that each judges, with its bounds where another judges the same."""
-    names = [f"|{each.name}|" if each.abs else each.name for each in study.requirements]
+    names = [f"|{requirement.name}|" if requirement.abs else requirement.name for requirement in study.requirements]
     return [
-        in_words(each) if names.count(name) > 1 else name
-        for each, name in zip(study.requirements, names, strict=True)
+        in_words(requirement) if names.count(name) > 1 else name
+        for requirement, name in zip(study.requirements, names, strict=True)
     ]  # fmt: skip
 
 

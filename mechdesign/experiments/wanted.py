@@ -82,7 +82,7 @@ class Wanted:
 def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:
     """What a section of the study names as its results."""
     return [
-        Wanted(each.result, tuple(each.where.items()), (section, "results", k)) for k, each in enumerate(results)
+        Wanted(result.result, tuple(result.where.items()), (section, "results", k)) for k, result in enumerate(results)
     ]  # fmt: skip
 
 

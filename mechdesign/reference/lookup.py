@@ -26,7 +26,7 @@ def find(entries: Sequence[Entry], word: str) -> list[Entry]:
     found = found or [entry for entry in entries if asked in (entry.kind, f"{entry.kind}s")]
     if not found:
         parts = [entry for entry in entries if entry.kind in ("prefix of units", "unit")]
-        pairs = ((one, other) for one in parts for other in parts if one.word.endswith("-"))
+        pairs = ((part, other) for part in parts for other in parts if part.word.endswith("-"))
         found = next(([*pair] for pair in pairs if word == pair[0].word.removesuffix("-") + pair[1].word), [])
     if not found and (above := place(word)):
         found = [entry for entry in entries if entry.kind == KIND and entry.plain == above]

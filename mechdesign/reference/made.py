@@ -49,7 +49,7 @@ def _made(call: ast.Call, scope: Scope) -> Iterator[Made]:
     elif name in MAKERS or (name.endswith("Error") and name not in FOREIGN):
         code = getattr(getattr(errors, name, None), "exit_code", 2)
         yield from (Made(each, scope, code) for each in call.args[: None if name in MAKERS else 1])
-    yield from (Made(each.value, scope, 3) for each in call.keywords if each.arg == "failed")
+    yield from (Made(keyword.value, scope, 3) for keyword in call.keywords if keyword.arg == "failed")
 
 
 def _given(nodes: Iterable[ast.AST]) -> dict[str, list[ast.expr]]:
@@ -98,15 +98,15 @@ class Reader:
     def made(self, file: str, node: ast.AST | None = None, scope: Scope | None = None) -> Iterator[Made]:
         """Messages of a file, or below a node of it, in the order of the source."""
         scope = scope or Scope(file, {})
-        for each in ast.iter_child_nodes(node or self.trees[file]):
+        for child in ast.iter_child_nodes(node or self.trees[file]):
             inner = scope
-            if isinstance(each, ast.FunctionDef):
-                inner = Scope(file, _given(ast.walk(each)))
-                if each.name in RETURNING:
-                    yield from (Made(value, inner, RETURNING[each.name]) for value in _returned(each))
-            elif isinstance(each, ast.Call):
-                yield from _made(each, scope)
-            yield from self.made(file, each, inner)
+            if isinstance(child, ast.FunctionDef):
+                inner = Scope(file, _given(ast.walk(child)))
+                if child.name in RETURNING:
+                    yield from (Made(value, inner, RETURNING[child.name]) for value in _returned(child))
+            elif isinstance(child, ast.Call):
+                yield from _made(child, scope)
+            yield from self.made(file, child, inner)
 
     def texts(self, node: ast.expr, scope: Scope, seen: frozenset[str] = frozenset()) -> Iterator[tuple[str, bool]]:
         """What an expression may read, `PLACE` for what differs; and, as parts, what may stand in its places."""
@@ -114,10 +114,10 @@ class Reader:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.value.replace("{}", PLACE), False
         elif isinstance(node, ast.JoinedStr):
-            words = (str(each.value) if isinstance(each, ast.Constant) else PLACE for each in node.values)
+            words = (str(value.value) if isinstance(value, ast.Constant) else PLACE for value in node.values)
             yield re.sub(f"{PLACE}+", PLACE, "".join(words)), False
-            places = [each.value for each in node.values if isinstance(each, ast.FormattedValue)]
-            yield from ((text, True) for each in places for text, _ in self.texts(each, scope, seen))
+            places = [value.value for value in node.values if isinstance(value, ast.FormattedValue)]
+            yield from ((text, True) for place in places for text, _ in self.texts(place, scope, seen))
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
             sides = [[*self.texts(each, scope, seen)] for each in (node.left, node.right)]
             whole = [[text for text, part in side if not part] or [PLACE] for side in sides]

@@ -95,8 +95,8 @@ def _owner(name: str) -> tuple[Group, int] | None:
 def find_messages(words: str) -> list[Entry]:
     """Entries of the messages in which these words stand, or that these words are."""
     found = [
-        Entry(told.text, KIND, ". ".join(filter(None, (f"{told.group.group}; {meaning(told)}", told.mend))))
-        for told in messages() if told.holds(words)
+        Entry(message.text, KIND, ". ".join(filter(None, (f"{message.group.group}; {meaning(message)}", message.mend))))
+        for message in messages() if message.holds(words)
     ]  # fmt: skip
     # What is between quotes in what is said of a group may be any part of a message.
     said = [group for group in groups() if any(part in words for part in re.findall('"(.+?)"', group.about))]

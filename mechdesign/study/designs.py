@@ -96,7 +96,7 @@ class Designs:
         return replace(
             study,
             **sections,
-            requirements=tuple(each.with_numbers(number) for each in study.requirements),
+            requirements=tuple(requirement.with_numbers(number) for requirement in study.requirements),
             targets={owner: _retabled(target, number) for owner, target in study.targets.items()},
             resolved=resolved,
             mechanism=Variant(study.mechanism, replace(description, places={**description.places, **new})),
@@ -123,7 +123,7 @@ class Designs:
         def number(amount: Amount) -> Amount:
             return Amount(float(self.numbers.of(amount)[k]), "", amount.expression)
 
-        return tuple(each.with_numbers(number) for each in self.study.requirements)
+        return tuple(requirement.with_numbers(number) for requirement in self.study.requirements)
 
     def take(self, rows: Ints) -> Designs:
         """Some of the designs."""

@@ -306,7 +306,7 @@ def course(name: str, given: PathSection, folder: Folder, value: Callable[[float
             return Polyline.through(places)
         if places.shape[1] < 3 or not np.diff(places, axis=1).all():
             raise StudyError(f"path: the spline of {name!r} needs three points or more, no two in succession the same")
-        splines = [Spline.through(each, given.points) for each in places]
+        splines = [Spline.through(place, given.points) for place in places]
         return splines[0] if len(splines) == 1 else Own(splines[0].count, splines)
     if table.shape[2] == 1:
         return np.asarray(table[..., 0])

@@ -68,7 +68,7 @@ def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int
         try:
             with_entries(study, [(name, value)])
         except StudyError as error:
-            yield from ((k, each.message) for each in error.problems if f"{each.key}.".startswith(f"{place}."))
+            yield from ((k, problem.message) for problem in error.problems if f"{problem.key}.".startswith(f"{place}."))
 
 
 def entry_unit(study: Study, name: str) -> str:

@@ -386,15 +386,15 @@ def _not_assembled(results: Sequence[MethodResult], task: Task) -> list[Caution]
 def _unassembled(results: Sequence[MethodResult]) -> list[Caution]:
     """Warnings of importance samples, drawn about the limits, that cannot be assembled."""
     warnings = []
-    for each in results:
-        used = [(METHODS[each.used.get(pose, each.method)], e) for pose, e in each.estimates.items()]
+    for result in results:
+        used = [(METHODS[result.used.get(pose, result.method)], e) for pose, e in result.estimates.items()]
         drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
         if drawn:
             invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
             warnings.append(Caution(
                 "unassembled",
-                f"{each.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they count "
-                "as failures",
+                f"{result.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they "
+                "count as failures",
             ))  # fmt: skip
     return warnings
 

@@ -44,7 +44,7 @@ def tick(axis: Axis, designs: Designs, name: str) -> bool:
     """Name the places of a variable's choices along an axis, unless they are many numbers; whether it has choices."""
     variable = variables_of(designs.study)[name]
     if variable.choices is not None and (variable.words or len(variable.choices) <= MAX_TICKS):
-        words = variable.words or [value_text(each) for each in variable.choices]
+        words = variable.words or [value_text(choice) for choice in variable.choices]
         axis.set_ticks(range(len(words)) if variable.words else variable.choices, [*map(folded, words)])
     return variable.choices is not None
 

@@ -149,7 +149,7 @@ def score_curves(designs: Designs) -> Figure:
             axes.set_yscale("log")
     among = "" if count == 1 else " over each variable"
     better = "" if many else f", {'less' if one.smallest else 'more'} is better"
-    what = f"Composite performance index of ({', '.join(each.name for each in designs.goals)})" if many else one.name
+    what = f"Composite performance index of ({', '.join(goal.name for goal in designs.goals)})" if many else one.name
     head(figure, f"{what}{among}{better}")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=fitting(labels) if style.narrow() else 5)
@@ -177,7 +177,7 @@ def _steep(values: Floats) -> bool:
 
 def score_surface(designs: Designs) -> Figure:
     """The score over two variables as a map, with the best design for each row of weights [S1, Fig. 3(b)]."""
-    goals = [each.name for each in designs.goals]
+    goals = [goal.name for goal in designs.goals]
     many = len(goals) > 1
     figure = style.new_figure(5.2)
     axes = figure.add_subplot()
@@ -231,7 +231,7 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     steps = [np.unique(np.round(v, 9)) for v in (x, y)]
     on_a_grid = len(steps[0]) * len(steps[1]) <= 4 * len(z)
     if not on_a_grid or len(steps[0]) < 2 or len(steps[1]) < 2 or len(z) < 4:
-        order = np.argsort(designs.cpi[inside] if any(each.smallest for each in designs.goals) else z)
+        order = np.argsort(designs.cpi[inside] if any(goal.smallest for goal in designs.goals) else z)
         axes.margins(0.03)
         return axes.scatter(x[order], y[order], c=z[order], s=14, cmap=style.COLORMAP, linewidths=0)
     levels, norm = style.levels(z.min(), z.max(), MAP_LEVELS), None
@@ -257,7 +257,7 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
 
 def parallel_axes(designs: Designs) -> Figure:
     """Each feasible design a line across its variables and goals, the colour its score, the best of all on top."""
-    names = [*designs.variables, *(each.name for each in designs.goals)]
+    names = [*designs.variables, *(goal.name for goal in designs.goals)]
     rows = np.flatnonzero(designs.feasible)
     rows = rows[np.argsort(designs.cpi[rows], kind="stable")]
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MAX_LINES)).astype(int))]

@@ -168,7 +168,7 @@ def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
         name = column.name.removesuffix("_effort").removesuffix("_mean")
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
-        low, high = (float(table[each][row]) for each in rule.bounds or (column.name, column.name))
+        low, high = (float(table[bound][row]) for bound in rule.bounds or (column.name, column.name))
         if rule.table is EXTREMES and low == high:
             # Of a motion of one pose.
             yield Headline(words["output"], shown(low), unit)
@@ -195,7 +195,7 @@ def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | N
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
     """The largest size of a table's numbers of a unit."""
-    alike = (each.values for each in table.columns if each.numeric and each.unit == unit)
+    alike = (column.values for column in table.columns if column.numeric and column.unit == unit)
     sizes = (np.abs(np.asarray(values, dtype=float)[rows]) for values in alike)
     return max(float(size.max(initial=0.0, where=np.isfinite(size))) for size in sizes)
 

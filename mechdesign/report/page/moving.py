@@ -193,7 +193,7 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     known = configuration.valid & (regularity(linear) >= STALLED)
     found = {}
     for point in sweep.places:
-        x, y = (first(configuration, each, velocity) for each in expand_outputs(study, (point,)))
+        x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
         found[point] = np.where(known, x + 1j * y, np.nan)
     speeds = np.abs(np.concatenate(list(found.values())))
     speeds = speeds[np.isfinite(speeds)]

@@ -78,11 +78,11 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     plots : bool
         Whether pictures are wanted.
     """
-    sections = [each.section for each in answers if each.section is not None]
+    sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
-    warnings += [(warning, each["command"]) for each in sections for warning in each["warnings"]]
-    moving = any(each["moving"] is not None for each in sections)
-    drawing = next((each["mechanism"] for each in sections if each["mechanism"]), "")
+    warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
+    moving = any(section["moving"] is not None for section in sections)
+    drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
     return _page(
         "report.html.j2",
@@ -181,10 +181,10 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
         *({"what": named(kind), "where": "", "limit": "\N{LESS-THAN OR EQUAL TO} 0"} for kind in study.barred),
     ]
     of_warnings = range(len(study.requirements), len(rules))
-    for each in answers:
-        for k, verdict in zip_longest([*judged_by(study, each.command), *of_warnings], each.verdicts):
-            about = {"command": each.command, "verdict": verdict, "met": verdict is not None and verdict.met}
-            rows.append((each.command == SWEEP.name, k, about | rules[k]))
+    for answer in answers:
+        for k, verdict in zip_longest([*judged_by(study, answer.command), *of_warnings], answer.verdicts):
+            about = {"command": answer.command, "verdict": verdict, "met": verdict is not None and verdict.met}
+            rows.append((answer.command == SWEEP.name, k, about | rules[k]))
     return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
 
 

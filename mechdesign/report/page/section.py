@@ -54,7 +54,7 @@ def section(
     shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
         "command": result.command,
-        "headlines": [dataclasses.asdict(each) for each in headlines(result.seen)],
+        "headlines": [dataclasses.asdict(headline) for headline in headlines(result.seen)],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),

@@ -100,7 +100,7 @@ class Checker:
         """Values that entries of the study have in cases of its matrix, or in designs."""
         matrix, optimize = self.parts.get("matrix"), self.parts.get("optimize")
         varied = [] if matrix is None else [each.values for each in (matrix.vary or {}).values()]
-        varied += [] if optimize is None else [each.choices for each in optimize.variables.values()]
+        varied += [] if optimize is None else [variable.choices for variable in optimize.variables.values()]
         return [value for values in varied for value in values or ()]
 
     def needs(self, section: str | None, what: str, path: KeyPath) -> None:

@@ -214,8 +214,8 @@ class MatrixSection(fields.Model):
         if self.best is not None:
             named |= {("matrix", "best", key): getattr(self.best, key) for key in ("maximize", "minimize")}
         for place, results in named.items():
-            for k, each in enumerate(results):
-                check_result(checker, each.result, (*place, k))
+            for k, result in enumerate(results):
+                check_result(checker, result.result, (*place, k))
         return self
 
     def table(self, folder: Folder) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]]:

@@ -85,11 +85,11 @@ class Variable(fields.Model):
     @property
     def numeric(self) -> bool:
         """Whether its values are numbers."""
-        return all(isinstance(each, int | float) and not isinstance(each, bool) for each in self.choices or ())
+        return all(isinstance(choice, int | float) and not isinstance(choice, bool) for choice in self.choices or ())
 
     @property
     def words(self) -> tuple[str, ...]:
         """Choices that are no numbers as tables name them; empty of numbers."""
         if self.numeric:
             return ()
-        return tuple(each if isinstance(each, str) else in_yaml(each) for each in self.choices or ())
+        return tuple(choice if isinstance(choice, str) else in_yaml(choice) for choice in self.choices or ())

@@ -505,7 +505,7 @@ class Model(BaseModel):
         form["description"] = cls.said_of_all()
         for key in cls.fields_by_key():
             text, examples = cls.said(key)
-            told = {"description": text, "examples": [read(each.encode(), key).data for each in examples]}
+            told = {"description": text, "examples": [read(example.encode(), key).data for example in examples]}
             form["properties"][key].update({name: value for name, value in told.items() if value})
         return {"anyOf": [dict(form), *cls.short]} if cls.short else found
 

@@ -141,7 +141,7 @@ def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
     """Failures among the design points with two variables exchanged, a little beyond: like parts fail alike."""
     u = _BEYOND * points.u[points.near]
     first, second = np.triu_indices(problem.dimension, 1)
-    point, pair = (each.ravel() for each in np.indices((len(u), len(first))))
+    point, pair = (index.ravel() for index in np.indices((len(u), len(first))))
     some = evenly(len(point), EXPLORED)
     point, pair, lane = point[some], pair[some], np.arange(len(some))
     u = u[point]

@@ -180,6 +180,11 @@ def _of_pairs(sources: Sources, covariance: Floats) -> Iterator[tuple[tuple[int,
 
 
 def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:
-    terms = [(each, value) for places, value in found.items() if value for each in sorted(set(permutations(places)))]
+    terms = [
+        (permutation, value)
+        for places, value in found.items()
+        if value
+        for permutation in sorted(set(permutations(places)))
+    ]
     index = np.array([each for each, _ in terms], dtype=np.intp).reshape(-1, order)
     return index, np.array([value for _, value in terms], dtype=float)

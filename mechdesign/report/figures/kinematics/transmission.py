@@ -138,8 +138,8 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     axis.axhspan(*GOOD, color=_BAND, linewidth=0, zorder=0, label=GOOD_WORDS)
     for end in GOOD:
         axis.axhline(end, color=style.GREEN, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
-    for each, (color, dashes) in zip(loops, _LOOKS, strict=False):
-        axis.plot(x, each.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(each))
+    for loop, (color, dashes) in zip(loops, _LOOKS, strict=False):
+        axis.plot(x, loop.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(loop))
     worst = loops[0]
     words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {worst.at:.4g}" if over.name else "")
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION

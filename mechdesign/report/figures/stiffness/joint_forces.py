@@ -129,19 +129,19 @@ def joint_force_figures(study: Study, result: Result) -> dict[str, Figure]:
 def _curves(study: Study, kinds: Mapping[str, Sequence[Joint]], loads: Sequence[str], over: Along) -> Figure:
     """Panels of forces and of moments for each load, the largest of each marked."""
     rows = [(number, kind, joints) for number in range(len(loads)) for kind, joints in kinds.items()
-            if any(np.nan_to_num(each.values[:, number]).any() for each in joints)]  # fmt: skip
+            if any(np.nan_to_num(joint.values[:, number]).any() for joint in joints)]  # fmt: skip
     looks = iter([{"color": color, "linestyle": dashes} for color, dashes in zip(_COLORS, _DASHES, strict=True)] * 2)
-    look = {(kind, each.name): next(looks) for kind, joints in kinds.items() for each in joints}
+    look = {(kind, joint.name): next(looks) for kind, joints in kinds.items() for joint in joints}
     handles = [Line2D([], [], linewidth=1.8, label=f"{kind} in {name}", **look[kind, name]) for kind, name in look]
     labels = [str(line.get_label()) for line in handles]
     bottom = 0.65 + _LEGEND_LINE * (0.2 + -(-len(labels) // fitting(labels)))
     figure, panels = stack(len(rows), HEADING, over.label, tall=_PANEL if len(rows) < 4 else _LOW_PANEL, bottom=bottom)
     for axes, (number, kind, joints) in zip(panels, rows, strict=True):
         unit = study.units.label(kind)
-        values = [np.abs(each.values[:, number]) if kind == "force" else each.values[:, number] for each in joints]
-        for each, curve in zip(joints, values, strict=True):
-            axes.plot(over.values, curve, linewidth=1.8, **look[kind, each.name])
-        worst = _mark_worst(study, axes, [each.name for each in joints], np.array(values), unit, over)
+        values = [np.abs(joint.values[:, number]) if kind == "force" else joint.values[:, number] for joint in joints]
+        for joint, curve in zip(joints, values, strict=True):
+            axes.plot(over.values, curve, linewidth=1.8, **look[kind, joint.name])
+        worst = _mark_worst(study, axes, [joint.name for joint in joints], np.array(values), unit, over)
         if kind == "force":
             axes.set_ylim(bottom=0)
         _in_powers(axes.yaxis, kind, unit, max(map(abs, axes.get_ylim())))
@@ -186,14 +186,14 @@ def _mark_worst(
 
 def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], over: Along) -> Figure:
     """Where the tip of each joint's force goes, drawn from the origin, a panel a load."""
-    shown = np.array([each.values[:, : len(loads)] for each in joints])
+    shown = np.array([joint.values[:, : len(loads)] for joint in joints])
     some = [number for number in range(len(loads)) if np.nan_to_num(shown[:, :, number]).any()]
     known = shown[np.isfinite(shown)]
     # As of the curves: what grows without bounds near a singularity is left out.
     places = np.append(known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)], 0.0)
     columns, unit = len(some), study.units.label("force")
     window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
-    labels = [f"{each.name.split(', ')[0]}: {each.words}" for each in joints]
+    labels = [f"{joint.name.split(', ')[0]}: {joint.words}" for joint in joints]
     rows = -(-len(labels) // fitting(labels))
     figure, panels = windows(window, "", columns, columns, above=0.28, top=0.34,
                              below=BELOW + 0.1 + _LEGEND_LINE * rows)  # fmt: skip

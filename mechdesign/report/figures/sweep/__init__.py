@@ -14,7 +14,7 @@ def figures(study: Study, result: Result) -> Gallery:
     """``main_effects`` and ``scatter``; of two numbers that vary or more ``response``."""
     table, found = result.main, Gallery()
     entries = [Axis.of(table.column(name)) for name in result.drawn["entries"]]
-    entries = [each for each in entries if len(each.distinct) > 1]
+    entries = [entry for entry in entries if len(entry.distinct) > 1]
     results = [Axis.of(table.column(name), *limits, varied=False) for name, limits in result.drawn["results"].items()]
     if entries and results:
         found.add("main_effects", main_effects, entries, results, len(table))

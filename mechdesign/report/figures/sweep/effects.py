@@ -114,7 +114,7 @@ def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, r
     columns = 1 if style.narrow() else 2
     words = [style.folded(kind.words, NAME, style.width() / columns - 0.6) for kind in kinds]
     legend = top
-    top += _LEGEND * -(-len(kinds) // columns) + style.line(NAME) * sum(each.count("\n") for each in words)
+    top += _LEGEND * -(-len(kinds) // columns) + style.line(NAME) * sum(word.count("\n") for word in words)
     figure, panels = style.page(size * size, size, side, top=top, across=_ACROSS, down=_DOWN, **_MARGINS)
     figure.text(0.01, 1 - 0.08 / figure.get_figheight(), head, va="top", fontsize=TITLE)
     for kind in kinds:

@@ -50,14 +50,14 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
     for all results. Where other entries vary, too, a map has the mean over them, or what is best where it is known
     which way is better, of the cases that meet every requirement, or else of the nearest miss.
     """
-    numbers = [each for each in entries if not each.words]
+    numbers = [entry for entry in entries if not entry.words]
     pairs = (Plane.of(x, y, others=len(entries) > 2) for x, y in combinations(numbers[:MOST_ENTRIES], 2))
     most = MOST_BELOW if style.narrow() else MOST_MAPS
     planes = [plane for plane in pairs if plane is not None][:most]
-    asked = sorted((each for each in results if each.ends), key=lambda each: each.name not in goals)
+    asked = sorted((result for result in results if result.ends), key=lambda each: each.name not in goals)
     if not planes or not asked:
         return None
-    taken, limited = asked[: most // len(planes)], [each for each in results if each.limits]
+    taken, limited = asked[: most // len(planes)], [result for result in results if result.limits]
     gates = [Gates.of(plane, limited, table) for plane in planes if limited]
     met = table["exit_code"] == 0
     counts = [met | gate.nearest for gate in gates] or [met] * len(planes)
@@ -74,7 +74,7 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
         for axes, plane, field in zip(panels[k :: len(taken)], planes, fields, strict=True):
             _map(axes, plane, field, norm)
             style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), ax=axes, pad=0.02)
-            rest = [each.name for each in entries if each not in (plane.x, plane.y)]
+            rest = [entry.name for entry in entries if entry not in (plane.x, plane.y)]
             over = f", {word} over {', '.join(rest) if len(rest) <= _MOST_OTHERS else f'{len(rest)} entries'}"
             name = style.axis_label(number.name, number.unit) + (over if rest else "")
             axes.set_title(style.folded(name, NAME, _room(panels)), loc="left", fontsize=NAME)

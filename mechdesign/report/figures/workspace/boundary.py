@@ -68,7 +68,7 @@ def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, befor
     study, shown = parts[0][1], [region for _, _, region in parts]
     assert study.workspace is not None
     poses = [_pose_inside(own, region) for _, own, region in parts]
-    reached = np.concatenate([np.ravel(each.point(point)) for each in poses for point in study.mechanism.points])
+    reached = np.concatenate([np.ravel(pose.point(point)) for pose in poses for point in study.mechanism.points])
     everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
                                  places_before(before)])  # fmt: skip
     title = f"workspace of point {study.workspace.point}, {title}"

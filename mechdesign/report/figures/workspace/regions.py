@@ -222,7 +222,7 @@ class Sheet:
     def ends(self, found: Sequence[Region]) -> None:
         """Draw what ends each region, a panel each, and its singularities, with a legend."""
         panels = list(zip(self.axes, found, strict=True))
-        self.legend(set().union(*(outline(*each) | loci(*each) for each in panels)))
+        self.legend(set().union(*(outline(*panel) | loci(*panel) for panel in panels)))
 
     def legend(self, seen: set[str]) -> None:
         """Entries in one row below the panels for what `outline` and `loci` have drawn."""
