@@ -91,13 +91,13 @@ class ColumnKind:
 class TableKind:
     """What a table is, and the kinds of its columns."""
 
-    name: str
+    name: str  #: that of its file, without ``.csv``
     meaning: str  #: one line; ``<places>`` stand for words of an answer
     kinds: tuple[ColumnKind, ...]
 
     @classmethod
     def of(cls, name: str, meaning: str, *kinds: ColumnKind | tuple[str, ...]) -> TableKind:
-        """A table of column kinds, or of their name, meaning, unit and formula."""
+        """A table of kinds of columns, each of which may be given as its name, meaning, unit and formula."""
         return cls(name, meaning, tuple(ColumnKind(*kind) if isinstance(kind, tuple) else kind for kind in kinds))
 
     @cached_property
@@ -113,7 +113,12 @@ class TableKind:
         Parameters
         ----------
         words : mapping
-            Labels of units by their kinds, and what stands at the places.
+            Labels of units by their kinds, as `mechdesign.study.Units.labels`, and what stands at the places.
+
+        Raises
+        ------
+        KeyError
+            If a column is not declared, or a unit or a place of it has no word.
         """
         units = {"": "", **words}
         return [self[name].column(column, units[self[name].unit], name, **words) for name, column in values.items()]
