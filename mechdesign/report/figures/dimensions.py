@@ -15,10 +15,11 @@ from matplotlib.textpath import text_to_path
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism, link_colors, link_labels, point_labels
+from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.labels import covered, paper, place_labels
 from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.shapes import link_colors, link_labels, point_labels
 from mechdesign.study import Study
 from mechdesign.study.schema.stiffness import Profile
 from mechdesign.study.schema.variation import LOADS, Dimension

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,9 +23,10 @@ _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
 _NET = 4.5  # points between two places of what names keep off
 _SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
-_HATCHED = 10.0  # width of a hatched line, points
+HATCHED = 10.0  # width of a hatched line, points
 _CLEARLY = 2.0  # points by which a name must be nearer to what it names than to another
 _UNCLEAR = 4.0  # what it costs where it is not
+_NO_ROOM = 5.5  # cost from which a name is left out that may be
 _LEADERLESS = 14.0  # points beyond a name's reach from where a line leads to its place
 _LEADER: dict[str, Any] = {"arrowstyle": "-", "linewidth": 0.7, "shrinkA": 0.5}
 _PALE = 0.5  # opacity below which a drawing may be written on
@@ -56,11 +57,76 @@ class Label:
     optional: bool = False
 
 
-def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: float) -> None:
-    """Write labels, one after another, each at the place that costs least.
+@dataclass(frozen=True)
+class Position:
+    """Where a label stands: by which of its anchors, its middle from there (points), and whether a line leads to it."""
 
-    A label that is not nearer to what it names than to another of its kind has a line to it. The axes' limits must be
-    final: what overlaps depends on the scale.
+    anchor: int
+    offset: Floats
+    leader: bool
+
+
+def positions(
+    labels: Sequence[Label], anchors: Sequence[Sequence[Floats]], nets: Sequence[Floats], window: Floats
+) -> list[Position | None]:
+    """Where labels stand, one after another, each at the place that costs least on average over some poses.
+
+    A label that is not nearer to what it names than to another of its kind has a line to it. None is an optional label
+    that finds no room.
+
+    Parameters
+    ----------
+    anchors : sequence of sequences of ndarray, shape (n, 2)
+        Of each pose the anchors of each label on paper.
+    nets : sequence of ndarray, shape (n, 2)
+        Of each pose the places on paper that names should not cover (`net`).
+    window : ndarray, shape (2, 2)
+        Lower left and upper right corner of the paper.
+    """
+    nets, poses = [net[np.argsort(net[:, 0])] for net in nets], len(nets)
+    taken, count = np.empty((poses, len(labels), 4)), 0
+    chosen: list[Position | None] = []
+    for which, label in enumerate(labels):
+        # Names of one kind could change places.
+        alike = [k for k, other in enumerate(labels) if k != which and other.size == label.size]
+        half = np.array([_LETTER * label.size * len(label.text), label.size]) / 2
+        offsets, strains = _offsets(label, half)
+        # Only what is within reach of some place can be covered.
+        reach = np.abs(offsets).max(axis=0) + half + 2
+        best: tuple[float, Position] | None = None
+        for rank in range(len(label.anchors)):
+            costs, unclear = strains + 0.4 * rank, np.zeros(len(offsets))
+            for named, net, boxes_taken in zip(anchors, nets, taken, strict=True):
+                origin = named[which][rank]
+                first, last = np.searchsorted(net[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
+                near = net[first:last]
+                near = near[np.abs(near[:, 1] - origin[1]) <= reach[1]]
+                written = boxes_taken[:count]
+                low, high = origin - reach, origin + reach
+                written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
+                boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
+                others = np.concatenate([named[k] for k in alike]) if alike else np.full((1, 2), np.inf)
+                doubtful = _distances(boxes, named[which]) + _CLEARLY > _distances(boxes, others)
+                costs = costs + _costs(boxes, near, written, window) / poses + _UNCLEAR * doubtful / poses
+                unclear += doubtful / poses
+            k = int(np.argmin(costs))
+            if best is None or costs[k] < best[0]:
+                far = np.hypot(*np.maximum(np.abs(offsets[k]) - half, 0.0)) > label.reach + _LEADERLESS
+                best = float(costs[k]), Position(rank, offsets[k], bool(far or unclear[k] > 0.5))
+        if best is None or (label.optional and best[0] > _NO_ROOM):
+            chosen.append(None)
+            continue
+        position = best[1]
+        middles = np.array([named[which][position.anchor] for named in anchors]) + position.offset
+        taken[:, count], count = np.column_stack([middles - half, middles + half]), count + 1
+        chosen.append(position)
+    return chosen
+
+
+def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: float) -> None:
+    """Write labels, one after another, each at the place that costs least (`positions`).
+
+    The axes' limits must be final: what overlaps depends on the scale.
 
     Parameters
     ----------
@@ -69,44 +135,16 @@ def place_labels(axes: Axes, labels: Sequence[Label], obstacles: Floats, order: 
     """
     window = paper(axes, np.array([complex(axes.get_xlim()[0], axes.get_ylim()[0]),
                                    complex(axes.get_xlim()[1], axes.get_ylim()[1])]))  # fmt: skip
-    obstacles = obstacles[np.argsort(obstacles[:, 0])]
-    named = [paper(axes, np.array(label.anchors)) for label in labels]
-    taken, count = np.empty((len(labels), 4)), 0
-    for label, own in zip(labels, named, strict=True):
-        # Names of one kind could change places.
-        alike = [
-            there for other, there in zip(labels, named, strict=True) if there is not own and other.size == label.size
-        ]
-        others = np.concatenate(alike) if alike else np.full((1, 2), np.inf)
-        half = np.array([_LETTER * label.size * len(label.text), label.size]) / 2
-        offsets, strains = _offsets(label, half)
-        # Only what is within reach of some place can be covered.
-        reach = np.abs(offsets).max(axis=0) + half + 2
-        best: tuple[float, complex, Floats, Floats, bool] | None = None
-        for rank, (anchor, origin) in enumerate(zip(label.anchors, own, strict=True)):
-            first, last = np.searchsorted(obstacles[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
-            near = obstacles[first:last]
-            near = near[np.abs(near[:, 1] - origin[1]) <= reach[1]]
-            written = taken[:count]
-            low, high = origin - reach, origin + reach
-            written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
-            boxes = np.column_stack([origin + offsets - half, origin + offsets + half])
-            unclear = _distances(boxes, own) + _CLEARLY > _distances(boxes, others)
-            costs = strains + 0.4 * rank + _costs(boxes, near, written, window) + _UNCLEAR * unclear
-            k = int(np.argmin(costs))
-            if best is None or costs[k] < best[0]:
-                best = float(costs[k]), anchor, offsets[k], boxes[k], bool(unclear[k])
-        if best is None or (label.optional and best[0] > 5.5):
+    anchors = [paper(axes, np.array(label.anchors)) for label in labels]
+    for label, position in zip(labels, positions(labels, [anchors], [obstacles], window), strict=True):
+        if position is None:
             continue
-        _, anchor, offset, box, unclear_here = best
-        taken[count], count = box, count + 1
+        anchor = label.anchors[position.anchor]
         # A line ends at what is named: a pin, or the arrow about it.
-        leader = None
-        if unclear_here or np.hypot(*np.maximum(np.abs(offset) - half, 0.0)) > label.reach + _LEADERLESS:
-            leader = _LEADER | {"color": label.color, "shrinkB": max(label.reach - 3.0, 3.0)}
+        leader = _LEADER | {"color": label.color, "shrinkB": max(label.reach - 3.0, 3.0)} if position.leader else None
         axes.annotate(
-            label.text, (anchor.real, anchor.imag), xytext=tuple(offset), textcoords="offset points", ha="center",
-            va="center", arrowprops=leader, color=label.color, fontsize=label.size,
+            label.text, (anchor.real, anchor.imag), xytext=tuple(position.offset), textcoords="offset points",
+            ha="center", va="center", arrowprops=leader, color=label.color, fontsize=label.size,
             fontstyle="italic" if label.optional else "normal", zorder=order,
             path_effects=HALO,
         )  # fmt: skip
@@ -134,30 +172,38 @@ def _points(axes: Axes, pixels: ArrayLike) -> Floats:
 
 def covered(axes: Axes) -> Floats:
     """Points on paper, shape (n, 2), in a net, that lines and symbols cover; what is pale may be written on."""
-    found = [np.empty(0, dtype=complex)]
-    filled = {patch for patch in axes.patches if to_rgba(patch.get_facecolor())[3]}
-    lines: list[Line2D | Patch] = [*axes.lines, *axes.patches]
-    for artist in lines:
+    lines: list[tuple[Complexes, float, bool]] = []
+    artists: list[Line2D | Patch] = [*axes.lines, *axes.patches]
+    for artist in artists:
         # The strokes of a hatched line stand beside it.
-        width = _HATCHED if artist.get_path_effects() else artist.get_linewidth()
+        width = HATCHED if artist.get_path_effects() else artist.get_linewidth()
         if not width or (artist.get_alpha() or 1.0) < _PALE:
             continue
+        filled = isinstance(artist, Patch) and bool(to_rgba(artist.get_facecolor())[3])
         path, moved = artist.get_path(), artist.get_transform()
         dots = isinstance(artist, Line2D) and artist.get_linestyle() == "None"
         pieces = moved.transform(path.vertices)[:, None] if dots else path.to_polygons(moved, closed_only=False)
-        for piece in filter(lambda piece: np.isfinite(piece).all(), pieces):
-            z = _points(axes, piece) @ np.array([1, 1j])
-            low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
-            if artist in filled and abs(high - low) < _SYMBOL:
-                x, y = (np.arange(a, b + _NET, _NET) for a, b in ((low.real, high.real), (low.imag, high.imag)))
-                found.append(np.add.outer(x, 1j * y).ravel())
-                continue
-            ends = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
-            line = np.interp(np.linspace(0.0, ends[-1], 2 + int(ends[-1] / _NET)), ends, z)
-            along = np.gradient(line)
-            across = 0.5j * width * along / np.maximum(np.abs(along), 1e-9)
-            found += [line - across, line, line + across]
-    every = np.concatenate(found)
+        lines += [(_points(axes, piece) @ np.array([1, 1j]), width, filled) for piece in pieces]
+    return net(lines)
+
+
+def net(lines: Iterable[tuple[Complexes, float, bool]]) -> Floats:
+    """Points in a net, shape (n, 2), that lines on paper cover, each with its width (points); small areas entirely."""
+    places = [np.empty(0, dtype=complex)]
+    for z, width, filled in lines:
+        if not np.isfinite(z).all():
+            continue
+        low, high = complex(z.real.min(), z.imag.min()), complex(z.real.max(), z.imag.max())
+        if filled and abs(high - low) < _SYMBOL:
+            x, y = (np.arange(a, b + _NET, _NET) for a, b in ((low.real, high.real), (low.imag, high.imag)))
+            places.append(np.add.outer(x, 1j * y).ravel())
+            continue
+        ends = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(z)))])
+        line = np.interp(np.linspace(0.0, ends[-1], 2 + int(ends[-1] / _NET)), ends, z)
+        along = np.gradient(line)
+        across = 0.5j * width * along / np.maximum(np.abs(along), 1e-9)
+        places += [line - across, line, line + across]
+    every = np.concatenate(places)
     return np.unique(np.round(np.column_stack([every.real, every.imag]) / _NET), axis=0) * _NET
 
 

@@ -15,10 +15,11 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import Travel, draw_mechanism
+from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
+from mechdesign.report.figures.shapes import Travel
 from mechdesign.results import Result
 from mechdesign.study import Study
 

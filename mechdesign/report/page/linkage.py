@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -18,23 +18,24 @@ from matplotlib.path import Path
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import (
-    BAR,
-    GROUND_HEIGHT,
-    PIN,
-    SLIDER_SIZE,
-    Color,
-    Travel,
-    bodies,
-    darker,
-    lighter,
-    link_colors,
-    reach,
-)
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures.framing import fit
-from mechdesign.report.figures.scene import Guide, Scene
+from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions
+from mechdesign.report.figures.scene import Scene
+from mechdesign.report.figures.shapes import (
+    TICK,
+    TICK_ANGLE,
+    TICK_SPACING,
+    Dashes,
+    Line,
+    Shape,
+    Symbol,
+    Travel,
+    link_colors,
+    link_labels,
+    mechanism_shapes,
+    point_labels,
+)
 
 # Of a drawing, in its own units, which are about points on paper: its width, its height at most, room around.
 WIDTH = 520.0
@@ -43,13 +44,7 @@ _PAD = 30.0
 _STRIP = 14.0  # below, for the bar of the scale
 _POINTS = 72.0
 _STEEL = "#777777"
-_RAIL_SPACING = 6.0
-_NAME = 12.0  # size of letters
-_LETTER = 0.6  # width of a letter in sizes
-_DIRECTIONS = 8  # in which names may stand
-_NET = np.linspace(0, 1, 9)  # places along a bar that names should not cover
-_FOOT = np.array([-10, -5, 0, 5, 10]) + 8j  # places that the symbol of a pivot covers
-_ROUND = ("stroke-linecap", "stroke-linejoin")
+_NAME = 12.0  # size of the letters of points
 _RULER = 0.3  # part of the width that the bar of the scale is long at most
 _LETTERS = {int(Path.MOVETO): "M", int(Path.LINETO): "L"}
 
@@ -111,52 +106,29 @@ class Body:
 
 
 class Sketcher:
-    """Draws a pose of a mechanism into an SVG element, layer by layer as `report.figures.drawing` does."""
+    """Draws a pose of a mechanism into an SVG element."""
 
-    def __init__(self, root: Element, sheet: Sheet, mechanism: Mechanism, scene: Scene) -> None:
-        self.root, self.sheet, self.scene = root, sheet, scene
-        self.colors = {name: to_hex(color) for name, color in link_colors(mechanism).items()}
+    def __init__(self, root: Element, sheet: Sheet, mechanism: Mechanism, scene: Scene, travel: Travel) -> None:
+        self.root, self.sheet, self.scene, self.travel = root, sheet, scene, travel
+        self.colors = link_colors(mechanism)
 
     def body(self, name: str) -> Body:
         """The frame in which the parts of a link are drawn."""
         point = self.scene.link_points(name)[0]
         return Body(name, point, self.scene.points[point], self.scene.rotations[name], self.sheet.scale)
 
-    def draw(self, travel: Travel) -> None:
+    def draw(self) -> None:
         """The mechanism without its names."""
-        scene = self.scene
-        for point in scene.pivots():
-            self._pivot(scene.points[point])
-        slotted = []
-        for guide in scene.guides:
-            ends = guide.ends(travel, scene.span)
-            if guide.owner == GROUND:
-                self._rail(*ends)
+        for shape in sorted(self._shapes(self.scene), key=lambda shape: shape.layer):
+            if isinstance(shape, Symbol):
+                self._symbol(shape)
+            elif shape.leg:
+                self._leg(shape, *shape.leg)
             else:
-                self._bar(guide.owner, reach(scene, guide, ends))
-                if guide.slider is None:
-                    slotted.append((guide.owner, ends))
-        # Plates below bars, as there.
-        for name, corners in sorted(bodies(scene), key=lambda found: len(found[1]) < 3):
-            if len(corners) > 2:
-                self._plate(name, corners)
-            elif len(corners) == 2:
-                self._bar(name, corners)
-        for owner, ends in slotted:
-            _line(self._moved(self.body(owner)), map(self.body(owner).local, ends), "white", BAR - 3.4)
-        for name, link in scene.description.links.items():
-            if link.telescopic and link.ends:
-                self._leg(*link.ends, self.colors[name])
-        for guide in scene.guides:
-            if guide.slider is not None:
-                self._block(guide, guide.slider)
-        owners: dict[str, str] = {}
-        for name in scene.description.links:
-            for point in scene.link_points(name):
-                owners.setdefault(point, name)
-        for point, kind in scene.kinds().items():
-            if kind != "none":
-                self._joint(point, kind, self.colors[owners[point]])
+                self._line(shape)
+
+    def _shapes(self, scene: Scene) -> list[Shape]:
+        return mechanism_shapes(scene, self.colors, self.travel)
 
     def _moved(self, body: Body) -> Element:
         """A group that moves with a link."""
@@ -167,65 +139,42 @@ class Sketcher:
         """A group that stays at a point."""
         return add(self.root, "g", data_at=point, transform=_shift(self.sheet.at(self.scene.points[point])))
 
-    def _pivot(self, place: complex) -> None:
-        foot = GROUND_HEIGHT - 3
-        group = add(self.root, "g", transform=_shift(self.sheet.at(place)), stroke=style.INK)
-        add(group, "path", d=f"M0 0L-8 {foot:g}L8 {foot:g}z", fill="#EEEEEE", stroke_width=1.2)
-        hatch = "".join(f"M{-10 + 5.5 * k:g} {foot:g}l-4 4" for k in range(5))
-        add(group, "path", d=f"M-12 {foot:g}H12{hatch}", stroke_width=1.1)
+    def _line(self, line: Line) -> None:
+        """A line or plate that moves with its link, or a rail."""
+        parent, places = self.root, [self.sheet.at(place) + line.rail.conjugate() for place in line.places]
+        if line.link != GROUND:
+            body = self.body(line.link)
+            parent, places = self._moved(body), [body.local(place) for place in line.places]
+        way = f"M{'L'.join(map(_pair, places))}{'z' * line.filled}" + (_ticks(*places) if line.rail else "")
+        look = {"fill": to_hex(line.color)} if line.filled else {}
+        path = add(parent, "path", d=way, stroke=to_hex(line.color), stroke_width=line.width, **look)
+        dashed(path, line.dashes, line.width)
 
-    def _rail(self, start: complex, end: complex) -> None:
-        """A guide fixed to the ground: the slide's line, and a hatched rail on its lower side."""
-        ends = sorted((self.sheet.at(start), self.sheet.at(end)), key=lambda place: (place.real, place.imag))
-        _line(self.root, ends, _STEEL, 0.8).set("stroke-dasharray", "9 3 2 3")
-        length = abs(ends[1] - ends[0])
-        along = (ends[1] - ends[0]) / length
-        down = 1j * along
-        begin = ends[0] + down * (SLIDER_SIZE[1] / 2 + 1.2)
-        marks = [begin + along * step for step in np.arange(_RAIL_SPACING, length, _RAIL_SPACING).tolist()]
-        hatch = "".join(f"M{_pair(mark)}l{_pair((down - along) * 3.5)}" for mark in marks)
-        way = f"M{_pair(begin)}L{_pair(begin + along * length)}{hatch}"
-        add(self.root, "path", d=way, stroke=style.INK, stroke_width=1.1)
+    def _leg(self, line: Line, base: str, tip: str, first: float, last: float) -> None:
+        """A part of a telescopic leg."""
+        begin, end = (self.sheet.at(place) for place in line.places)
+        add(self.root, "line", data_from=base, data_to=tip, data_part=f"{first:g} {last:g}", x1=begin.real,
+            y1=begin.imag, x2=end.real, y2=end.imag, stroke=to_hex(line.color), stroke_width=line.width,
+            stroke_linecap=line.cap)  # fmt: skip
 
-    def _bar(self, name: str, ends: Sequence[complex]) -> None:
-        body, color = self.body(name), self.colors[name]
-        group = self._moved(body)
-        _line(group, map(body.local, ends), color, BAR)
-        _line(group, map(body.local, ends), lighter(color), BAR - 2.4)
-
-    def _plate(self, name: str, corners: Sequence[complex]) -> None:
-        body, color = self.body(name), self.colors[name]
-        group = self._moved(body)
-        outline = "L".join(_pair(body.local(corner)) for corner in corners)
-        for shade, width in ((color, BAR), (to_hex(lighter(color)), BAR - 2.4)):
-            add(group, "path", d=f"M{outline}z", fill=shade, stroke=shade, stroke_width=width)
-
-    def _leg(self, base: str, tip: str, color: str) -> None:
-        """A telescopic leg: cylinder from the base, rod to the tip."""
-        looks = (("0 1", color, 3.6, "round"), ("0 1", lighter(color), 1.6, "round"),
-                 ("0.12 0.58", color, BAR + 3, "butt"), ("0.123 0.577", lighter(color), BAR + 0.6, "butt"))  # fmt: skip
-        begin, end = (self.sheet.at(self.scene.points[point]) for point in (base, tip))
-        for part, shade, width, cap in looks:
-            one, two = (begin + float(share) * (end - begin) for share in part.split())
-            add(self.root, "line", data_from=base, data_to=tip, data_part=part, x1=one.real, y1=one.imag, x2=two.real,
-                y2=two.imag, stroke=to_hex(shade), stroke_width=width, stroke_linecap=cap)  # fmt: skip
-
-    def _block(self, guide: Guide, slider: str) -> None:
-        """A slider, which lies along its guide."""
-        wide, high = SLIDER_SIZE
-        color, body = self.colors[slider], self.body(slider)
-        transform = f"{_shift(body.local(guide.pin))} {_turned(guide.along / body.turn)}"
-        add(self._moved(body), "rect", x=-wide / 2, y=-high / 2, width=wide, height=high, transform=transform,
-            fill=to_hex(lighter(color)), stroke=color, stroke_width=1.4)  # fmt: skip
-
-    def _joint(self, point: str, kind: str, color: str) -> None:
-        group = self._placed(point)
-        if kind == "clamp":
-            add(group, "rect", x=-PIN, y=-PIN, width=2 * PIN, height=2 * PIN, fill=style.INK)
-        elif kind == "pin":
-            add(group, "circle", r=PIN, fill="white", stroke=style.INK, stroke_width=1.5)
+    def _symbol(self, symbol: Symbol) -> None:
+        colors = (("fill", symbol.fill), ("stroke", symbol.edge))
+        look = {key: to_hex(color) for key, color in colors if color} | {"stroke_width": symbol.width}
+        origin, turn = 0j, symbol.direction
+        if symbol.link != GROUND:
+            body = self.body(symbol.link)
+            parent, origin, turn = self._moved(body), body.local(symbol.place), turn / body.turn
+        elif symbol.point:
+            parent = self._placed(symbol.point)
         else:
-            add(group, "circle", r=PIN - 0.8, fill=color, stroke=style.INK, stroke_width=1)
+            parent = add(self.root, "g", transform=_shift(self.sheet.at(symbol.place)))
+        lines = [[_pair(origin + (place * turn).conjugate()) for place in line] for line in symbol.outlines]
+        if symbol.radius:
+            add(parent, "circle", r=symbol.radius, **look)
+        elif symbol.fill:
+            add(parent, "polygon", points=" ".join(lines[0]), **look)
+        else:
+            add(parent, "path", d="".join(f"M{'L'.join(line)}" for line in lines), **look)
 
     def trace(self, places: Complexes, color: str, width: float, share: float) -> None:
         """The path of a point; the script may hide it."""
@@ -233,52 +182,51 @@ class Sketcher:
             stroke_width=width, opacity=share)  # fmt: skip
 
     def names(self, scenes: Sequence[Scene]) -> None:
-        """Names of the points, each on the side where it covers least in some poses of the motion, and of the links."""
-        slid = {guide.point for guide in self.scene.guides if guide.slider is not None}
-        shown = [point for point, kind in self.scene.kinds().items() if kind != "none" or point in slid]
-        nets = [self._covered(scene) for scene in scenes]
-        for point in shown:
-            half = complex(_LETTER * _NAME * len(point), _NAME) / 2
-            costs = []
-            for k in range(_DIRECTIONS):
-                toward = cmath.exp(2j * math.pi * k / _DIRECTIONS - 0.25j * math.pi)
-                shift = (PIN + 4) * toward + complex(half.real * _clip(toward.real), half.imag * _clip(toward.imag))
-                cost = 0.02 * k
-                for scene, net in zip(scenes, nets, strict=True):
-                    away = net - self.sheet.at(scene.points[point]) - shift
-                    inside = (np.abs(away.real) < half.real + 2) & (np.abs(away.imag) < half.imag + 2)
-                    cost += np.count_nonzero(inside) / len(scenes)
-                costs.append((cost, k, shift))
-            _, _, shift = min(costs, key=lambda found: found[:2])
-            add(self._placed(point), "text", point, x=shift.real, y=shift.imag + 0.35 * _NAME, text_anchor="middle",
-                font_size=_NAME, fill=style.INK, stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
+        """Names of the points and links, each where it covers least in some poses of the motion.
 
-        for name in self.scene.description.links:
-            if name != GROUND:
-                self._link_name(name)
+        Those of links stay level; the script shows them on request.
+        """
+        points = [replace(label, size=_NAME) for label in point_labels(self.scene)]
+        links = [replace(label, optional=False) for label in link_labels(self.scene, self.colors, driven=True)]
+        bodies = [self.body(label.text) for label in links]
+        anchors = []
+        for scene in scenes:
+            places = [np.array([scene.points[label.text]]) for label in points]
+            for label, body in zip(links, bodies, strict=True):
+                turn = scene.rotations[body.name] / body.turn
+                places.append(scene.points[body.point] + turn * (np.array(label.anchors) - body.place))
+            anchors.append([_rows(self._paper(z)) for z in places])
+        nets = [net(map(self._outline, self._shapes(scene))) for scene in scenes]
+        window = _rows(np.array([-1j * self.sheet.height, self.sheet.width]))
+        chosen = positions([*points, *links], anchors, nets, window)
+        for label, position in zip(points, chosen, strict=False):
+            if position:
+                self._name(self._placed(label.text), label, position)
+        for label, body, position in zip(links, bodies, chosen[len(points) :], strict=True):
+            if position:
+                anchor = label.anchors[position.anchor]
+                looks = {"data-offset": _pair(body.local(anchor)), "class": "moving-name moving-off"}
+                group = add(self.root, "g", data_at=body.point, data_turn=body.name,
+                            transform=_shift(self.sheet.at(anchor)), **looks)  # fmt: skip
+                self._name(group, label, position, font_style="italic")
 
-    def _link_name(self, name: str) -> None:
-        """A link's name at its middle, which stays level; the script shows it on request."""
-        body, ends = self.body(name), self.scene.link_points(name)
-        middle = sum(self.scene.points[point] for point in ends) / len(ends)
-        at, offset = self.sheet.at(middle), body.local(middle)
-        looks = {"data-offset": _pair(offset), "class": "moving-name moving-off"}
-        group = add(self.root, "g", data_at=body.point, data_turn=name, transform=_shift(at), **looks)
-        # Above the middle of a bar, in a plate, below a slider, whose point has its name above.
-        y = {1: SLIDER_SIZE[1] / 2 + _NAME, 2: -BAR / 2 - 3}.get(len(ends), 0.35 * _NAME)
-        color = to_hex(darker(self.colors[name]))
-        add(group, "text", name, y=y, text_anchor="middle", font_size=_NAME - 2, font_style="italic", fill=color,
-            stroke="white", stroke_width=2.6, paint_order="stroke")  # fmt: skip
+    def _name(self, group: Element, label: Label, position: Position, **looks: str) -> None:
+        """A name at its position from the origin of a group."""
+        x, y = position.offset.tolist()
+        add(group, "text", label.text, x=x, y=0.35 * label.size - y, text_anchor="middle", font_size=label.size,
+            fill=to_hex(label.color), stroke="white", stroke_width=2.6, paint_order="stroke", **looks)  # fmt: skip
 
-    def _covered(self, scene: Scene) -> Complexes:
-        """Places along the links of a pose, and its joints."""
-        found = [np.array([self.sheet.at(place) for place in scene.points.values()])]
-        found += [self.sheet.at(scene.points[point]) + _FOOT for point in scene.pivots()]
-        for name in scene.description.links.keys() - {GROUND}:
-            corners = [self.sheet.at(scene.points[point]) for point in scene.link_points(name)]
-            for begin, end in zip(corners, corners[1:] + corners[:1], strict=True):
-                found.append(begin + _NET * (end - begin))
-        return np.concatenate(found)
+    def _paper(self, places: Complexes) -> Complexes:
+        """Places of the study in points from the sheet's upper left corner, the y axis up."""
+        return (places - self.sheet.corner) * self.sheet.scale
+
+    def _outline(self, shape: Shape) -> tuple[Complexes, float, bool]:
+        """What a shape covers: its outline on paper, its width, whether it is an area."""
+        if isinstance(shape, Line):
+            outline = self._paper(np.array(shape.places)) + shape.rail
+            return outline, HATCHED if shape.rail else shape.width, shape.filled
+        around = shape.radius * np.array([1, 1j, -1, -1j]) if shape.radius else np.concatenate(shape.outlines)
+        return self._paper(np.array(shape.place)) + around * shape.direction, shape.width, shape.fill is not None
 
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
@@ -297,14 +245,16 @@ def add(parent: Element, kind: str, /, text: str | None = None, **looks: str | f
     return element
 
 
+def dashed(element: Element, dashes: Dashes, width: float) -> None:
+    """Give a line of some width its dashes."""
+    if not isinstance(dashes, str):
+        element.set("stroke-dasharray", " ".join(_number(width * part) for part in dashes[1]))
+
+
 def rounded(value: float) -> float:
     """The largest of 1, 2, 5 times powers of ten that is not above a value."""
     power = 10.0 ** math.floor(math.log10(value))
     return max(step * power for step in (1, 2, 5) if step * power <= value)
-
-
-def _clip(part: float) -> float:
-    return max(-1.0, min(1.0, 1.3 * part))
 
 
 def _number(value: float) -> str:
@@ -324,5 +274,13 @@ def _turned(direction: complex) -> str:
     return f"rotate({_number(-math.degrees(cmath.phase(direction)))})"
 
 
-def _line(group: Element, ends: Iterable[complex], color: Color, width: float) -> Element:
-    return add(group, "path", d=f"M{'L'.join(map(_pair, ends))}", stroke=to_hex(color), stroke_width=width)
+def _ticks(begin: complex, end: complex) -> str:
+    """The strokes of a hatched rail."""
+    along = (end - begin) / abs(end - begin)
+    stroke = _pair(TICK * along * cmath.exp(-1j * math.radians(TICK_ANGLE)))
+    steps = np.arange(TICK_SPACING, abs(end - begin), TICK_SPACING).tolist()
+    return "".join(f"M{_pair(begin + step * along)}l{stroke}" for step in steps)
+
+
+def _rows(places: Complexes) -> Floats:
+    return np.column_stack([places.real, places.imag])

@@ -98,10 +98,10 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
     """The first of some valid poses, with the paths of the points."""
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
-    sketcher = Sketcher(root, sheet, whole.mechanism, scene)
+    sketcher = Sketcher(root, sheet, whole.mechanism, scene, whole.travel)
     for look in path_looks(whole):
         sketcher.trace(look.path, look.color, look.width, look.share)
-    sketcher.draw(whole.travel)
+    sketcher.draw()
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
     return tostring(root, encoding="unicode")

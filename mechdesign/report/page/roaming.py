@@ -23,7 +23,7 @@ from mechdesign.report.figures.scene import pose, travels
 from mechdesign.report.figures.workspace.boundary import solved_inside
 from mechdesign.report.figures.workspace.index_maps import contours, index_columns, index_norm
 from mechdesign.report.figures.workspace.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
-from mechdesign.report.page.linkage import Sheet, Sketcher, add
+from mechdesign.report.page.linkage import Sheet, Sketcher, add, dashed
 from mechdesign.report.page.tracks import Moving, Numbers, places
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -75,11 +75,11 @@ def roaming(study: Study, result: Result) -> Moving | None:
         if norm is not None:
             _map(layer, sheet, region, index, norm)
         _boundary(layer, sheet, region)
-    sketcher = Sketcher(root, sheet, mechanism, scene)
     few = evenly(len(rows), _NAMED_POSES).tolist()
-    scenes = list(filter(None, (pose(mechanism, configuration, index) for index in few)))
-    sketcher.draw(travels([scene, *scenes]))
-    sketcher.names([scene, *scenes])
+    scenes = list(filter(None, (pose(mechanism, configuration, index) for index in [begin, *few])))
+    sketcher = Sketcher(root, sheet, mechanism, scene, travels(scenes))
+    sketcher.draw()
+    sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
     _legend(root, sheet, found, found[0].local.column(index) if index else None, norm)
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
@@ -161,8 +161,7 @@ def _fill(layer: Element, sheet: Sheet, local: Table, color: str) -> None:
 def _look(line: Element, kind: str) -> None:
     color, dashes, width, _ = LOOKS[kind]
     line.attrib |= {"stroke": to_hex(color), "stroke-width": f"{width:g}"}
-    if dashes != "-":
-        line.set("stroke-dasharray", " ".join(f"{width * part:g}" for part in dashes[1]))
+    dashed(line, dashes, width)
 
 
 def _legend(

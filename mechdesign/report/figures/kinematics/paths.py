@@ -14,12 +14,13 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
 from mechdesign.report.before import Before
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism, link_colors
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
+from mechdesign.report.figures.shapes import link_colors
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 

@@ -13,9 +13,9 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from mechdesign.analyses.reliability.simulation import CELLS, REACH
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import lighter
 from mechdesign.report.figures.panels import title
 from mechdesign.report.figures.reliability.looks import Sampled, heading, look
+from mechdesign.report.figures.shapes import lighter
 
 # Shares of the made mechanisms that an ellipse or a region holds, with the ellipses' dashes and the regions' tints.
 SHARES = (0.5, 0.9, 0.997)

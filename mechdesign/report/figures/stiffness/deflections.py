@@ -20,10 +20,11 @@ from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import ARC, Pen, draw_mechanism
+from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
 from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.shapes import ARC, arc, force
 from mechdesign.report.figures.stiffness.joint_forces import load_in_words
 from mechdesign.report.figures.stiffness.springs import LARGEST_MOVE
 from mechdesign.results import Result
@@ -70,14 +71,15 @@ def deflections_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | Non
         draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
         for line in lines:
             axes.plot(line.real, line.imag, color=style.INK, linewidth=1.8, zorder=5)
-        moved, pen = lines[0][0], Pen(axes, order=5.5)
+        moved = lines[0][0]
         axes.plot([at.real, moved.real], [at.imag, moved.imag], ":", color=style.BLUE, linewidth=1.4, zorder=5.2)
         axes.plot([moved.real], [moved.imag], "o", color=style.BLUE, zorder=6)
         # The arrows act where the load does: at the asked point, here where it has moved.
-        if force := complex(*load[:2]):
-            pen.force(moved, force / abs(force), style.VERMILION)
+        if push := complex(*load[:2]):
+            draw(axes, force(moved, push / abs(push), style.VERMILION), order=5.5)
         if load[2:] and load[2]:
-            pen.arc(moved, -np.pi / 4, np.copysign(1.5 * np.pi, load[2]), ARC, style.VERMILION)
+            sweep = np.copysign(1.5 * np.pi, load[2])
+            draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
         size, name = abs(shapes[0][1][0, k]), asked.section.at
         axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {size:.3g} {length}\n"
                        f"drawn {scale:g} times as large", loc="left", fontsize=9)  # fmt: skip

@@ -15,11 +15,12 @@ from mechdesign.analyses.poses import pose_in_words
 from mechdesign.analyses.stiffness.analysis import Drawn
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism, point_labels
+from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import quantity
 from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.shapes import point_labels
 from mechdesign.results import Result
 from mechdesign.study import Poses, Study
 

@@ -1,0 +1,348 @@
+"""What is drawn of a mechanism in a pose, for Matplotlib and SVG alike: lines and symbols in layers, and names."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.colors import to_rgb
+
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.report.figures import style
+from mechdesign.report.figures.labels import Label
+from mechdesign.report.figures.scene import Guide, Scene, hull
+
+# Of symbols, in points on paper.
+BAR = 8.0  # width of a link
+PIN = 3.6  # radius of a joint
+GROUND_HEIGHT = 13.0
+SLIDER_SIZE = (22.0, 13.0)  # along its guide and across
+ARC = 25.0  # radius of an angle drive's arrow
+FORCE = 34.0  # length of a force's arrow
+TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
+_NESTING = 9.0  # between the arrows of drives at one pivot
+_PUSH = 30.0  # length of a straight arrow
+_MIN_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
+_STEEL = "#777777"
+_GHOST = "#777777"
+DRIVE_COLOR = style.VERMILION
+LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
+Color = str | tuple[float, float, float]
+Dashes = str | tuple[float, tuple[float, ...]]  # as Matplotlib has them: "-", or dashes and gaps in widths of the line
+Travel = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through places of the mechanism, or a filled plate with this outline.
+
+    Parameters
+    ----------
+    width : float
+        Points on paper.
+    layer : float
+        A shape lies above those of lower layers, and above earlier ones of its own.
+    link : str
+        The link in which its places are fixed.
+    leg : tuple, optional
+        A part of a telescopic leg: both end points, and between which shares of its length the line runs.
+    rail : complex
+        Displacement on paper (points) of a rail, which is hatched on its left; 0 for a plain line.
+    """
+
+    places: Sequence[complex]
+    color: Color
+    width: float
+    layer: float
+    link: str = GROUND
+    leg: tuple[str, str, float, float] | None = None
+    filled: bool = False
+    cap: str = "round"
+    dashes: Dashes = "-"
+    rail: complex = 0j
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A symbol in points on paper at a place of the mechanism, its x axis along `direction`.
+
+    Parameters
+    ----------
+    outlines : sequence of sequences of complex
+        Lines, or the corners of one area where there is a `fill`.
+    radius : float
+        Of a circle in place of the outlines.
+    width : float
+        Of the edge, points.
+    point : str
+        The point at which it stays.
+    link : str
+        The link in which it is fixed.
+    """
+
+    place: complex
+    layer: float
+    outlines: Sequence[Sequence[complex]] = ()
+    radius: float = 0.0
+    fill: Color | None = None
+    edge: Color | None = style.INK
+    width: float = 1.0
+    dashes: Dashes = "-"
+    direction: complex = 1.0
+    point: str = ""
+    link: str = GROUND
+
+
+Shape = Line | Symbol
+
+
+def lighter(color: str, share: float = 0.62) -> Color:
+    """A colour mixed with white."""
+    red, green, blue = (1 - (1 - part) * (1 - share) for part in to_rgb(color))
+    return red, green, blue
+
+
+def darker(color: str, share: float = 0.3) -> Color:
+    """A colour mixed with black, for text."""
+    red, green, blue = (part * (1 - share) for part in to_rgb(color))
+    return red, green, blue
+
+
+def link_colors(mechanism: Mechanism) -> dict[str, str]:
+    """The colour of each link, the same in every picture."""
+    moving = [name for name in mechanism.description.links if name != GROUND]
+    return {name: LINK_COLORS[k % len(LINK_COLORS)] for k, name in enumerate(moving)} | {GROUND: style.INK}
+
+
+def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) -> list[Shape]:
+    """A mechanism in one pose without drives and names; guides are as long as the `travel` of their slides."""
+    shapes: list[Shape] = []
+    for point in scene.pivots():
+        shapes += _pivot(scene.points[point])
+    for guide in scene.guides:
+        shapes += _guide(scene, guide, colors, guide.ends(travel, scene.span))
+    for rank, (name, body) in enumerate(bodies(scene)):
+        if len(body) > 2:
+            # A smaller plate lies on a larger one, all of them below the bars.
+            layer = 0.1 * (1 - 0.5**rank)
+            shapes += [Line(body, shade, width, layer, name, filled=True)
+                       for shade, width in ((colors[name], BAR), (lighter(colors[name]), BAR - 2.4))]  # fmt: skip
+        elif len(body) == 2:
+            shapes += _bar(body, colors[name], name)
+    owners: dict[str, str] = {}
+    for name, link in scene.description.links.items():
+        if link.telescopic and link.ends:
+            shapes += _leg(scene, link.ends, colors[name])
+        for point in scene.link_points(name):
+            owners.setdefault(point, name)
+    for point, kind in scene.kinds().items():
+        place = scene.points[point]
+        if kind == "pin":
+            shapes.append(Symbol(place, 0.5, radius=PIN, fill="white", width=1.5, point=point))
+        elif kind == "clamp":
+            shapes.append(Symbol(place, 0.5, (_rectangle(PIN, PIN),), fill=style.INK, point=point))
+        elif kind == "tracer":
+            shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
+    return shapes
+
+
+def _rectangle(half: float, high: float) -> tuple[complex, ...]:
+    return complex(-half, -high), complex(half, -high), complex(half, high), complex(-half, high)
+
+
+def _pivot(place: complex) -> list[Symbol]:
+    """The ground symbol under a pivot: triangle and hatch."""
+    foot = -GROUND_HEIGHT + 3
+    hatch = [(complex(x, foot), complex(x - 4, foot - 4)) for x in (-10 + 5.5 * k for k in range(5))]
+    return [
+        Symbol(place, 0.0, ((0j, complex(-8, foot), complex(8, foot)),), fill="#EEEEEE", width=1.2),
+        Symbol(place, 0.0, ((complex(-12, foot), complex(12, foot)), *hatch), width=1.1),
+    ]
+
+
+def _guide(scene: Scene, guide: Guide, colors: Mapping[str, str], ends: tuple[complex, complex]) -> list[Shape]:
+    """A rail of the ground, or a bar with a slot, and the slider on it."""
+    shapes: list[Shape] = []
+    if guide.owner == GROUND:
+        shapes += _rail(*ends)
+    else:
+        shapes += _bar(reach(scene, guide, ends), colors[guide.owner], guide.owner)
+        if guide.slider is None:
+            shapes.append(Line(ends, "white", BAR - 3.4, 0.12, guide.owner))
+    if guide.slider is not None:
+        color, half = colors[guide.slider], SLIDER_SIZE[0] / 2
+        shapes.append(Symbol(guide.pin, 0.2, (_rectangle(half, SLIDER_SIZE[1] / 2),), fill=lighter(color), edge=color,
+                             width=1.4, direction=guide.along, link=guide.slider))  # fmt: skip
+    return shapes
+
+
+def _rail(start: complex, end: complex) -> list[Shape]:
+    """A guide fixed to the ground: the slide's line, and a hatched rail on its lower side."""
+    along = (end - start) / abs(end - start)
+    down = -1j * along if (-1j * along).imag <= 0 else 1j * along
+    # Ticks stand on the left of the rail: it runs so that this is away from the slider.
+    first, last = (start, end) if (1j * along * down.conjugate()).real > 0 else (end, start)
+    return [
+        Line((start, end), _STEEL, 0.8, 0.0, dashes=(0, (9, 3, 2, 3))),
+        Line((first, last), style.INK, 1.2, 0.0, cap="projecting", rail=down * (SLIDER_SIZE[1] / 2 + 1.2)),
+    ]
+
+
+def _bar(ends: Sequence[complex], color: str, link: str) -> list[Shape]:
+    return [Line(ends, color, BAR, 0.1, link), Line(ends, lighter(color), BAR - 2.4, 0.11, link)]
+
+
+def _leg(scene: Scene, ends: tuple[str, str], color: str) -> list[Shape]:
+    """A telescopic leg: cylinder from the base, rod to the tip."""
+    base, tip = (scene.points[end] for end in ends)
+    parts = (
+        (0.0, 1.0, color, 3.6, 0.1, "round"), (0.0, 1.0, lighter(color), 1.6, 0.11, "round"),
+        (0.12, 0.58, color, BAR + 3, 0.12, "butt"), (0.123, 0.577, lighter(color), BAR + 0.6, 0.13, "butt"),
+    )  # fmt: skip
+    return [
+        Line((base + first * (tip - base), base + last * (tip - base)), shade, width, layer, cap=cap,
+             leg=(*ends, first, last))
+        for first, last, shade, width, layer, cap in parts
+    ]  # fmt: skip
+
+
+def ghost_shapes(scene: Scene, dashes: Dashes) -> list[Shape]:
+    """The links as thin grey lines."""
+    lines = [[*body, *(body[:1] if len(body) > 2 else [])] for _, body in bodies(scene) if len(body) > 1]
+    for link in scene.description.links.values():
+        if link.telescopic and link.ends:
+            lines.append([scene.points[end] for end in link.ends])
+    lines += [reach(scene, guide, (guide.pin,)) for guide in scene.guides if guide.owner != GROUND]
+    return [Line(line, _GHOST, 1.3, 0.1, dashes=dashes) for line in lines]
+
+
+def bodies(scene: Scene) -> list[tuple[str, list[complex]]]:
+    """Outline of each moving rigid link, the largest first so that none hides another."""
+    outlines = []
+    for name, link in scene.description.links.items():
+        if name != GROUND:
+            points = link.points if link.telescopic else scene.link_points(name)
+            outlines.append((name, hull([scene.points[point] for point in points])))
+    return sorted(outlines, key=lambda item: -_area(item[1]))
+
+
+def _area(corners: list[complex]) -> float:
+    turned = zip(corners, corners[1:] + corners[:1], strict=True)
+    return abs(sum((a.conjugate() * b).imag for a, b in turned)) / 2 if len(corners) > 2 else 0.0
+
+
+def reach(scene: Scene, guide: Guide, places: Iterable[complex]) -> list[complex]:
+    """Ends of the line that a link carries: from its own points to where something slides."""
+    own = [scene.points[point] for point in scene.link_points(guide.owner)]
+    along = [((place - guide.origin) * guide.along.conjugate()).real for place in (*own, *places)]
+    return [guide.origin + s * guide.along for s in (min(along), max(along))]
+
+
+def drive_shapes(scene: Scene) -> tuple[list[Shape], list[Label]]:
+    """An arrow for each drive, and their names.
+
+    That of an angle runs from the line it is measured from, that of a length or slide in its positive sense.
+    """
+    shapes: list[Shape] = []
+    labels: list[Label] = []
+    turned: list[complex] = []
+    for name, drive in scene.description.drives.items():
+        if drive.kind == "angle":
+            place = scene.points[scene.pivot(drive.target, drive.reference)]
+            radius = ARC + _NESTING * turned.count(place)
+            turned.append(place)
+            start = cmath.phase(scene.rotations[drive.reference])
+            sweep = cmath.phase(scene.rotations[drive.target] / scene.rotations[drive.reference])
+            if abs(sweep) < _MIN_SWEEP:
+                sweep = 4 * _MIN_SWEEP
+            shapes += arc(place, start, sweep, radius, DRIVE_COLOR)
+            base = (0j, (radius + 9) * cmath.exp(1j * start))
+            shapes.append(Symbol(place, 0.3, (base,), edge=DRIVE_COLOR, width=0.9, dashes=(0, (3, 2))))
+            labels.append(Label(name, (place,), DRIVE_COLOR, radius + 4, start + sweep / 2))
+            continue
+        if drive.kind == "length":
+            ends = scene.description.links[drive.target].ends
+            assert ends is not None
+            foot, leg = scene.points[ends[0]], scene.points[ends[1]] - scene.points[ends[0]]
+            place, along, away = foot + 0.36 * leg, leg / abs(leg), BAR / 2 + 6
+        else:
+            guide = next(guide for guide in scene.guides if guide.joint == drive.target)
+            place, along, away = guide.pin, guide.along, SLIDER_SIZE[1] / 2 + 6
+        stem = (complex(-_PUSH / 2, away), complex(_PUSH / 2 - 4, away))
+        shapes += _arrow(place, stem, complex(_PUSH / 2, away), 1.0, 7.0, DRIVE_COLOR, along)
+        labels.append(Label(name, (place,), DRIVE_COLOR, away + 5, cmath.phase(1j * along)))
+    return shapes, labels
+
+
+def arc(place: complex, start: float, sweep: float, radius: float, color: str) -> list[Shape]:
+    """A curved arrow about a place, from the angle `start` over `sweep` (radians); the radius in points."""
+    angles = start + np.linspace(0.0, sweep, 48)
+    # The head is as long on the arc as it looks; a small angle has a small head.
+    head = min(7.0, 0.7 * abs(sweep) * radius)
+    stem = radius * np.exp(1j * angles[np.abs(angles - start) <= abs(sweep) - 0.6 * head / radius])
+    sign = math.copysign(1.0, sweep)
+    tip = radius * np.exp(1j * angles[-1])
+    tangent = 1j * sign * np.exp(1j * (angles[-1] - sign * head / (2 * radius)))
+    return _arrow(place, stem.tolist(), complex(tip), complex(tangent), head, color)
+
+
+def force(place: complex, direction: complex, color: str) -> list[Shape]:
+    """A force: an arrow that ends at the place where it acts."""
+    return _arrow(place, (complex(-FORCE - PIN), complex(-PIN - 6)), complex(-PIN), 1.0, 9.0, color, direction)
+
+
+def _arrow(
+    place: complex, stem: Sequence[complex], tip: complex, along: complex, head: float, color: str,
+    direction: complex = 1.0,
+) -> list[Shape]:  # fmt: skip
+    back = tip - head * along
+    wings = (tip, back + 0.45j * head * along, back - 0.45j * head * along)
+    shapes: list[Shape] = [Symbol(place, 0.6, (wings,), fill=color, edge=None, direction=direction)]
+    if len(stem) > 1:
+        shapes.insert(0, Symbol(place, 0.6, (stem,), edge=color, width=1.7, direction=direction))
+    return shapes
+
+
+def point_labels(scene: Scene) -> list[Label]:
+    """Names of points; what slides in a line has none but its own."""
+    slid = {guide.point for guide in scene.guides if guide.slider is not None}
+    labels = []
+    for name, kind in scene.kinds().items():
+        if kind != "none" or name in slid:
+            away = SLIDER_SIZE[1] / 2 if name in slid else PIN
+            labels.append(Label(name, (scene.points[name],), style.INK, away + 4, size=10.5))
+    return labels
+
+
+def slide_labels(scene: Scene) -> list[Label]:
+    """Names of the slides that are no drive."""
+    return [
+        Label(guide.joint, (guide.pin,), style.FAINT, SLIDER_SIZE[1] / 2 + 8, -math.pi / 3, 9, optional=True)
+        for guide in scene.guides
+        if guide.joint not in scene.description.drives
+    ]
+
+
+def link_labels(scene: Scene, colors: Mapping[str, str], *, driven: bool = False) -> list[Label]:
+    """Names of the moving links, with those that are `driven` or without."""
+    labels = []
+    for name in scene.description.links:
+        places = [scene.points[point] for point in scene.link_points(name)]
+        if name == GROUND or (name in scene.description.drives and not driven) or not places:
+            continue
+        anchors: tuple[complex, ...]
+        if len(places) == 1:
+            anchors, away, heading = (places[0],), SLIDER_SIZE[1] / 2 + 4, -math.pi / 2
+        elif len(corners := hull(places)) > 2:
+            # The middle of a plate is its own best place.
+            anchors, away, heading = (sum(corners) / len(corners),), 0.0, 0.0
+        else:
+            run = places[1] - places[0]
+            anchors = tuple(places[0] + share * run for share in (0.5, 0.4, 0.6, 0.3, 0.7))
+            away, heading = BAR / 2 + 3, cmath.phase(1j * run if (1j * run).imag >= 0 else -1j * run)
+        labels.append(Label(name, anchors, darker(colors[name]), away, heading, 9, optional=True))
+    return labels
