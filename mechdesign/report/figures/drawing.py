@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,26 +15,10 @@ from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.numerics.arrays import Floats
-from mechdesign.report.figures.labels import covered, place_labels
+from mechdesign.report.figures import shapes
+from mechdesign.report.figures.labels import covered, place_labels, rows
 from mechdesign.report.figures.scene import pose
-from mechdesign.report.figures.shapes import (
-    TICK,
-    TICK_ANGLE,
-    TICK_SPACING,
-    Dashes,
-    Line,
-    Shape,
-    Symbol,
-    Travel,
-    drive_shapes,
-    ghost_shapes,
-    link_colors,
-    link_labels,
-    mechanism_shapes,
-    point_labels,
-    slide_labels,
-)
+from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
 
 
 def draw_mechanism(
@@ -68,16 +52,17 @@ def draw_mechanism(
     scene = pose(mechanism, configuration, index)
     if scene is None:
         return
-    colors = link_colors(mechanism)
-    shapes = mechanism_shapes(scene, colors, travel or {})
+    colors = shapes.link_colors(mechanism)
+    drawn = shapes.mechanism_shapes(scene, colors, travel or {})
     if faint:
-        draw(axes, shapes, order=2.0, alpha=0.22, size=size)
+        draw(axes, drawn, order=2.0, alpha=0.22, size=size)
         return
-    arrows, named = drive_shapes(scene) if drives else ([], [])
-    draw(axes, [*shapes, *arrows], size=size)
+    arrows, named = shapes.drive_shapes(scene) if drives else ([], [])
+    draw(axes, [*drawn, *arrows], size=size)
     if labels:
         # The most needed first.
-        named = [*point_labels(scene), *named, *slide_labels(scene), *link_labels(scene, colors)]
+        named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene)]
+        named += shapes.link_labels(scene, colors)
         place_labels(axes, named, covered(axes), order=5.0)
 
 
@@ -88,14 +73,14 @@ def draw_ghost(
     """Draw a further pose as thin grey lines, which lie below the paths and do not look like them."""
     scene = pose(mechanism, configuration, index)
     if scene is not None:
-        draw(axes, ghost_shapes(scene, dashes), order=2.0, alpha=alpha)
+        draw(axes, shapes.ghost_shapes(scene, dashes), order=2.0, alpha=alpha)
 
 
 def draw(
-    axes: Axes, shapes: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0, size: float = 1.0
+    axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0, size: float = 1.0
 ) -> None:  # fmt: skip
     """Draw shapes; `order` lifts them above drawings of lower order, `size` enlarges symbols and widths of lines."""
-    for shape in shapes:
+    for shape in drawn:
         if isinstance(shape, Symbol):
             axes.add_artist(
                 PathPatch(_path(shape), transform=_at(axes, shape, size), facecolor=shape.fill or "none",
@@ -104,7 +89,7 @@ def draw(
             )  # fmt: skip
         elif shape.filled:
             axes.add_patch(
-                Polygon(_xy(shape.places), closed=True, facecolor=shape.color, edgecolor=shape.color,
+                Polygon(rows(np.array(shape.places)), closed=True, facecolor=shape.color, edgecolor=shape.color,
                         lw=shape.width * size, joinstyle="round", alpha=alpha, zorder=order + shape.layer)
             )  # fmt: skip
         else:
@@ -113,7 +98,7 @@ def draw(
 
 def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Line2D:
     artist = Line2D(
-        *_xy(line.places).T, lw=line.width * size, color=line.color, alpha=alpha, zorder=order + line.layer,
+        *rows(np.array(line.places)).T, lw=line.width * size, color=line.color, alpha=alpha, zorder=order + line.layer,
         linestyle=line.dashes, solid_capstyle=line.cap, solid_joinstyle="round",
     )  # fmt: skip
     if line.rail:
@@ -121,7 +106,8 @@ def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Li
         assert figure is not None
         shift = line.rail * size / 72
         artist.set_transform(axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans))
-        ticks = TickedStroke(angle=TICK_ANGLE, spacing=TICK_SPACING, length=TICK / TICK_SPACING)
+        spacing = shapes.TICK_SPACING
+        ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
         artist.set_path_effects([ticks, Normal()])
     return artist
 
@@ -130,7 +116,8 @@ def _path(symbol: Symbol) -> Path:
     if symbol.radius:
         return Path.circle(radius=symbol.radius)
     closed = symbol.fill is not None
-    return Path.make_compound_path(*(Path(_xy([*line, *line[:closed]]), closed=closed) for line in symbol.outlines))
+    lines = (rows(np.array([*line, *line[:closed]])) for line in symbol.outlines)
+    return Path.make_compound_path(*(Path(line, closed=closed) for line in lines))
 
 
 def _at(axes: Axes, symbol: Symbol, size: float) -> Transform:
@@ -141,9 +128,3 @@ def _at(axes: Axes, symbol: Symbol, size: float) -> Transform:
     moved = ScaledTranslation(symbol.place.real, symbol.place.imag, axes.transData)  # type: ignore[arg-type]
     turned = Affine2D().rotate(cmath.phase(symbol.direction)).scale(size / 72)
     return turned + figure.dpi_scale_trans + moved
-
-
-def _xy(places: Sequence[complex]) -> Floats:
-    """Places as rows of x and y."""
-    z = np.array(places, dtype=complex)
-    return np.column_stack([z.real, z.imag])

@@ -56,6 +56,11 @@ class Label:
     size: float = 10.0
     optional: bool = False
 
+    @property
+    def half(self) -> Floats:
+        """Half the width and height of the text, about (points)."""
+        return np.array([_LETTER * self.size * len(self.text), self.size]) / 2
+
 
 @dataclass(frozen=True)
 class Position:
@@ -83,13 +88,13 @@ def positions(
     window : ndarray, shape (2, 2)
         Lower left and upper right corner of the paper.
     """
-    nets, poses = [net[np.argsort(net[:, 0])] for net in nets], len(nets)
-    taken, count = np.empty((poses, len(labels), 4)), 0
+    poses, count = len(nets), 0
+    taken = np.empty((poses, len(labels), 4))
     chosen: list[Position | None] = []
     for which, label in enumerate(labels):
         # Names of one kind could change places.
         alike = [k for k, other in enumerate(labels) if k != which and other.size == label.size]
-        half = np.array([_LETTER * label.size * len(label.text), label.size]) / 2
+        half = label.half
         offsets, strains = _offsets(label, half)
         # Only what is within reach of some place can be covered.
         reach = np.abs(offsets).max(axis=0) + half + 2
@@ -98,9 +103,7 @@ def positions(
             costs, unclear = strains + 0.4 * rank, np.zeros(len(offsets))
             for named, net, boxes_taken in zip(anchors, nets, taken, strict=True):
                 origin = named[which][rank]
-                first, last = np.searchsorted(net[:, 0], origin[0] + reach[0] * np.array([-1, 1]))
-                near = net[first:last]
-                near = near[np.abs(near[:, 1] - origin[1]) <= reach[1]]
+                near = net[(np.abs(net - origin) <= reach).all(axis=1)]
                 written = boxes_taken[:count]
                 low, high = origin - reach, origin + reach
                 written = written[((written[:, :2] < high) & (written[:, 2:] > low)).all(axis=1)]
@@ -161,7 +164,12 @@ def _distances(boxes: Floats, places: Floats) -> Floats:
 
 def paper(axes: Axes, places: Complexes) -> Floats:
     """Places of the drawing in points on paper, shape (n, 2)."""
-    return _points(axes, axes.transData.transform(np.column_stack([places.real, places.imag])))
+    return _points(axes, axes.transData.transform(rows(places)))
+
+
+def rows(places: Complexes) -> Floats:
+    """Places as rows of x and y."""
+    return np.column_stack([places.real, places.imag])
 
 
 def _points(axes: Axes, pixels: ArrayLike) -> Floats:
@@ -204,7 +212,7 @@ def net(lines: Iterable[tuple[Complexes, float, bool]]) -> Floats:
         across = 0.5j * width * along / np.maximum(np.abs(along), 1e-9)
         places += [line - across, line, line + across]
     every = np.concatenate(places)
-    return np.unique(np.round(np.column_stack([every.real, every.imag]) / _NET), axis=0) * _NET
+    return np.unique(np.round(rows(every) / _NET), axis=0) * _NET
 
 
 def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -32,7 +33,7 @@ _GHOST = "#777777"
 DRIVE_COLOR = style.VERMILION
 LINK_COLORS = (style.BLUE, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, "#8A6A2A", "#5B4FA2", "#6E6E6E")
 Color = str | tuple[float, float, float]
-Dashes = str | tuple[float, tuple[float, ...]]  # as Matplotlib has them: "-", or dashes and gaps in widths of the line
+Dashes = Literal["-"] | tuple[float, tuple[float, ...]]  # for Matplotlib: dashes and gaps in widths of the line
 Travel = Mapping[str, tuple[float, float]]
 
 
@@ -61,7 +62,7 @@ class Line:
     link: str = GROUND
     leg: tuple[str, str, float, float] | None = None
     filled: bool = False
-    cap: str = "round"
+    cap: Literal["round", "butt", "projecting"] = "round"
     dashes: Dashes = "-"
     rail: complex = 0j
 
@@ -199,14 +200,12 @@ def _bar(ends: Sequence[complex], color: str, link: str) -> list[Shape]:
 def _leg(scene: Scene, ends: tuple[str, str], color: str) -> list[Shape]:
     """A telescopic leg: cylinder from the base, rod to the tip."""
     base, tip = (scene.points[end] for end in ends)
-    parts = (
-        (0.0, 1.0, color, 3.6, 0.1, "round"), (0.0, 1.0, lighter(color), 1.6, 0.11, "round"),
-        (0.12, 0.58, color, BAR + 3, 0.12, "butt"), (0.123, 0.577, lighter(color), BAR + 0.6, 0.13, "butt"),
-    )  # fmt: skip
+    parts = ((0.0, 1.0, color, 3.6, 0.1), (0.0, 1.0, lighter(color), 1.6, 0.11),
+             (0.12, 0.58, color, BAR + 3, 0.12), (0.123, 0.577, lighter(color), BAR + 0.6, 0.13))  # fmt: skip
     return [
-        Line((base + first * (tip - base), base + last * (tip - base)), shade, width, layer, cap=cap,
-             leg=(*ends, first, last))
-        for first, last, shade, width, layer, cap in parts
+        Line((base + first * (tip - base), base + last * (tip - base)), shade, width, layer,
+             leg=(*ends, first, last), cap="round" if last == 1 else "butt")
+        for first, last, shade, width, layer in parts
     ]  # fmt: skip
 
 

@@ -19,23 +19,11 @@ from matplotlib.path import Path
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.report.figures import shapes
 from mechdesign.report.figures.framing import fit
-from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions
+from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions, rows
 from mechdesign.report.figures.scene import Scene
-from mechdesign.report.figures.shapes import (
-    TICK,
-    TICK_ANGLE,
-    TICK_SPACING,
-    Dashes,
-    Line,
-    Shape,
-    Symbol,
-    Travel,
-    link_colors,
-    link_labels,
-    mechanism_shapes,
-    point_labels,
-)
+from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
 
 # Of a drawing, in its own units, which are about points on paper: its width, its height at most, room around.
 WIDTH = 520.0
@@ -90,32 +78,12 @@ class Sheet:
         return root
 
 
-@dataclass(frozen=True)
-class Body:
-    """A rigid link in the first pose: the point that its parts are drawn about, and where that is; its direction."""
-
-    name: str
-    point: str
-    place: complex
-    turn: complex
-    scale: float
-
-    def local(self, place: complex) -> complex:
-        """A place of the first pose in the link's frame, in the drawing's units and with its y axis down."""
-        return ((place - self.place) / self.turn * self.scale).conjugate()
-
-
 class Sketcher:
     """Draws a pose of a mechanism into an SVG element."""
 
     def __init__(self, root: Element, sheet: Sheet, mechanism: Mechanism, scene: Scene, travel: Travel) -> None:
         self.root, self.sheet, self.scene, self.travel = root, sheet, scene, travel
-        self.colors = link_colors(mechanism)
-
-    def body(self, name: str) -> Body:
-        """The frame in which the parts of a link are drawn."""
-        point = self.scene.link_points(name)[0]
-        return Body(name, point, self.scene.points[point], self.scene.rotations[name], self.sheet.scale)
+        self.colors = shapes.link_colors(mechanism)
 
     def draw(self) -> None:
         """The mechanism without its names."""
@@ -128,23 +96,26 @@ class Sketcher:
                 self._line(shape)
 
     def _shapes(self, scene: Scene) -> list[Shape]:
-        return mechanism_shapes(scene, self.colors, self.travel)
+        return shapes.mechanism_shapes(scene, self.colors, self.travel)
 
-    def _moved(self, body: Body) -> Element:
-        """A group that moves with a link."""
-        transform = f"{_shift(self.sheet.at(body.place))} {_turned(body.turn)}"
-        return add(self.root, "g", data_at=body.point, data_turn=body.name, transform=transform)
+    def _group(self, point: str, link: str = GROUND) -> Element:
+        """A group that stays at a point, and turns with a link that moves."""
+        place, moves = _shift(self.sheet.at(self.scene.points[point])), {"data_at": point}
+        if link != GROUND:
+            place, moves = f"{place} {_turned(self.scene.rotations[link])}", moves | {"data_turn": link}
+        return add(self.root, "g", **moves, transform=place)
 
-    def _placed(self, point: str) -> Element:
-        """A group that stays at a point."""
-        return add(self.root, "g", data_at=point, transform=_shift(self.sheet.at(self.scene.points[point])))
+    def _local(self, link: str, place: complex) -> complex:
+        """A place from the first point of a link, in the link's frame and the drawing's units, the y axis down."""
+        way = place - self.scene.points[self.scene.link_points(link)[0]]
+        return (way / self.scene.rotations[link] * self.sheet.scale).conjugate()
 
     def _line(self, line: Line) -> None:
         """A line or plate that moves with its link, or a rail."""
         parent, places = self.root, [self.sheet.at(place) + line.rail.conjugate() for place in line.places]
         if line.link != GROUND:
-            body = self.body(line.link)
-            parent, places = self._moved(body), [body.local(place) for place in line.places]
+            parent = self._group(self.scene.link_points(line.link)[0], line.link)
+            places = [self._local(line.link, place) for place in line.places]
         way = f"M{'L'.join(map(_pair, places))}{'z' * line.filled}" + (_ticks(*places) if line.rail else "")
         look = {"fill": to_hex(line.color)} if line.filled else {}
         path = add(parent, "path", d=way, stroke=to_hex(line.color), stroke_width=line.width, **look)
@@ -159,22 +130,23 @@ class Sketcher:
 
     def _symbol(self, symbol: Symbol) -> None:
         colors = (("fill", symbol.fill), ("stroke", symbol.edge))
-        look = {key: to_hex(color) for key, color in colors if color} | {"stroke_width": symbol.width}
+        look = {key: to_hex(color) for key, color in colors if color}
         origin, turn = 0j, symbol.direction
         if symbol.link != GROUND:
-            body = self.body(symbol.link)
-            parent, origin, turn = self._moved(body), body.local(symbol.place), turn / body.turn
+            parent = self._group(self.scene.link_points(symbol.link)[0], symbol.link)
+            origin, turn = self._local(symbol.link, symbol.place), turn / self.scene.rotations[symbol.link]
         elif symbol.point:
-            parent = self._placed(symbol.point)
+            parent = self._group(symbol.point)
         else:
             parent = add(self.root, "g", transform=_shift(self.sheet.at(symbol.place)))
         lines = [[_pair(origin + (place * turn).conjugate()) for place in line] for line in symbol.outlines]
         if symbol.radius:
-            add(parent, "circle", r=symbol.radius, **look)
+            add(parent, "circle", r=symbol.radius, stroke_width=symbol.width, **look)
         elif symbol.fill:
-            add(parent, "polygon", points=" ".join(lines[0]), **look)
+            add(parent, "polygon", points=" ".join(lines[0]), stroke_width=symbol.width, **look)
         else:
-            add(parent, "path", d="".join(f"M{'L'.join(line)}" for line in lines), **look)
+            way = "".join(f"M{'L'.join(line)}" for line in lines)
+            add(parent, "path", d=way, stroke_width=symbol.width, **look)
 
     def trace(self, places: Complexes, color: str, width: float, share: float) -> None:
         """The path of a point; the script may hide it."""
@@ -186,47 +158,52 @@ class Sketcher:
 
         Those of links stay level; the script shows them on request.
         """
-        points = [replace(label, size=_NAME) for label in point_labels(self.scene)]
-        links = [replace(label, optional=False) for label in link_labels(self.scene, self.colors, driven=True)]
-        bodies = [self.body(label.text) for label in links]
-        anchors = []
-        for scene in scenes:
-            places = [np.array([scene.points[label.text]]) for label in points]
-            for label, body in zip(links, bodies, strict=True):
-                turn = scene.rotations[body.name] / body.turn
-                places.append(scene.points[body.point] + turn * (np.array(label.anchors) - body.place))
-            anchors.append([_rows(self._paper(z)) for z in places])
+        first = self.scene
+        labels = [replace(label, size=_NAME) for label in shapes.point_labels(first)]
+        owners = [(label.text, GROUND) for label in labels]
+        for label in shapes.link_labels(first, self.colors, driven=True):
+            labels.append(replace(label, size=_NAME - 2, optional=False))
+            owners.append((first.link_points(label.text)[0], label.text))
+
+        def anchors(scene: Scene, label: Label, point: str, link: str) -> Floats:
+            moved = (np.array(label.anchors) - first.points[point]) * scene.rotations[link] / first.rotations[link]
+            return rows(self.sheet.all(scene.points[point] + moved).conj())
+
+        places = [[anchors(scene, label, *owner) for label, owner in zip(labels, owners, strict=True)]
+                  for scene in scenes]  # fmt: skip
         nets = [net(map(self._outline, self._shapes(scene))) for scene in scenes]
-        window = _rows(np.array([-1j * self.sheet.height, self.sheet.width]))
-        chosen = positions([*points, *links], anchors, nets, window)
-        for label, position in zip(points, chosen, strict=False):
-            if position:
-                self._name(self._placed(label.text), label, position)
-        for label, body, position in zip(links, bodies, chosen[len(points) :], strict=True):
-            if position:
+        window = rows(np.array([-1j * self.sheet.height, self.sheet.width]))
+        chosen = positions(labels, places, nets, window)
+        for label, (point, link), position in zip(labels, owners, chosen, strict=True):
+            if position and link == GROUND:
+                self._name(self._group(point), label, position)
+            elif position:
                 anchor = label.anchors[position.anchor]
-                looks = {"data-offset": _pair(body.local(anchor)), "class": "moving-name moving-off"}
-                group = add(self.root, "g", data_at=body.point, data_turn=body.name,
-                            transform=_shift(self.sheet.at(anchor)), **looks)  # fmt: skip
+                looks = {"data-offset": _pair(self._local(link, anchor)), "class": "moving-name moving-off"}
+                group = add(self.root, "g", data_at=point, data_turn=link, transform=_shift(self.sheet.at(anchor)),
+                            **looks)  # fmt: skip
                 self._name(group, label, position, font_style="italic")
 
     def _name(self, group: Element, label: Label, position: Position, **looks: str) -> None:
         """A name at its position from the origin of a group."""
         x, y = position.offset.tolist()
+        color = to_hex(label.color)
+        if position.leader:
+            # From what is named to the edge of the text.
+            middle, width = complex(x, -y), float((label.half / np.maximum(np.abs(position.offset), 1e-9)).min())
+            begin, end = middle / abs(middle) * max(label.reach - 3.0, 3.0), middle * (1 - width)
+            add(group, "line", x1=begin.real, y1=begin.imag, x2=end.real, y2=end.imag, stroke=color, stroke_width=0.7)
         add(group, "text", label.text, x=x, y=0.35 * label.size - y, text_anchor="middle", font_size=label.size,
-            fill=to_hex(label.color), stroke="white", stroke_width=2.6, paint_order="stroke", **looks)  # fmt: skip
-
-    def _paper(self, places: Complexes) -> Complexes:
-        """Places of the study in points from the sheet's upper left corner, the y axis up."""
-        return (places - self.sheet.corner) * self.sheet.scale
+            fill=color, stroke="white", stroke_width=2.6, paint_order="stroke", **looks)  # fmt: skip
 
     def _outline(self, shape: Shape) -> tuple[Complexes, float, bool]:
         """What a shape covers: its outline on paper, its width, whether it is an area."""
         if isinstance(shape, Line):
-            outline = self._paper(np.array(shape.places)) + shape.rail
+            outline = self.sheet.all(np.array(shape.places)).conj() + shape.rail
             return outline, HATCHED if shape.rail else shape.width, shape.filled
-        around = shape.radius * np.array([1, 1j, -1, -1j]) if shape.radius else np.concatenate(shape.outlines)
-        return self._paper(np.array(shape.place)) + around * shape.direction, shape.width, shape.fill is not None
+        outlines = shape.outlines or ([1, 1j, -1, -1j] * np.array(shape.radius),)
+        around = self.sheet.at(shape.place).conjugate() + np.concatenate(outlines) * shape.direction
+        return around, shape.width, shape.fill is not None
 
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
@@ -277,10 +254,6 @@ def _turned(direction: complex) -> str:
 def _ticks(begin: complex, end: complex) -> str:
     """The strokes of a hatched rail."""
     along = (end - begin) / abs(end - begin)
-    stroke = _pair(TICK * along * cmath.exp(-1j * math.radians(TICK_ANGLE)))
-    steps = np.arange(TICK_SPACING, abs(end - begin), TICK_SPACING).tolist()
+    stroke = _pair(shapes.TICK * along * cmath.exp(-1j * math.radians(shapes.TICK_ANGLE)))
+    steps = np.arange(shapes.TICK_SPACING, abs(end - begin), shapes.TICK_SPACING).tolist()
     return "".join(f"M{_pair(begin + step * along)}l{stroke}" for step in steps)
-
-
-def _rows(places: Complexes) -> Floats:
-    return np.column_stack([places.real, places.imag])
