@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
@@ -246,7 +247,7 @@ def _solve(
             some = np.flatnonzero(dear[which] == assembly)
             at = which[some]
             if some.size:
-                local = {name: value[at] for name, value in places.items()}
+                local = {name: picked(value, at) for name, value in places.items()}
                 found[some] = _ahead(designs, meetings[at], theta[some], radius[some], reach[at], local, assembly)
         return found
 

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.analyses.region.field import Field, Places
+from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots, dips
 
@@ -126,7 +127,7 @@ class Designs:
         if not both:
             # Determinants cost as much as all other margins: only where they decide.
             place, lane = np.nonzero(good)
-            margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
+            margins = field.margins(z[place, lane], {name: picked(value, lane) for name, value in places.items()})
             good[place, lane] = (margins > 0).all(axis=0)
             rest = np.full((len(margins) - len(found), *z.shape), np.inf)
             rest[:, place, lane] = margins[len(found) :]
@@ -279,7 +280,7 @@ def _others(
     known = np.concatenate([quadratic, np.zeros((extra, len(direction)), dtype=bool)])
     sampled = np.flatnonzero(~np.asarray(known.all(axis=0))[found.ray])
     owner, inner, width = found.ray[sampled], found.inner[sampled], (found.outer - found.inner)[sampled]
-    local = {name: value[owner] for name, value in places.items()}
+    local = {name: picked(value, owner) for name, value in places.items()}
     turning = any(bound.coordinate.kind == "expression" for bound in designs.field.mechanism.bounds)
     number = max(designs.effort.samples, OF_EXPRESSIONS if turning else 0)
     fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, number))), INSET, 1 - INSET)
@@ -288,12 +289,12 @@ def _others(
 
     def look(lane: Ints, radius: Floats) -> tuple[Floats, Floats]:
         z = start_of[owner[lane]] + radius * direction[owner[lane]]
-        values, turned = designs.field.sampled(z, {name: value[lane] for name, value in local.items()})
+        values, turned = designs.field.sampled(z, {name: picked(value, lane) for name, value in local.items()})
         return without_known(values[rows], lane), turned
 
     def margins_at(lane: Ints, radius: Floats) -> Floats:
         z = start_of[owner[lane]] + radius * direction[owner[lane]]
-        values = designs.field.margins(z, {name: value[lane] for name, value in local.items()})
+        values = designs.field.margins(z, {name: picked(value, lane) for name, value in local.items()})
         return without_known(values[rows], lane)
 
     def without_known(values: Floats, lane: Ints) -> Floats:
