@@ -368,8 +368,9 @@ def drive_turns(
     drawn = float(mechanism.sketch_configuration.value(mechanism.coordinate(drive)))
     turns = np.round((drawn - begin) / TURN)
     for bound in mechanism.bounds:
-        if bound.drive and bound.of_angle and bound.coordinate.name == drive:
-            low, high = bound.ends({**mechanism.nominal, **sizes})
+        low, high = bound.ends({**mechanism.nominal, **sizes})
+        own = bound.drive and bound.of_angle and bound.coordinate.name == drive
+        if own and low is not None and high is not None:
             # All of the motion where it fits, or else its begin.
             for smallest, largest in ((begin, begin), (least, most)):
                 fewest, greatest = np.ceil((low - smallest) / TURN), np.floor((high - largest) / TURN)

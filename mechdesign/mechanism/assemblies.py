@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, wrap
+from mechdesign.mechanism.algebra import Value, largest, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
@@ -123,4 +123,4 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
 def _same(one: Configuration, other: Configuration, size: float) -> bool:
     turns = [wrap(np.angle(a) - np.angle(b)) for a, b in zip(one.rotations, other.rotations, strict=True)]
     shifts = [(a - b) / size for a, b in zip(one.slides, other.slides, strict=True)]
-    return bool(np.all(np.abs([*turns, *shifts]) < SAME_ASSEMBLY))
+    return bool(np.all(largest([*turns, *shifts]) < SAME_ASSEMBLY))

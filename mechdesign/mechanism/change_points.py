@@ -51,7 +51,7 @@ class ChangePoints:
     def modes(self, values: Value) -> list[Value]:
         """Mode of each group at values of the given coordinate (radians or lengths)."""
         self.cover(values)
-        return self._parity(values, len(self._places))
+        return self._parity(np.asarray(values, dtype=float), len(self._places))
 
     def cover(self, values: Value) -> None:
         """Search the range of some values, if it has not been searched."""

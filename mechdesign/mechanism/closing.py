@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, cross
+from mechdesign.mechanism.algebra import cross
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
@@ -20,7 +20,7 @@ from mechdesign.mechanism.rigidity import CLOSED
 from mechdesign.mechanism.sketch import SKETCH
 from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Group
-from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
 # Poses of a sweep for the range in which a mechanism closes.
 SWEEP_POSES = 721
@@ -57,7 +57,7 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
         drawn = Plan(core, plan.structure, plan.modes, follows=False)
         for k, (coordinate, _) in enumerate(given):
 
-            def valid(sweep: Floats, k: int = k) -> Value:
+            def valid(sweep: Floats, k: int = k) -> Flags:
                 return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
             found = closing_range(valid, coordinate, core.size, unit)
@@ -144,12 +144,12 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     def points(nodes: Iterable[int]) -> str:
         return " and ".join(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node])
 
-    gap = abs(known)
+    gap = float(np.abs(known))
     if group.form == "two angles":
         (one, two), (first, second) = links.values(), ends.values()
         inner = [node for node in first if node in second]
         outer = [node for node in (*first, *second) if node not in inner]
-        long, short = sorted((abs(z) for z in vectors.values()), reverse=True)
+        long, short = sorted((float(np.abs(z)) for z in vectors.values()), reverse=True)
         at = f" at {points(inner)}" if len(inner) == 1 else ""
         apart = f"{points(outer)} are {gap:.5g} apart" if len(outer) == 2 else f"they have to span {gap:.5g}"
         limit = f"reach only {long + short:.5g}" if gap > long else f"span no less than {long - short:.5g}"
@@ -180,7 +180,7 @@ def _newton(state: State, group: Group, gaps: Complexes) -> str:
     return f"links {', '.join(owners_of(graph, used))} do not meet (joints {joints}), {best}"
 
 
-def closing_range(valid: Callable[[Floats], Value], coordinate: Coordinate, size: float, unit: float) -> str:
+def closing_range(valid: Callable[[Floats], Flags], coordinate: Coordinate, size: float, unit: float) -> str:
     """For which values of one drive, the others held, a mechanism closes; empty where for none.
 
     `valid` says so of an array of its values (radians or lengths); lengths are tried up to four times `size`, either

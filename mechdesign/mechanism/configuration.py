@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.mechanism.algebra import Value, angle_of, nearest, norm2, quiet
+from mechdesign.mechanism.algebra import Either, Value, Vector, angle_of, nearest, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Graph
@@ -40,8 +40,8 @@ class Configuration:
     graph: Graph
     vectors: Vectors
     shape: tuple[int, ...]  # of the batch
-    nodes: Sequence[Value]  # complex position of each node
-    rotations: Sequence[Value]  # unit rotation exp(i theta) of each angle class
+    nodes: Sequence[Vector]  # complex position of each node
+    rotations: Sequence[Vector]  # unit rotation exp(i theta) of each angle class
     slides: Sequence[Value]  # displacement of each slide
     closures: Sequence[Value]  # positive inside the range in which each group closes, zero at its limits
     reason: NDArray[np.int8]  # `Reason` of each pose, of this very shape
@@ -68,7 +68,7 @@ class Configuration:
         """Unit vector of a link's x axis in the world, shape of the batch."""
         return np.broadcast_to(np.asarray(self.body_rotation(body), dtype=complex), self.shape)
 
-    def body_rotation(self, body: str) -> Value:
+    def body_rotation(self, body: str) -> Vector:
         """Unit vector of a body's x axis, unbroadcast."""
         frame = self.graph.bodies[body][0]
         offset = self.vectors.offsets[body]
@@ -121,7 +121,7 @@ class Configuration:
 
         reason = self.reason[index]
 
-        def pick(value: Value) -> Value:
+        def pick(value: Either) -> Either:
             if np.ndim(value) == 0 and reason.ndim == 0:
                 return value
             return np.broadcast_to(np.asarray(value), self.shape)[index]
@@ -140,15 +140,15 @@ class Configuration:
         )  # fmt: skip
 
 
-def hide(value: Value, lost: Flags) -> Value:
+def hide(value: Either, lost: Flags) -> Either:
     """nan for poses that cannot be assembled; a value that is the same for every pose (the ground) stays one."""
-    value = np.asarray(value)
-    if value.ndim == 0 and not lost.all():
-        value = np.broadcast_to(value, lost.shape)
-    elif value.ndim == 0:
-        return value * np.nan if lost.ndim == 0 else np.broadcast_to(value * np.nan, lost.shape)
+    whole: NDArray[Any] = np.asarray(value)
+    if whole.ndim == 0 and not lost.all():
+        whole = np.broadcast_to(whole, lost.shape)
+    elif whole.ndim == 0:
+        return whole * np.nan if lost.ndim == 0 else np.broadcast_to(whole * np.nan, lost.shape)
     # Both parts of a position: (nan + 0i) would leave its y at zero.
-    return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(value) else np.nan, value)
+    return np.where(lost, complex(np.nan, np.nan) if np.iscomplexobj(whole) else np.nan, whole)
 
 
 def joined(
@@ -160,7 +160,7 @@ def joined(
     for part in parts:
         some = slice(end, end := end + len(part.reason))
         reason[some] = part.reason
-        each = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        each: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
         whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in each]
         for k, value in enumerate(each):
             if np.ndim(value) > np.ndim(whole[k]):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, wrap
+from mechdesign.mechanism.algebra import Value, picked, wrap
 from mechdesign.mechanism.solve import NEWTON_STEPS, State
 from mechdesign.mechanism.structure import Structure
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -94,18 +94,18 @@ def follow(
     }
     signs = [np.broadcast_to(sign, (count,)) for sign in start.signs]
 
-    def solve(lanes: Ints, at: Value, guess: Floats, steps: int = NEWTON_STEPS) -> tuple[Floats, State, Floats]:
+    def solve(rows: Ints, at: Value, guess: Floats, steps: int = NEWTON_STEPS) -> tuple[Floats, State, Floats]:
         """Unknowns, state and angles of some poses at parts `at` of their paths."""
 
         def between(begin: Value, end: Value) -> Value:
-            a, b = (value if np.ndim(value) == 0 else value[lanes] for value in (begin, end))
+            a, b = picked(begin, rows), picked(end, rows)
             return a + at * (b - a)
 
         state, angles_there = solver(
             [between(*pair) for pair in ends], {name: between(*pair) for name, pair in sizes.items()},
-            guess, steps, turns[:, lanes],
+            guess, steps, turns[:, rows],
         )  # fmt: skip
-        return table_of(state.unknowns, lanes.shape), state, angles_there
+        return table_of(state.unknowns, rows.shape), state, angles_there
 
     def change(new: Floats, old: Floats) -> Floats:
         """How far the unknowns moved, angles the short way round; nan where a step has no end."""

@@ -53,8 +53,8 @@ class Bound:
             value = norm2(b - a)
             low, high = _squared(low), _squared(high)
         elif self.coordinate.kind == "slide" and self.coordinate.slide in configuration.graph.telescopic:
-            value = _squared(configuration.slides[self.coordinate.slide])
-            low, high = _squared(low), _squared(high)
+            slide = configuration.slides[self.coordinate.slide]
+            value, low, high = slide * np.abs(slide), _squared(low), _squared(high)
         else:
             value = configuration.value(self.coordinate)
             if self.of_angle and low is not None and high is not None:
@@ -87,9 +87,10 @@ class Bound:
     def counts(self, places: Mapping[str, Value]) -> bool:
         """Whether it depends on the turns of an angle: in an expression, or between ends a turn apart or more."""
         low, high = self.ends(places)
-        return self.coordinate.kind == "expression" or (self.of_angle and bool(np.any(high - low >= TURN)))
+        whole = low is not None and high is not None and bool(np.any(high - low >= TURN))
+        return self.coordinate.kind == "expression" or (self.of_angle and whole)
 
-    def ends(self, places: Mapping[str, Value]) -> tuple[Value, Value]:
+    def ends(self, places: Mapping[str, Value]) -> tuple[Value | None, Value | None]:
         """Smallest and largest value where the places have given values; None for a side that is left open."""
         low, high = (places[end] if isinstance(end, str) else end for end in (self.minimum, self.maximum))
         return low, high
@@ -143,8 +144,8 @@ class Core:
         sizes = {**self.nominal, **places} if places else self.nominal
         near: dict[str, Value] = {}
         for bound in self.bounds:
-            if bound.drive and bound.of_angle:
-                low, high = bound.ends(sizes)
+            low, high = bound.ends(sizes)
+            if bound.drive and bound.of_angle and low is not None and high is not None:
                 # Between limits a turn apart or more, the turn nearest to zero.
                 middle, room = (low + high) / 2, np.maximum((high - low) / 2 - np.pi, 0.0)
                 near[bound.coordinate.name] = np.clip(0.0, middle - room, middle + room)

@@ -19,12 +19,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, norm2, plus, quiet, times
+from mechdesign.mechanism.algebra import Either, Value, Vector, cross, norm2, plus, quiet, times
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
@@ -52,17 +52,17 @@ class Linearization(Loops):
         )  # fmt: skip
         self.geometry = geometry
         self.configuration = configuration
-        self._columns: dict[int, list[list[Value]]] = {}
+        self._columns: dict[int, list[list[Vector]]] = {}
         self._scales: dict[int, Value] = {}
-        self._edges: dict[int, Value] = {}
+        self._edges: dict[int, Vector] = {}
 
-    def edge(self, k: int) -> Value:
+    def edge(self, k: int) -> Vector:
         """World vector of an edge."""
         if k not in self._edges:
             self._edges[k] = super().edge(k)
         return self._edges[k]
 
-    def loop_columns(self, index: int, group: Group) -> list[list[Value]]:
+    def loop_columns(self, index: int, group: Group) -> list[list[Vector]]:
         """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
         if index not in self._columns:
             self._columns[index] = [self.columns(group, loop.edges)[1] for loop in group.loops]
@@ -77,17 +77,17 @@ class Linearization(Loops):
         it is the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
         """
         groups = [(k, group) for k, group in enumerate(self.structure.groups) if group.form != "place"]
-        signed = {}
+        signed: dict[int, Value] = {}
         for (index, group), determinant in zip(groups, determinants(self), strict=True):
             lines = self.loop_columns(index, group)
             sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
             signed[index] = determinant / np.sqrt(math.prod(sizes))
         return signed
 
-    def _solve_group(self, index: int, group: Group, right: list[Value]) -> list[Value]:
+    def _solve_group(self, index: int, group: Group, right: list[Vector]) -> list[Value]:
         lines = self.loop_columns(index, group)
         if len(lines) > 1:
-            sides = [part for value in right for part in (-np.real(value), -np.imag(value))]
+            sides = [part for value in right for part in (-value.real, -value.imag)]
             return solve_linear(rows_of(lines), sides)[0]
         a, b = lines[0]
         if index not in self._scales:
@@ -97,7 +97,7 @@ class Linearization(Loops):
 
     @quiet
     def _solve(
-        self, given: Sequence[Value], rest: Sequence[Value], offsets: Mapping[str, Value] | None = None
+        self, given: Sequence[Value], rest: Sequence[Vector], offsets: Mapping[str, Value] | None = None
     ) -> Rates:
         """Derivatives of all positions from those of the drives, the `rest` of each edge's, and of body offsets."""
         structure, offsets = self.structure, offsets or {}
@@ -107,7 +107,7 @@ class Linearization(Loops):
             slides[slide] = given[k]
         nodes: list[Any] = [0.0, *[None] * (len(self.nodes) - 1)]
 
-        def step(k: int) -> Value:
+        def step(k: int) -> Vector:
             return self.change(k, angles, slides, rest[k])
 
         for index, group in enumerate(structure.groups):
@@ -141,10 +141,10 @@ class Linearization(Loops):
     @quiet
     def acceleration(self, velocity: Rates, accelerations: Sequence[Value]) -> Rates:
         """Accelerations for given drive accelerations."""
-        rest: list[Value] = []
+        rest: list[Vector] = []
         for k, edge in enumerate(self.structure.edges):
             omega = velocity.angles[edge.frame]
-            total: Value = 0.0
+            total: Vector = 0.0
             if not nothing(omega):
                 total = self.edge(k) * (-omega * omega)
                 if edge.slide is not None:
@@ -175,19 +175,20 @@ class Linearization(Loops):
         _, explicit, _ = self._explicit(places)
         none, edges = [0.0] * len(self.structure.given), self.structure.edges
         s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))
-        rest: list[Value] = []
-        known: list[tuple[Value, ...]] = []
+        rest: list[Vector] = []
+        known: list[tuple[Vector, ...]] = []
         for k, edge in enumerate(edges):
             (w_z, d_z), d, m = explicit[k], self.vectors.d[k], self.arm(k)
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             m_z, m1 = w_z + s[k] * d_z + s_z[k] * d, s1[k] * d
-            known.append((m, m_z, m1, d, d_z, omega, turn_z))
+            known.append((m, m_z, m1, d, d_z))
             here = 1j * omega * m_z + s1[k] * d_z + 1j * turn_z * (m1 + 1j * omega * m)
             rest.append(self.turned(here, edge.frame))
         velocity_z = self._solve(none, rest)
         s1_z = self._along(velocity_z.slides)
         for k, edge in enumerate(edges):
-            m, m_z, m1, d, d_z, omega, turn_z = known[k]
+            m, m_z, m1, d, d_z = known[k]
+            omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             alpha, omega_z = acceleration.angles[edge.frame], velocity_z.angles[edge.frame]
             m1_z, bend = s1_z[k] * d + s1[k] * d_z, 1j * alpha - omega * omega
             here = (
@@ -198,21 +199,21 @@ class Linearization(Loops):
         return velocity_z, self._solve(none, rest)
 
     @quiet
-    def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Value]]:
+    def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Vector]]:
         """Derivatives of `loop_columns` with respect to dimensions; `position` from `sensitivity`."""
         _, explicit, _ = self._explicit(places)
         rest = self._rests(explicit)
 
-        def edge_z(k: int) -> Value:
+        def edge_z(k: int) -> Vector:
             return self.change(k, position.angles, position.slides, rest[k])
 
-        def direction_z(k: int) -> Value:
+        def direction_z(k: int) -> Vector:
             frame = self.structure.edges[k].frame
             return self.turned(explicit[k][1], frame) + 1j * position.angles[frame] * self.direction(k)
 
         return [self.columns(group, loop.edges, edge_z, direction_z)[1] for loop in group.loops]
 
-    def _rests(self, explicit: Sequence[tuple[Value, Value]]) -> list[Value]:
+    def _rests(self, explicit: Sequence[tuple[Vector, Vector]]) -> list[Vector]:
         """By edge, its derivatives with respect to dimensions without those of its angle and slide."""
         pairs = zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
         return [self.turned(plus(w, 1, times(s, d)), edge.frame) for (w, d), s, edge in pairs]
@@ -221,11 +222,11 @@ class Linearization(Loops):
         """Displacements, or derivatives of them, by edge; zero for edges without a slide."""
         return [0.0 if edge.slide is None else slides[edge.slide] for edge in self.structure.edges]
 
-    def _explicit(self, places: Sequence[str]) -> tuple[list[Value], list[tuple[Value, Value]], dict[str, Value]]:
+    def _explicit(self, places: Sequence[str]) -> tuple[list[Value], list[tuple[Vector, Vector]], dict[str, Value]]:
         configuration = self.configuration
         axes = (1,) * len(configuration.shape)
 
-        def lead(values: Sequence[Value]) -> Value:
+        def lead(values: Sequence[Either]) -> Either:
             if any(np.ndim(value) for value in values):
                 return np.stack([np.broadcast_to(value, configuration.shape) for value in values])
             array = np.array(values)
@@ -261,7 +262,10 @@ def determinants(linearization: Linearization) -> list[Value]:
 
 def regularity(linearization: Linearization) -> Value:
     """How far the drives are from a singularity, for each pose: 0 at one, at most 1; the smallest over the groups."""
-    return reduce(np.minimum, map(np.abs, linearization.conditionings.values()), 1.0)
+    least: Value = 1.0
+    for conditioning in linearization.conditionings.values():
+        least = np.minimum(least, np.abs(conditioning))
+    return least
 
 
 def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:

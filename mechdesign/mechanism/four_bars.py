@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, norm2
+from mechdesign.mechanism.algebra import Value, Vector, cross, norm2
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
@@ -149,7 +149,7 @@ class FourBar:
         near, far = (1, 2) if end == 0 else (2, 1)
         return (end, end) if self.slide == end else (end, far if self.slide == near else near)
 
-    def _vector(self, configuration: Configuration, end: int | None) -> Value:
+    def _vector(self, configuration: Configuration, end: int | None) -> Vector:
         tail, head = (self.joints[k] for k in self._line(end))
         if tail is head:
             return 1j * _along(configuration, tail)
@@ -276,7 +276,7 @@ class _Bodies:
         return -1
 
 
-def _along(configuration: Configuration, slide: Joint) -> Value:
+def _along(configuration: Configuration, slide: Joint) -> Vector:
     """Unit vector along a slide."""
     return configuration.vectors.d[slide.edge] * configuration.rotations[configuration.graph.edges[slide.edge].frame]
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, norm2, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, Vector, cross, norm2, picked, plus, rotation, vector
 from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import MEASURED, Place, Term
 from mechdesign.numerics.arrays import Ints
@@ -32,19 +32,16 @@ class Vectors:
     Also of the parameters that measures take, by their names.
     """
 
-    w: Sequence[Value]
-    d: Sequence[Value]
-    offsets: Mapping[str, Value]
+    w: Sequence[Vector]
+    d: Sequence[Vector]
+    offsets: Mapping[str, Vector]
     parameters: Mapping[str, Value]
 
     def take(self, index: Ints | slice) -> Vectors:
         """Those of some dimensions of a flat batch; what is the same for all stays a number."""
-
-        def pick(value: Value) -> Value:
-            return value[index] if np.ndim(value) else value
-
-        offsets, parameters = ({name: pick(v) for name, v in part.items()} for part in (self.offsets, self.parameters))
-        return Vectors([pick(w) for w in self.w], [pick(d) for d in self.d], offsets, parameters)
+        offsets = {body: picked(turn, index) for body, turn in self.offsets.items()}
+        parameters = {name: picked(value, index) for name, value in self.parameters.items()}
+        return Vectors([picked(w, index) for w in self.w], [picked(d, index) for d in self.d], offsets, parameters)
 
 
 @dataclass(frozen=True)
@@ -61,16 +58,16 @@ class Geometry:
             return self.places[term].nominal if value is None else value
         return term
 
-    def place(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
+    def place(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
         """Coordinates of a point in its body's frame, those of its hole where a pin moves in it."""
         return vector(*(self.term(term, values) for term in self.graph.points[body, point]))
 
-    def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
+    def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
         """The offset of the pin at a point, in its body's frame; the plain zero where it has none."""
         dx, dy = (values.get(name, 0.0) for name in offset_names(body, point))
         return vector(dx, dy) if np.ndim(dx) or np.ndim(dy) or dx or dy else 0.0
 
-    def local(self, body: str, point: str, values: Mapping[str, Value]) -> Value:
+    def local(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
         """Coordinates of the pin at a point in the body's frame."""
         return plus(self.place(body, point, values), 1, self.pin(body, point, values))
 
@@ -144,17 +141,17 @@ class Geometry:
     def _evaluate(self, values: Mapping[str, Value], base: Vectors | None) -> Vectors:
         graph = self.graph
         changed = values.keys()
-        offsets: dict[str, Value] = {}
+        offsets: dict[str, Vector] = {}
         for body, (_, turns) in graph.bodies.items():
             offsets[body] = rotation(self.angle(turns, values)) if turns else 1.0
-        w: list[Value] = []
-        d: list[Value] = []
+        w: list[Vector] = []
+        d: list[Vector] = []
         for k, edge in enumerate(graph.edges):
             if base is not None and self.dependencies[k].isdisjoint(changed):
                 w.append(base.w[k])
                 d.append(base.d[k])
                 continue
-            total: Value = 0.0
+            total: Vector = 0.0
             for sign, body, arm, _ in self._arms(edge, values):
                 if not isinstance(offsets[body], float) and not isinstance(arm, float):
                     arm = arm * offsets[body]
@@ -181,17 +178,19 @@ class Geometry:
                 total = total + turn.sign * cross(span, change) / norm2(span)
         return total
 
-    def derivatives(self, place: str, values: Mapping[str, Value], vectors: Vectors) -> tuple[list[Value], list[Value]]:
+    def derivatives(
+        self, place: str, values: Mapping[str, Value], vectors: Vectors
+    ) -> tuple[list[Vector], list[Vector]]:
         """Derivatives of all edges' w and d with respect to one place, at dimensions `values` with edges `vectors`."""
-        w_z: list[Value] = []
-        d_z: list[Value] = []
+        w_z: list[Vector] = []
+        d_z: list[Vector] = []
         for k, edge in enumerate(self.graph.edges):
             if place not in self.dependencies[k]:
                 w_z.append(0j)
                 d_z.append(0j)
                 continue
             d_z.append(1j * self.angle_derivative(edge.turns, place, values) * vectors.d[k])
-            total: Value = 0j
+            total: Vector = 0j
             for name in self._offset_of(edge):
                 total = 1j * ((place == name) * vectors.d[k] + values.get(name, 0.0) * d_z[k])
             for sign, body, arm, change in self._arms(edge, values, place):
@@ -202,7 +201,7 @@ class Geometry:
 
     def _arms(
         self, edge: Edge, values: Mapping[str, Value], place: str = ""
-    ) -> Iterator[tuple[int, str, Value, complex]]:
+    ) -> Iterator[tuple[int, str, Vector, complex]]:
         """What `w` of an edge is the sum of: sign, body, vector in its frame, and derivative of that by a place."""
         for sign, body, point in edge.locals:
             change = _equal(self.graph.points[body, point], place) + _equal(offset_names(body, point), place)

@@ -20,7 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, angle_of, dot, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Edge, Graph
@@ -31,7 +31,7 @@ from mechdesign.numerics.arrays import Floats
 # The unknowns of groups, one after another: angles, slides, then x and y of each base (see `Structure.unknowns`).
 Unknowns = Sequence[Value] | Floats
 # A vector of each edge, by its number.
-OfEdges = Callable[[int], Value]
+OfEdges = Callable[[int], Vector]
 # Dividing by a vector that has shrunk to nothing gives inf, where Python's own zero would raise.
 ZERO = np.float64(0.0)
 
@@ -47,10 +47,10 @@ class Loops:
     graph: Graph
     structure: Structure
     vectors: Vectors
-    w: list[Value]
+    w: list[Vector]
     nodes: list[Any]
     rotations: list[Any]
-    ties: list[Value]
+    ties: list[Vector]
     slides: list[Any]
     given: Sequence[Value] = ()
     near: Mapping[str, Value] = field(default_factory=dict)
@@ -60,9 +60,9 @@ class Loops:
         """What is known before the first group: the ground, the given coordinates, and the ties between classes."""
         nodes: list[Any] = [0.0, *[None] * (len(graph.nodes) - 1)]
         slides: list[Any] = [None] * len(graph.slides)
-        ties: list[Value] = []
+        ties: list[Vector] = []
         for tie in structure.ties:
-            turn: Value = rotation(tied(tie, given, {})) if tie.given else 1.0
+            turn: Vector = rotation(tied(tie, given, {})) if tie.given else 1.0
             for sign, body in tie.offsets:
                 offset = vectors.offsets[body]
                 if not isinstance(offset, float):
@@ -81,35 +81,36 @@ class Loops:
         w = [*vectors.w, *(given[k] for _, k in structure.spans)]
         return cls(graph, structure, vectors, w, nodes, rotations, ties, slides, given)
 
-    def arm(self, k: int) -> Value:
+    def arm(self, k: int) -> Vector:
         """Vector w + s d of an edge in the frame of its class."""
         slide = self.structure.edges[k].slide
         return self.w[k] if slide is None else self.w[k] + self.slides[slide] * self.vectors.d[k]
 
-    def turned(self, arm: Value, frame: int) -> Value:
+    def turned(self, arm: Vector, frame: int) -> Vector:
         """A vector of a class's frame in the world."""
         turn = self.rotations[frame]
         return arm if isinstance(turn, float) else arm * turn
 
-    def edge(self, k: int) -> Value:
+    def edge(self, k: int) -> Vector:
         """World vector of an edge whose rotation and slide are known."""
         return self.turned(self.arm(k), self.structure.edges[k].frame)
 
-    def direction(self, k: int) -> Value:
+    def direction(self, k: int) -> Vector:
         """World direction of an edge's slide; zero of an edge that has none."""
         return self.turned(self.vectors.d[k], self.structure.edges[k].frame)
 
-    def chord(self, k: int) -> Value:
+    def chord(self, k: int) -> Vector:
         """World vector between the ends of an edge where these are known."""
         edge = self.structure.edges[k]
-        return self.nodes[edge.head] - self.nodes[edge.tail]
+        span: Vector = self.nodes[edge.head] - self.nodes[edge.tail]
+        return span
 
     def displacement(self, k: int) -> Value:
         """Displacement of an edge's slide between its ends where these and its rotation are known."""
         frame = self.structure.edges[k].frame
         return dot(self.chord(k) - self.turned(self.w[k], frame), self.direction(k))
 
-    def change(self, k: int, angles: Sequence[Value], slides: Sequence[Value], rest: Value = 0.0) -> Value:
+    def change(self, k: int, angles: Sequence[Value], slides: Sequence[Value], rest: Vector = 0.0) -> Vector:
         """Derivative of an edge's world vector from those of all classes' angles and slides, and from its `rest`."""
         edge = self.structure.edges[k]
         if not nothing(angles[edge.frame]):
@@ -118,7 +119,7 @@ class Loops:
             rest = plus(rest, 1, slides[edge.slide] * self.direction(k))
         return rest
 
-    def turn(self, root: int, turn: Value) -> None:
+    def turn(self, root: int, turn: Vector) -> None:
         """Set the rotation of a root and of the classes tied to it."""
         for frame, tie in enumerate(self.structure.ties):
             if tie.root == root:
@@ -140,16 +141,16 @@ class Loops:
 
     def columns(
         self, group: Group, path: Sequence[tuple[int, int]], edge: OfEdges | None = None, along: OfEdges | None = None
-    ) -> tuple[Value, list[Value]]:
+    ) -> tuple[Vector, list[Vector]]:
         """Sum of the signed edges along `path`, and its derivatives with respect to a group's angles and slides.
 
         Where `edge` and `along` give other vectors than those of the edges and their slides' directions, such as
         derivatives of these, the sums are of them.
         """
         edge, along = edge or self.edge, along or self.direction
-        total: Value = 0.0
-        by_root: dict[int, Value] = dict.fromkeys(group.angles, 0.0)
-        by_slide: dict[int, Value] = dict.fromkeys(group.slides, 0.0)
+        total: Vector = 0.0
+        by_root: dict[int, Vector] = dict.fromkeys(group.angles, 0.0)
+        by_slide: dict[int, Vector] = dict.fromkeys(group.slides, 0.0)
         for k, sign in path:
             frame, slide = self.structure.edges[k].frame, self.structure.edges[k].slide
             root, step = self.structure.ties[frame].root, edge(k)
@@ -189,23 +190,23 @@ class Loops:
             roots, slides = dict(zip(group.angles, own, strict=False)), dict(zip(group.slides, own, strict=False))
             angles = [roots.get(tie.root, 0.0) for tie in self.structure.ties]
             shifts = [slides.get(slide, 0.0) for slide in range(len(self.slides))]
-            nodes: list[Value] = [0.0j] * len(self.nodes)
+            nodes: list[Vector] = [0.0j] * len(self.nodes)
             if j >= count:
                 nodes[group.bases[(j - count) // 2]] = 1j if (j - count) % 2 else 1.0 + 0j
             walk(self.structure.edges, group.tree, nodes, partial(self.change, angles=angles, slides=shifts))
             moves.append(Rates(nodes, angles, shifts, {}))
         return moves
 
-    def dyad(self, group: Group) -> tuple[Value, dict[int, Value], dict[int, Value]]:
+    def dyad(self, group: Group) -> tuple[Vector, dict[int, Vector], dict[int, Vector]]:
         """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d.
 
         They are in the frames of the unknown angles' roots, where the unknowns themselves do not enter.
         """
         structure = self.structure
         loop = group.loops[0]
-        k: Value = ZERO if loop.start == loop.end else gap_of(loop, self.nodes)
-        z: dict[int, Value] = dict.fromkeys(group.angles, ZERO)
-        d: dict[int, Value] = {}
+        k: Vector = ZERO if loop.start == loop.end else gap_of(loop, self.nodes)
+        z: dict[int, Vector] = dict.fromkeys(group.angles, ZERO)
+        d: dict[int, Vector] = {}
         for index, sign in loop.edges:
             edge = structure.edges[index]
             root = structure.ties[edge.frame].root
@@ -241,12 +242,12 @@ def tied(tie: Tie, given: Sequence[Value], offsets: Mapping[str, Value]) -> Valu
     return total
 
 
-def gap_of(loop: Loop, nodes: Sequence[Value]) -> Value:
+def gap_of(loop: Loop, nodes: Sequence[Vector]) -> Vector:
     """Known part of a loop's closure error, or a derivative of it: from the node where it ends to that of its start."""
     return 0.0 if loop.start == loop.end else plus(nodes[loop.start], -1, nodes[loop.end])
 
 
-def walk(edges: Sequence[Edge], tree: Sequence[tuple[int, int]], nodes: list[Value], step: OfEdges) -> None:
+def walk(edges: Sequence[Edge], tree: Sequence[tuple[int, int]], nodes: list[Vector], step: OfEdges) -> None:
     """Place nodes, or derivatives of their places, along signed edges from nodes that are known."""
     for k, sign in tree:
         begin, end = (edges[k].tail, edges[k].head) if sign > 0 else (edges[k].head, edges[k].tail)
@@ -254,30 +255,30 @@ def walk(edges: Sequence[Edge], tree: Sequence[tuple[int, int]], nodes: list[Val
 
 
 def unknowns_of(
-    group: Group, nodes: Sequence[Value], rotations: Sequence[Value], slides: Sequence[Value]
+    group: Group, nodes: Sequence[Vector], rotations: Sequence[Vector], slides: Sequence[Value]
 ) -> list[Value]:
     """A group's angles, slides, and x and y of its bases, at given positions; see `Loops.put`."""
     found: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
     found += [slides[slide] for slide in group.slides]
-    return found + [part for base in group.bases for part in (np.real(nodes[base]), np.imag(nodes[base]))]
+    return found + [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
 
 
-def nothing(value: Value) -> bool:
+def nothing(value: Vector) -> bool:
     """Whether a value is the plain zero of what does not depend on anything."""
     return isinstance(value, float) and value == 0.0
 
 
-def _quarter_turn(value: Value) -> Value:
+def _quarter_turn(value: Vector) -> Vector:
     """i times a vector; a vector that no edge contributes to stays the plain zero."""
     return value if isinstance(value, float) else vector(-value.imag, value.real)
 
 
-def rows_of(lines: Sequence[Sequence[Value]]) -> list[list[Value]]:
+def rows_of(lines: Sequence[Sequence[Vector]]) -> list[list[Value]]:
     """Loop equations as rows of a real matrix: of each line of columns real and imaginary parts, each contiguous."""
     return [[_part(column, name) for column in line] for line in lines for name in ("real", "imag")]
 
 
-def _part(value: Value, name: str) -> Value:
+def _part(value: Vector, name: str) -> Value:
     if isinstance(value, float):
         return value if name == "real" else 0.0
     part = getattr(value, name)

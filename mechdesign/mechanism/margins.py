@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, dot, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.loops import Unknowns, rows_of
@@ -179,7 +179,7 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
     return margins, slopes
 
 
-def _length(a: Value, a_z: Value) -> tuple[Value, Value]:
+def _length(a: Vector, a_z: Vector) -> tuple[Value, Value]:
     """Length of a vector, and its derivatives."""
     length = np.sqrt(norm2(a))
     return length, dot(a, a_z) / length

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
 
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
+from mechdesign.mechanism.algebra import Value, Vector, dot, largest, norm2, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 
@@ -26,12 +25,12 @@ class Rates:
     Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
     """
 
-    nodes: Sequence[Value]
+    nodes: Sequence[Vector]
     angles: Sequence[Value]
     slides: Sequence[Value]
     offsets: Mapping[str, Value]
     parameters: Mapping[str, Value] = field(default_factory=dict)
-    ends: Mapping[tuple[str, int], Value] = field(default_factory=dict)
+    ends: Mapping[tuple[str, int], Vector] = field(default_factory=dict)
 
 
 @quiet
@@ -41,7 +40,7 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
     if kind in ("x", "y", "distance"):
         moved = [rates.ends.get(end, rates.nodes[end[1]]) for end in coordinate.ends]
         if kind != "distance":
-            return np.real(moved[0]) if kind == "x" else np.imag(moved[0])
+            return moved[0].real if kind == "x" else moved[0].imag
         span = _span(configuration.nodes, coordinate)
         return dot(span, moved[1] - moved[0]) / np.sqrt(norm2(span))
     if kind == "slide":
@@ -115,7 +114,7 @@ def acceleration_sensitivity(
     return first(configuration, coordinate, acceleration_z)
 
 
-def _span(nodes: Sequence[Value], coordinate: Coordinate) -> Value:
+def _span(nodes: Sequence[Vector], coordinate: Coordinate) -> Vector:
     return nodes[coordinate.other] - nodes[coordinate.node]
 
 
@@ -138,10 +137,10 @@ def _gradient(coordinate: Coordinate, values: dict[str, Value]) -> list[Value]:
 
 def _directional(coordinate: Coordinate, values: dict[str, Value], direction: list[Value]) -> list[Value]:
     """Derivative of an expression's gradient along a direction, by a central difference of the exact gradient."""
-    largest = reduce(np.maximum, [np.abs(v) for v in direction], 0.0)
-    scale = reduce(np.maximum, [np.abs(v) for v in values.values()], 1.0)
+    fastest = largest(direction)
+    scale = largest(values.values(), 1.0)
     # A pose that does not move takes any step: both sides are the same.
-    step = GRADIENT_STEP * scale / np.where(largest > 0, largest, 1.0)
+    step = GRADIENT_STEP * scale / np.where(fastest > 0, fastest, 1.0)
     sides = [
         _gradient(
             coordinate, {p.name: values[p.name] + h * v for p, v in zip(coordinate.parts, direction, strict=True)}

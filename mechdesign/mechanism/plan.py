@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, nearest, quiet
+from mechdesign.mechanism.algebra import Value, nearest, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
@@ -102,7 +102,7 @@ class Plan:
         rotations = [*at.rotations]
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.core.graph.edges) + position]
-            rotations.append((at.nodes[edge.head] - at.nodes[edge.tail]) / given[k])
+            rotations.append(np.divide(at.nodes[edge.head] - at.nodes[edge.tail], given[k]))
         groups = [self.structure.groups[index] for index in self.structure.unknowns]
         return [value for group in groups for value in unknowns_of(group, at.nodes, rotations, at.slides)]
 
@@ -139,10 +139,10 @@ class Plan:
         Configuration
             nan where the mechanism cannot be assembled; never raises for a pose.
         """
-        values: list[Value] = [np.asarray(g, dtype=float) for g in given]
+        values = [np.asarray(g, dtype=float) for g in given]
         if len(values) != len(self.structure.given):
             raise ValueError(f"{len(self.structure.given)} given coordinates needed, {len(values)} passed")
-        dims: dict[str, Value] = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
+        dims = {name: np.asarray(v, dtype=float) for name, v in (places or {}).items()}
         shape = np.broadcast_shapes(*(v.shape for v in values), *(v.shape for v in dims.values()))
         count = int(np.prod(shape, dtype=np.int64))
         if count <= CHUNK:
@@ -151,22 +151,20 @@ class Plan:
         keep_freed_memory()
         if self.change_points is not None:
             self.change_points.cover(values[0])
-        flat, places = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
+        flat, sizes = [_flat(v, shape) for v in values], {name: _flat(v, shape) for name, v in dims.items()}
         length = CHUNK if self.iterative or worker_count(jobs) == 1 else THREAD_CHUNK
         starts: Ints | None = None
         if start is not None and start.shape:
-            starts = _flat(np.arange(start.reason.size).reshape(start.shape), shape)
+            starts = np.broadcast_to(np.arange(start.reason.size).reshape(start.shape), shape).reshape(-1)
 
         def part(begin: int) -> Configuration:
-            def some(value: Value) -> Value:
-                return value if value.ndim == 0 else value[begin : begin + length]
-
-            begun = start
+            rows, begun = slice(begin, begin + length), start
             if start is not None and starts is not None:
-                begun = start.take(np.unravel_index(starts[begin : begin + length], start.shape))
-            dimensions = {name: some(v) for name, v in places.items()}
-            own = None if vectors is None else vectors.take(slice(begin, begin + length))
-            return self._at_once([some(v) for v in flat], dimensions, (min(length, count - begin),), own, begun, limits)
+                begun = start.take(np.unravel_index(starts[rows], start.shape))
+            dimensions = {name: picked(v, rows) for name, v in sizes.items()}
+            own = None if vectors is None else vectors.take(rows)
+            drives = [picked(v, rows) for v in flat]
+            return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
         parts = [*parts] if self.angles else parts
@@ -247,7 +245,7 @@ class Plan:
 
         def solve(given: Sequence[Value], rows: Ints | None) -> tuple[Floats, Flags, Floats]:
             def some(value: Value) -> Value:
-                return value if rows is None or np.ndim(value) == 0 else value[rows]
+                return value if rows is None else picked(value, rows)
 
             return follow(
                 self.structure,
@@ -286,7 +284,7 @@ class Plan:
         """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
         graph = self.core.graph
         with np.errstate(invalid="ignore"):
-            open_: Value = np.zeros((), dtype=bool)
+            open_: Flags = np.zeros((), dtype=bool)
             # A group that does not close leaves nan in its first unknown.
             known = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
             known += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, vector, wrap
+from mechdesign.mechanism.algebra import Value, Vector, vector, wrap
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
@@ -62,7 +62,7 @@ class Equations:
         unknowns = self.inner + 2 * (len(self.graph.nodes) - 1)
         return np.where(np.arange(unknowns) < self.angles, 1.0, self.size)
 
-    def pack(self, nodes: Sequence[Value], rotations: Sequence[Value], slides: Sequence[Value]) -> Floats:
+    def pack(self, nodes: Sequence[Vector], rotations: Sequence[Vector], slides: Sequence[Value]) -> Floats:
         """Unknowns from positions (lengths as in the study)."""
         (group,) = whole(self.graph).groups
         return np.array(unknowns_of(group, nodes, rotations, slides), dtype=float) / self._units

@@ -59,13 +59,13 @@ class Sketch(Loops):
         drawn = replace(self, structure=structure, nodes=nodes, rotations=turns)
         a, b = drawn.columns(group, loop.edges, drawn.chord)[1]
         if group.form == "two angles":
-            side, size = cross(a + b, a), abs(a + b) * min(abs(a), abs(b))
+            side, size = cross(a + b, a), np.abs(a + b) * np.minimum(np.abs(a), np.abs(b))
             ends = [self.graph.nodes[node] for node in (loop.start, loop.end)]
             line = f"the line {'-'.join(ends)}" if ends[0] != ends[1] and ":" not in "".join(ends) else "the line"
         else:
-            side, size = cross(b, a) if group.form == "angle and turning slide" else cross(a, b), abs(a)
+            side, size = cross(b, a) if group.form == "angle and turning slide" else cross(a, b), np.abs(a)
             line = f"the perpendicular to slide '{self.graph.slides[group.slides[0]]}'"
-        if abs(side) <= UNDECIDED * size:
+        if np.abs(side) <= UNDECIDED * size:
             names = " or ".join(f"'{name}'" for name in deciding_joints(self.graph, group))
             raise MechanismError(
                 f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side",

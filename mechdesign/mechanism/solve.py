@@ -19,12 +19,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import reduce
 from itertools import combinations
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, dot, norm2, plus, times, vector
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, largest, norm2, plus, times, vector
 from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
@@ -42,7 +41,7 @@ NEWTON_STEPS = 10
 # After a correction this small (radians, or parts of the mechanism's size) another one would be below rounding.
 CONVERGED = 1e-8
 
-Solution = tuple[Value, Value, tuple[Value, ...]]
+Solution = tuple[Vector, Vector, tuple[Value, ...]]
 
 
 @dataclass
@@ -86,7 +85,7 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     for _ in range(state.steps):
         state.put(group, found)
         solution, determinant = solve_linear(*state.equations(group))
-        turned, moved = (reduce(np.maximum, map(np.abs, part), 0.0) for part in (solution[:count], solution[count:]))
+        turned, moved = largest(solution[:count]), largest(solution[count:])
         moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
@@ -114,8 +113,9 @@ def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple
     """Cramer's rule with Laplace's expansion by the 2 x 2 minors of the upper and of the lower rows."""
     count = len(rows)
     # Rows and columns of the identity fill up to two pairs of rows; the plain numbers in them cost nothing.
-    full = [[*row, *(0.0 for _ in range(count, MINORS_ORDER)), side] for row, side in zip(rows, right, strict=True)]
-    full += [[float(i == j) for j in range(MINORS_ORDER)] + [0.0] for i in range(count, MINORS_ORDER)]
+    zeros = [0.0] * (MINORS_ORDER - count)
+    full = [[*row, *zeros, side] for row, side in zip(rows, right, strict=True)]
+    full += [[*(float(i == j) for j in range(MINORS_ORDER)), 0.0] for i in range(count, MINORS_ORDER)]
     upper, lower = _minors(full[0], full[1]), _minors(full[2], full[3])
 
     def expand(order: Sequence[int]) -> Value:
@@ -204,7 +204,7 @@ def _root(product: Value, beyond: bool, *sizes: Value) -> Value:
     return np.sqrt(product)
 
 
-def two_angles(k: Value, z1: Value, z2: Value, mode: Value, beyond: bool = False) -> Solution:
+def two_angles(k: Vector, z1: Vector, z2: Vector, mode: Value, beyond: bool = False) -> Solution:
     """Rotations U1, U2 of two links that meet; `mode` is the side of the line -k on which they meet (+1 left)."""
     n1, n2, reach = norm2(z1), norm2(z2), norm2(k)
     product = 2 * np.sqrt(n1 * n2)
@@ -217,7 +217,7 @@ def two_angles(k: Value, z1: Value, z2: Value, mode: Value, beyond: bool = False
     return u1, u2, (outer, inner)
 
 
-def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: Value, beyond: bool = False) -> Solution:
+def angle_and_fixed_slide(k: Vector, z: Vector, d: Vector, mode: Value, beyond: bool = False) -> Solution:
     """Rotation U and displacement s along a known direction; `mode` is the side of the perpendicular's foot."""
     n = norm2(z)
     offset = cross(d, k)
@@ -227,7 +227,7 @@ def angle_and_fixed_slide(k: Value, z: Value, d: Value, mode: Value, beyond: boo
     return u, s, (closure,)
 
 
-def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value, beyond: bool = False) -> Solution:
+def angle_and_turning_slide(k: Vector, z: Vector, d: Vector, mode: Value, beyond: bool = False) -> Solution:
     """Rotation U and displacement s of a slide that turns with it; `mode` is the sign of the slide from its foot."""
     offset = cross(d, z)
     reach = norm2(k)
@@ -237,7 +237,7 @@ def angle_and_turning_slide(k: Value, z: Value, d: Value, mode: Value, beyond: b
     return u, s, (closure,)
 
 
-def two_slides(k: Value, d1: Value, d2: Value) -> Solution:
+def two_slides(k: Vector, d1: Vector, d2: Vector) -> Solution:
     """Displacements along two known directions; infinite where they are parallel."""
     across = cross(d1, d2)
     return cross(d2, k) / across, cross(k, d1) / across, ()

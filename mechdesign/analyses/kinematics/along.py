@@ -187,7 +187,7 @@ class Along:
         rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
         columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
         matrix = Jacobian.of(linear, given).matrix * rows[:, None] * columns
-        return np.linalg.det(np.nan_to_num(matrix))
+        return np.asarray(np.linalg.det(np.nan_to_num(matrix)))
 
     @cached_property
     def present(self) -> Floats:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Vector, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Complexes, Ints
@@ -56,7 +56,7 @@ class Centre:
         if pins and frames[0] != frames[1]:
             return configuration.point(pins[0]), np.full(shape, ROTATION)
 
-        def full(value: Value, kind: type) -> np.ndarray:
+        def full(value: Vector, kind: type) -> np.ndarray:
             return np.broadcast_to(np.asarray(value, dtype=kind), shape)
 
         turns = [full(velocity.angles[frame], float) for frame in frames]

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.poses import SolvedPoses, radians
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Value, picked
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
 from mechdesign.mechanism.outputs import second
@@ -30,7 +30,7 @@ class DriveRates:
     def take(self, index: Ints | int) -> DriveRates:
         """Those of some poses, or of one; numbers are the same at all."""
         return DriveRates(*(
-            [value if np.ndim(value) == 0 else value[index] for value in values]
+            [picked(value, index) for value in values]
             for values in (self.velocities, self.accelerations)
         ))  # fmt: skip
 

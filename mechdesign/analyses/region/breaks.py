@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.rays import Designs, Intervals, trace
 from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots
 
@@ -263,7 +264,7 @@ def _solve(
             rows = np.flatnonzero(with_assembly[which] == assembly)
             of = which[rows]
             if rows.size:
-                local = {name: value[of] for name, value in places.items()}
+                local = {name: picked(value, of) for name, value in places.items()}
                 residual[rows] = _residual(designs, meetings[of], theta[rows], radius[rows], reach[of], local, assembly)
         return residual
 

@@ -15,6 +15,7 @@ import numpy as np
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Intervals, is_turn
 from mechdesign.analyses.region.rules import cubic, spread
+from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
@@ -182,7 +183,7 @@ class Pieces:
         valid = np.broadcast_to(poses.valid, design.shape)
         place = np.where(valid, poses.value(x) + 1j * poses.value(y), complex(np.nan, np.nan))
         for k in [] if mechanism.forward.iterative else np.flatnonzero(~valid).tolist():
-            pose = elsewhere(mechanism, {name: value[k] for name, value in places.items()})
+            pose = elsewhere(mechanism, {name: picked(value, k) for name, value in places.items()})
             place[k] = complex(float(pose.value(x)), float(pose.value(y)))
         return place
 

@@ -341,7 +341,7 @@ def _box(designs: Designs) -> tuple[Complexes, Complexes, Flags]:
             size = np.abs(w) + np.abs(stroke).max(axis=0)
             steps.append((edge.tail, edge.head, -size, size))
         else:
-            along, turn = (np.stack([np.real(v), np.imag(v)]).reshape(2, -1) for v in (w, d))
+            along, turn = (np.stack([v.real, v.imag]).reshape(2, -1) for v in (w, d))
             with np.errstate(invalid="ignore"):
                 ends = np.nan_to_num(turn * stroke, nan=0.0, posinf=np.inf, neginf=-np.inf)
             steps.append((edge.tail, edge.head, along + ends.min(axis=0), along + ends.max(axis=0)))

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.region.field import Field, Places
+from mechdesign.mechanism.algebra import picked
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.numerics.roots import bracketed_roots, dips
 
@@ -130,7 +131,7 @@ class Designs:
         if not complete:
             # Determinants cost as much as all other margins together: they are computed only where they decide.
             place, lane = np.nonzero(inside)
-            all_margins = field.margins(z[place, lane], {name: value[lane] for name, value in places.items()})
+            all_margins = field.margins(z[place, lane], {name: picked(value, lane) for name, value in places.items()})
             inside[place, lane] = (all_margins > 0).all(axis=0)
             of_assembly = np.full((len(all_margins) - len(margins), *z.shape), np.inf)
             of_assembly[:, place, lane] = all_margins[len(margins) :]
@@ -284,7 +285,7 @@ def _cut_by_others(
     solved = np.concatenate([quadratic, np.zeros((assembly_count, len(direction)), dtype=bool)])
     sampled = np.flatnonzero(~np.asarray(solved.all(axis=0))[intervals.ray])
     owner, inner, width = intervals.ray[sampled], intervals.inner[sampled], (intervals.outer - intervals.inner)[sampled]
-    local = {name: value[owner] for name, value in places.items()}
+    local = {name: picked(value, owner) for name, value in places.items()}
     turning = any(bound.coordinate.kind == "expression" for bound in designs.field.mechanism.bounds)
     count = max(designs.effort.samples, OF_EXPRESSIONS if turning else 0)
     fraction = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, count))), INSET, 1 - INSET)
@@ -293,7 +294,7 @@ def _cut_by_others(
 
     def places_at(lane: Ints, radius: Floats) -> tuple[Complexes, Places]:
         z = centre[owner[lane]] + radius * direction[owner[lane]]
-        return z, {name: value[lane] for name, value in local.items()}
+        return z, {name: picked(value, lane) for name, value in local.items()}
 
     def look(lane: Ints, radius: Floats) -> tuple[Floats, Floats]:
         values, turned = designs.field.sampled(*places_at(lane, radius))

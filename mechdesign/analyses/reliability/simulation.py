@@ -90,8 +90,8 @@ def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
         for mode in (modes[index], -modes[index]) if modes[index] else ():
             modes[index] = mode
             solved = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
-            errors[mode] = sum(abs(solved.rotations[k] - configuration.rotations[k]) for k in group.angles)
-            errors[mode] += sum(abs(solved.slides[k] - configuration.slides[k]) for k in group.slides)
+            errors[mode] = sum(float(np.abs(solved.rotations[k] - configuration.rotations[k])) for k in group.angles)
+            errors[mode] += sum(float(np.abs(solved.slides[k] - configuration.slides[k])) for k in group.slides)
         # A mode that cannot be assembled has nan and comes last.
         modes[index] = min(errors, key=lambda mode: (np.isnan(errors[mode]), errors[mode]), default=modes[index])
     return forward if tuple(modes) == forward.modes else Plan(mechanism, forward.structure, modes)

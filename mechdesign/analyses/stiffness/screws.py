@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, cross, vector
+from mechdesign.mechanism.algebra import Value, cross, picked, vector
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # Singular values below this fraction of the largest one count as zero. Elbows at full stretch, which are found through
@@ -65,7 +65,7 @@ class LegScrews:
         return LegScrews(
             [twist[:, index] for twist in self.passive],
             [twist[:, index] for twist in self.elastic],
-            [c if np.ndim(c) == 0 else c[index] for c in self.compliance],
+            [picked(c, index) for c in self.compliance],
             self.base[index],
             self.tip[index],
         )

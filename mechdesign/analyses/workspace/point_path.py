@@ -50,7 +50,7 @@ class _Path:
             linear = mechanism.linearize(pose)
             rates = linear.velocity([1.0])
             slope = [first(pose, c, rates) for c in coordinates]
-            rows = [*(pose.value(c) for c in coordinates), np.hypot(*slope)]
+            rows = [*(pose.value(c) for c in coordinates), np.hypot(slope[0], slope[1])]
             conditioning = np.broadcast_to(regularity(linear), s.shape)
             return np.stack([np.broadcast_to(row, s.shape) for row in rows]), conditioning
 
@@ -161,7 +161,7 @@ def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
 def _range(study: Study, drive: str) -> tuple[float, float]:
     """The limits of a drive that is no angle."""
     bounds = [b.ends(study.mechanism.nominal) for b in study.mechanism.bounds if b.coordinate.name == drive]
-    lows, highs = ([float(ends[k]) for ends in bounds if ends[k] is not None] for k in (0, 1))
+    lows, highs = ([float(end) for ends in bounds if (end := ends[k]) is not None] for k in (0, 1))
     if not lows or not highs:
         message = f"the path of a point needs the range of drive {drive}: give it limits, {{drive: {drive}, min, max}}"
         raise StudyError((Problem(message, "mechanism.limits", str(study.path or "")),))

@@ -82,7 +82,7 @@ def _solved(panels: Panels, design: Ints, z: Complexes) -> tuple[Complexes, Floa
         (a, b), (c, d) = Local.at(designs.field, z + step, places).homogeneous
         with np.errstate(divide="ignore", invalid="ignore"):
             # Every matrix is the sum of a turning and a reflection, each times a size.
-            turning, reflection = (a + d) + 1j * (c - b), (a - d) + 1j * (c + b)
+            turning, reflection = np.asarray((a + d) + 1j * (c - b)), np.asarray((a - d) + 1j * (c + b))
             less = np.where(np.abs(turning[0]) > np.abs(reflection[0]), reflection / turning, turning / reflection)
             here, by_x, by_y = less[0], less[1] - less[0], less[2] - less[0]
             det = cross(by_x, by_y)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mechdesign.analyses.poses import Shown, pose_in_words, radians
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
@@ -107,7 +107,7 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
     """The pose of that index in a (flattened) batch, or None where it cannot be assembled."""
     description = mechanism.description
 
-    def pick(values: Value) -> complex:
+    def pick(values: Vector) -> complex:
         return complex(np.broadcast_to(values, configuration.shape).flat[index])
 
     names = {point for link in description.links.values() for point in link_points(link)}

@@ -14,6 +14,7 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from mechdesign.analyses.poses import in_study_units, radians
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.before import Before, known
 from mechdesign.report.figures import style
@@ -91,7 +92,7 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
     assert study.workspace is not None
     point, local = study.workspace.point, region.local
-    given = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
+    given: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
     plan = study.mechanism.plan(tuple(given))
     values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
     return plan.solve(np.broadcast_arrays(*values), limits=False)
