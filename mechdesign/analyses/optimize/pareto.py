@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from math import comb
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.search import sample, search
 from mechdesign.numerics import fronts
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.evolution import offspring, simplex, survivors
 from mechdesign.results import Column, Table
 
 # Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
@@ -29,7 +29,6 @@ BEST_PART, END_PART, SUMS_PART = 6, 20, 10
 POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
 DIVISIONS = {3: 12, 4: 6, 5: 4}
 MOST_DIVISIONS = 3
-MOST_GENERATIONS = 1_000_000
 # Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
 BESIDE = 1e-6
 # Weighted sums in a round.
@@ -84,6 +83,11 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
 
 
+def _divisions(goals: int) -> int:
+    """Divisions of each goal by which more than two goals are spread."""
+    return DIVISIONS.get(goals, MOST_DIVISIONS)
+
+
 def _front_rows(known: Known, signs: Floats) -> Ints:
     """Rows of the feasible designs that no other surpasses."""
     rows = np.flatnonzero(known.feasible)
@@ -92,13 +96,13 @@ def _front_rows(known: Known, signs: Floats) -> Ints:
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     """Spread a population along the front, begun in the widest gaps so far."""
-    partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
-    size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
+    divisions = _divisions(len(signs))
+    size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
     size = int(np.clip(explorer.left // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
     known = explorer.known
     begun = _front_rows(known, signs)
     if len(begun):
-        begun = begun[np.argsort(-crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
+        begun = begun[np.argsort(-fronts.crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
     evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
 
@@ -163,56 +167,25 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
     Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. It ends with the evaluations,
     too, and where the population brings nothing new.
     """
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.algorithms.moo.nsga3 import NSGA3
-    from pymoo.core.evaluator import Evaluator
-    from pymoo.core.problem import Problem
-    from pymoo.problems.static import StaticProblem
-    from pymoo.util.ref_dirs import get_reference_directions
-
-    def outcome(u: Floats) -> tuple[Floats, Floats]:
-        rows = explorer(u)
-        known = explorer.known
-        valid = known.valid[rows]
-        # What cannot be built misses one condition more than there are, by more than any other, and the more so by how
-        # much it does not assemble.
-        values = np.where(valid[:, None], known.values[rows] * signs, 0.0)
-        missing = np.where(valid[:, None], np.maximum(-known.margins[rows], 0.0), 1.0)
-        worst = missing.max(axis=0, initial=0.0)
-        open_ = 1e3 * (1.0 + np.nan_to_num(known.shortfall[rows], nan=1e9))
-        return values, np.column_stack([missing / np.where(worst > 0, worst, 1.0), np.where(valid, 0.0, open_)])
-
-    goals = len(signs)
-    try:
-        conditions = outcome(first)[1].shape[1]
-        problem = Problem(n_var=explorer.dimensions, n_obj=goals, n_ieq_constr=conditions, xl=0.0, xu=1.0)
-        if goals == 2:
-            algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
-        else:
-            # No more directions than members of the population.
-            most = DIVISIONS.get(goals, MOST_DIVISIONS)
-            partitions = max(n for n in range(1, most + 1) if n == 1 or comb(n + goals - 1, n) <= len(first))
-            directions = get_reference_directions("das-dennis", goals, n_partitions=partitions)
-            algorithm = NSGA3(ref_dirs=directions, pop_size=len(first), sampling=first)
-        algorithm.setup(problem, termination=("n_gen", MOST_GENERATIONS), seed=seed, verbose=False)
-        begun, before = explorer.evaluated, -1
-        while algorithm.has_next():
-            asked = algorithm.ask()
-            if asked is None or not len(asked):
-                break
-            values, missing = outcome(np.asarray(asked.get("X"), dtype=float))
-            Evaluator().eval(StaticProblem(problem, F=values, G=missing), asked)
-            algorithm.tell(infills=asked)
-            if algorithm.n_gen % LOOKS == 0:
+    goals, random = len(signs), np.random.default_rng(seed)
+    # No more directions than members of the population.
+    fitting = [n for n in range(1, _divisions(goals) + 1) if n == 1 or comb(n + goals - 1, n) <= len(first)]
+    directions = None if goals == 2 else simplex(goals, fitting[-1])
+    begun, before = explorer.evaluated, -1
+    with suppress(Spent):
+        rows = explorer(first)
+        for generation in count(1):
+            known = explorer.known.take(rows)
+            order = survivors(known.values * signs, known.merit(np.zeros(goals)), directions, random)[: len(first)]
+            rows = np.unique(np.concatenate([rows[order], explorer(offspring(known.u[order], random))]))
+            if generation % LOOKS == 0:
                 # Where all designs are known, generations cost nothing and bring nothing.
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                last_quarter = (begun + 3 * explorer.evaluated) // 4
+                last_quarter = (begun + 3 * before) // 4
                 if not _grows(explorer.known, signs, last_quarter, SPREAD_GROWTH):
                     return
-    except Spent:
-        return
 
 
 def _grows(known: Known, signs: Floats, begun: int, least: float) -> bool:
@@ -228,20 +201,18 @@ def volumes(values: Floats, counts: Ints) -> Floats:
     They are in units of the box between each goal's best value on the front of all rows and its worst, and reach a
     tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
     """
-    from pymoo.indicators.hv import HV
-
     if not len(values):
         return np.zeros(len(counts))
     last = values[front(values)]
     low, span = last.min(axis=0), np.ptp(last, axis=0)
     shares = (values - low) / np.where(span > 0, span, 1.0)
-    volume, found = HV(ref_point=np.full(values.shape[1], CORNER)), np.zeros(len(counts))
+    found = np.zeros(len(counts))
     rows, done = np.empty(0, dtype=np.intp), 0
     for k in np.argsort(counts, kind="stable").tolist():
         # What another design surpassed once stays off the front.
         rows = np.concatenate([rows, np.arange(done, counts[k])])
         rows, done = rows[front(shares[rows])], int(counts[k])
-        found[k] = volume(shares[rows]) if len(rows) else 0.0
+        found[k] = fronts.hypervolume(shares[rows], CORNER)
     return found
 
 
@@ -296,16 +267,6 @@ def knee(values: Floats) -> int:
     Less is better. [Das, On characterizing the 'knee' of the Pareto curve, 1999.]
     """
     return int(np.argmin(normalised(values) @ plane(values)))
-
-
-def crowding(values: Floats) -> Floats:
-    """Crowding distance of each row of a front: the sum over goals of the normalised gap between its neighbours.
-
-    Infinite at the ends [Deb et al., 2002].
-    """
-    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
-
-    return np.asarray(calc_crowding_distance(values) * values.shape[1])
 
 
 @dataclass(frozen=True)
@@ -403,6 +364,6 @@ def pareto_table(designs: Designs) -> Table:
         Column(
             "knee", found.rows == found.knee, "", "1 at the design farthest from the plane through the front's ends"
         ),
-        Column("crowding", crowding(found.values), "", "gap between the neighbours on the front; inf at its ends"),
+        Column("crowding", fronts.crowding(found.values), "", "gap between the neighbours on the front; inf at its ends"),
     )
     return Table("pareto", columns, "designs none of which is surpassed in every goal at once")
