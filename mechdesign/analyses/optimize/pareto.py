@@ -37,8 +37,8 @@ WEIGHTED_SUMS = 12
 # of more than two goals, whose fronts are surfaces of many thousand designs.
 DESIGN_DISTANCE, SURFACE_DISTANCE = 1e-4, 2e-3
 # A population is spread until the last quarter of its designs adds no more than this part of the hypervolume, looked at
-# after so many generations; rounds of spreading and filling end when one adds no more than that part.
-SPREAD_GROWTH, LOOKS, ROUND_GROWTH = 1e-3, 20, 2e-4
+# after so many generations; rounds of spreading and filling end when one adds no more, too.
+LEAST_GROWTH, LOOKS = 2e-4, 20
 # A front whose last tenth of designs adds more than this part of its hypervolume still grows.
 STILL_GROWING = 1e-3
 # Distances on a front, in parts of its extent, at which designs midway between neighbours are evaluated: the widest is
@@ -76,7 +76,7 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         _spread(explorer, signs, seed + k)
         _descend_between(explorer, signs, budget // SUMS_PART, seed + k)
         _fill(explorer, signs)
-        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before, ROUND_GROWTH)):
+        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before)):
             break
     if use_all:
         # Of a population that is larger than what is left nothing was evaluated.
@@ -95,16 +95,19 @@ def _front_rows(known: Known, signs: Floats) -> Ints:
 
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
-    """Spread a population along the front, begun in the widest gaps so far."""
+    """Spread a population along the front, begun in the widest gaps so far, by half of the evaluations that are left."""
     divisions = _divisions(len(signs))
     size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
-    size = int(np.clip(explorer.left // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
+    half = explorer.left // 2
+    size = int(np.clip(half // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
     known = explorer.known
     begun = _front_rows(known, signs)
     if len(begun):
         begun = begun[np.argsort(-fronts.crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
+    explorer.reserve = half
     evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
+    explorer.reserve = 0
 
 
 def _end(explorer: Explorer, signs: Floats, most: int) -> None:
@@ -183,16 +186,15 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                last_quarter = (begun + 3 * before) // 4
-                if not _grows(explorer.known, signs, last_quarter, SPREAD_GROWTH):
+                if not _grows(explorer.known, signs, (begun + 3 * before) // 4):
                     return
 
 
-def _grows(known: Known, signs: Floats, begun: int, least: float) -> bool:
+def _grows(known: Known, signs: Floats, begun: int) -> bool:
     """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
     before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))
-    return bool(last - before > least * last)
+    return bool(last - before > LEAST_GROWTH * last)
 
 
 def volumes(values: Floats, counts: Ints) -> Floats:
