@@ -95,7 +95,7 @@ def _front_rows(known: Known, signs: Floats) -> Ints:
 
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
-    """Spread a population along the front, begun in the widest gaps so far, by half of the evaluations that are left."""
+    """Spread a population along the front, begun in the widest gaps so far, by half of the evaluations left."""
     divisions = _divisions(len(signs))
     size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
     half = explorer.left // 2
@@ -193,29 +193,29 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
 def _grows(known: Known, signs: Floats, begun: int) -> bool:
     """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
-    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))
+    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))[1]
     return bool(last - before > LEAST_GROWTH * last)
 
 
-def volumes(values: Floats, counts: Ints) -> Floats:
-    """Hypervolumes of the fronts of the first so many rows of values, shape (designs, goals), less being better.
+def volumes(values: Floats, counts: Ints) -> tuple[Ints, Floats]:
+    """Sizes and hypervolumes of the fronts of the first so many rows of values, shape (designs, goals).
 
-    They are in units of the box between each goal's best value on the front of all rows and its worst, and reach a
-    tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
+    Less is better. Hypervolumes are in units of the box between each goal's best value on the front of all rows and its
+    worst, and reach a tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
     """
+    sizes, hypervolumes = np.zeros(len(counts), dtype=np.intp), np.zeros(len(counts))
     if not len(values):
-        return np.zeros(len(counts))
+        return sizes, hypervolumes
     last = values[front(values)]
     low, span = last.min(axis=0), np.ptp(last, axis=0)
     shares = (values - low) / np.where(span > 0, span, 1.0)
-    found = np.zeros(len(counts))
     rows, done = np.empty(0, dtype=np.intp), 0
     for k in np.argsort(counts, kind="stable").tolist():
         # What another design surpassed once stays off the front.
         rows = np.concatenate([rows, np.arange(done, counts[k])])
         rows, done = rows[front(shares[rows])], int(counts[k])
-        found[k] = fronts.hypervolume(shares[rows], CORNER)
-    return found
+        sizes[k], hypervolumes[k] = len(rows), fronts.hypervolume(shares[rows], CORNER)
+    return sizes, hypervolumes
 
 
 def front(values: Floats) -> Ints:
@@ -312,7 +312,7 @@ def front_of(designs: Designs) -> Front:
     return Front(feasible[rows], values[rows])
 
 
-def optima(designs: Designs, typed: Floats) -> Designs:
+def optima(designs: Designs, pareto_front: Front, typed: Floats) -> Designs:
     """The designs with the optima of their front: its knee, its ends, and those of the weights that the study types.
 
     The weights of the knee are the factors of the goals in the plane from which it is the farthest.
@@ -321,13 +321,12 @@ def optima(designs: Designs, typed: Floats) -> Designs:
     ----------
     typed : ndarray, shape (rows, goals)
     """
-    found = front_of(designs)
     inside = designs.values[designs.feasible]
-    ranges, spans = np.ptp(inside, axis=0), np.ptp(found.values, axis=0)
-    weights = plane(found.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
+    ranges, spans = np.ptp(inside, axis=0), np.ptp(pareto_front.values, axis=0)
+    weights = plane(pareto_front.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
     rows = np.concatenate([[weights / weights.max()], np.eye(len(weights)), typed])
     names = ("knee", *(f"best {goal.name}" for goal in designs.goals), *["weights"] * len(typed))
-    chosen = np.array([found.knee, *found.ends], dtype=np.intp)
+    chosen = np.array([pareto_front.knee, *pareto_front.ends], dtype=np.intp)
     return dataclasses.replace(designs, weights=rows, marks=names, chosen=chosen)
 
 
@@ -345,11 +344,11 @@ def growth_table(designs: Designs) -> Table:
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = counts - counts // 10
     values = designs.values[rows] * signs_of(designs)
-    volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
+    sizes, hypervolumes = volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier])))
+    volume, before = np.split(hypervolumes, 2)
     columns = (
         Column("designs", counts, "", "designs that were evaluated until then"),
-        Column("front", np.array([len(front(values[: np.searchsorted(rows, number)])) for number in counts]), "",
-               "how many of them no other surpassed"),
+        Column("front", sizes[: len(counts)], "", "how many of them no other surpassed"),
         Column("hypervolume", volume, "", "of their front, in boxes between the last front's best and worst values, "
                "up to a tenth beyond"),
         Column("growth", np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0), "",
@@ -358,14 +357,21 @@ def growth_table(designs: Designs) -> Table:
     return Table("hypervolume", columns, "how the front grew, and whether it still does")
 
 
-def pareto_table(designs: Designs) -> Table:
+def pareto_table(designs: Designs, pareto_front: Front) -> Table:
     """The designs on the front."""
-    found = front_of(designs)
     columns = (
-        *designs.columns(found.rows),
+        *designs.columns(pareto_front.rows),
         Column(
-            "knee", found.rows == found.knee, "", "1 at the design farthest from the plane through the front's ends"
+            "knee",
+            pareto_front.rows == pareto_front.knee,
+            "",
+            "1 at the design farthest from the plane through the front's ends",
         ),
-        Column("crowding", fronts.crowding(found.values), "", "gap between the neighbours on the front; inf at its ends"),
+        Column(
+            "crowding",
+            fronts.crowding(pareto_front.values),
+            "",
+            "gap between the neighbours on the front; inf at its ends",
+        ),
     )
     return Table("pareto", columns, "designs none of which is surpassed in every goal at once")
