@@ -81,4 +81,4 @@ def offspring(parents: Floats, random: np.random.Generator) -> Floats:
     share = random.random(children.shape)
     step = 1 - (2 * np.minimum(share, 1 - share)) ** (1 / (MUTATION_INDEX + 1))
     changed = random.random(children.shape) < min(0.5, 1 / dimensions)
-    return np.clip(children + np.where(changed, np.where(share < 0.5, -step, step), 0.0), 0.0, 1.0)
+    return np.asarray(np.clip(children + np.where(changed, np.where(share < 0.5, -step, step), 0.0), 0.0, 1.0))
