@@ -28,7 +28,7 @@ NAME = "manifest.json"
 _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"
 _MOST_BYTES = 100_000_000  # of a manifest; of a larger one the memory might not hold what it says
-_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "pymoo")
+_LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "moocore")
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from helpers.syntheses import tray
 
 import mechdesign
 from mechdesign.analyses.optimize.explorer import Explorer, Known
-from mechdesign.analyses.optimize.pareto import crowding, evolve_front, front, knee
+from mechdesign.analyses.optimize.pareto import evolve_front, front, knee
 from mechdesign.analyses.optimize.search import sample
+from mechdesign.numerics.fronts import crowding
 
 # x = r1 cos 30 + r2 cos 60 is small and y = r1 sin 30 + r2 sin 60 large: first r2 grows, then r1.
 ARM = """\

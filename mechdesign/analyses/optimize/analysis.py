@@ -84,7 +84,8 @@ def optimize(
             if not designs.feasible.any():
                 raise _nothing_feasible(study, designs, judge.nearest())
             if section.method == "pareto":
-                designs = pareto.optima(designs, weights if section.weights else weights[:0])
+                pareto_front = pareto.front_of(designs)
+                designs = pareto.optima(designs, pareto_front, weights if section.weights else weights[:0])
             sensitivity = sensitivity_table(designs, judge)
         except KeyboardInterrupt:
             if journal is not None:
@@ -99,7 +100,7 @@ def optimize(
     ]  # fmt: skip
     if section.method == "pareto":
         growth = pareto.growth_table(designs)
-        tables = [pareto.pareto_table(designs), *tables, growth]
+        tables = [pareto.pareto_table(designs, pareto_front), *tables, growth]
         doubts += tuple(pareto.doubts(growth, budget))
     files, wrong = design_files(study, designs, _optima(designs))
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}

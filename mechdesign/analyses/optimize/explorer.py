@@ -81,6 +81,10 @@ class Known:
     rows: Floats
     shortfall: Floats
 
+    def take(self, rows: Ints) -> Known:
+        """Some of the points."""
+        return Known(*(column[rows] for column in vars(self).values()))
+
     @property
     def valid(self) -> Flags:
         """Points that have values."""

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from math import comb
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from mechdesign.analyses.optimize.search import sample, search
 from mechdesign.cautions import Caution
 from mechdesign.numerics import fronts
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.numerics.evolution import offspring, simplex, survivors
 from mechdesign.results import Table
 
 # Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
@@ -31,7 +31,6 @@ BEST_PART, END_PART, SUMS_PART = 6, 20, 10
 POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
 DIVISIONS = {3: 12, 4: 6, 5: 4}
 MOST_DIVISIONS = 3
-MOST_GENERATIONS = 1_000_000
 # Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
 BESIDE = 1e-6
 # Weighted sums in a round.
@@ -40,8 +39,8 @@ WEIGHTED_SUMS = 12
 # of more than two goals, whose fronts are surfaces of many thousand designs.
 DESIGN_DISTANCE, SURFACE_DISTANCE = 1e-4, 2e-3
 # A population is spread until the last quarter of its designs adds no more than this part of the hypervolume, looked at
-# after so many generations; rounds of spreading and filling end when one adds no more than that part.
-SPREAD_GROWTH, LOOKS, ROUND_GROWTH = 1e-3, 20, 2e-4
+# after so many generations; rounds of spreading and filling end when one adds no more, too.
+LEAST_GROWTH, LOOKS = 2e-4, 20
 # A front whose last tenth of designs adds more than this part of its hypervolume still grows.
 STILL_GROWING = 1e-3
 # Distances on a front, in parts of its extent, at which designs midway between neighbours are evaluated: the widest is
@@ -79,11 +78,16 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
         _spread(explorer, signs, seed + k)
         _descend_between(explorer, signs, budget // SUMS_PART, seed + k)
         _fill(explorer, signs)
-        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before, ROUND_GROWTH)):
+        if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before)):
             break
     if use_all:
         # Of a population that is larger than what is left nothing was evaluated.
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
+
+
+def _divisions(goals: int) -> int:
+    """Divisions of each goal by which more than two goals are spread."""
+    return DIVISIONS.get(goals, MOST_DIVISIONS)
 
 
 def _front_rows(known: Known, signs: Floats) -> Ints:
@@ -93,16 +97,19 @@ def _front_rows(known: Known, signs: Floats) -> Ints:
 
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
-    """Spread a population along the front, begun in the widest gaps so far."""
-    partitions = DIVISIONS.get(len(signs), MOST_DIVISIONS)
-    size = POPULATION if len(signs) == 2 else comb(partitions + len(signs) - 1, partitions)
-    size = int(np.clip(explorer.left // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
+    """Spread a population along the front, begun in the widest gaps so far, by half of the evaluations left."""
+    divisions = _divisions(len(signs))
+    size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
+    half = explorer.left // 2
+    size = int(np.clip(half // GENERATIONS, max(SMALLEST_POPULATION, len(signs)), size))
     known = explorer.known
     begun = _front_rows(known, signs)
     if len(begun):
-        begun = begun[np.argsort(-crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
+        begun = begun[np.argsort(-fronts.crowding(known.values[begun] * signs), kind="stable")[: size // 2]]
     others = sample(explorer.dimensions, np.random.default_rng(seed), size - len(begun), explorer.left)
+    explorer.reserve = half
     evolve_front(explorer, signs, np.concatenate([known.u[begun], others]), seed)
+    explorer.reserve = 0
 
 
 def _end(explorer: Explorer, signs: Floats, most: int) -> None:
@@ -165,86 +172,52 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
     Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. It ends with the evaluations,
     too, and where the population brings nothing new.
     """
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.algorithms.moo.nsga3 import NSGA3
-    from pymoo.core.evaluator import Evaluator
-    from pymoo.core.problem import Problem
-    from pymoo.problems.static import StaticProblem
-    from pymoo.util.ref_dirs import get_reference_directions
-
-    def outcome(u: Floats) -> tuple[Floats, Floats]:
-        rows = explorer(u)
-        known = explorer.known
-        valid = known.valid[rows]
-        # What cannot be built misses one condition more than there are, by more than any other, and the more so by how
-        # much it does not assemble.
-        values = np.where(valid[:, None], known.values[rows] * signs, 0.0)
-        missing = np.where(valid[:, None], np.maximum(-known.margins[rows], 0.0), 1.0)
-        worst = missing.max(axis=0, initial=0.0)
-        open_ = 1e3 * (1.0 + np.nan_to_num(known.shortfall[rows], nan=1e9))
-        return values, np.column_stack([missing / np.where(worst > 0, worst, 1.0), np.where(valid, 0.0, open_)])
-
-    goals = len(signs)
-    try:
-        conditions = outcome(first)[1].shape[1]
-        problem = Problem(n_var=explorer.dimensions, n_obj=goals, n_ieq_constr=conditions, xl=0.0, xu=1.0)
-        if goals == 2:
-            algorithm: Any = NSGA2(pop_size=len(first), sampling=first)
-        else:
-            # No more directions than members of the population.
-            most = DIVISIONS.get(goals, MOST_DIVISIONS)
-            partitions = max(n for n in range(1, most + 1) if n == 1 or comb(n + goals - 1, n) <= len(first))
-            directions = get_reference_directions("das-dennis", goals, n_partitions=partitions)
-            algorithm = NSGA3(ref_dirs=directions, pop_size=len(first), sampling=first)
-        algorithm.setup(problem, termination=("n_gen", MOST_GENERATIONS), seed=seed, verbose=False)
-        begun, before = explorer.evaluated, -1
-        while algorithm.has_next():
-            asked = algorithm.ask()
-            if asked is None or not len(asked):
-                break
-            values, missing = outcome(np.asarray(asked.get("X"), dtype=float))
-            Evaluator().eval(StaticProblem(problem, F=values, G=missing), asked)
-            algorithm.tell(infills=asked)
-            if algorithm.n_gen % LOOKS == 0:
+    goals, random = len(signs), np.random.default_rng(seed)
+    # No more directions than members of the population.
+    fitting = [n for n in range(1, _divisions(goals) + 1) if n == 1 or comb(n + goals - 1, n) <= len(first)]
+    directions = None if goals == 2 else simplex(goals, fitting[-1])
+    begun, before = explorer.evaluated, -1
+    with suppress(Spent):
+        rows = explorer(first)
+        for generation in count(1):
+            known = explorer.known.take(rows)
+            order = survivors(known.values * signs, known.merit(np.zeros(goals)), directions, random)[: len(first)]
+            rows = np.unique(np.concatenate([rows[order], explorer(offspring(known.u[order], random))]))
+            if generation % LOOKS == 0:
                 # Where all designs are known, generations cost nothing and bring nothing.
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
-                last_quarter = (begun + 3 * explorer.evaluated) // 4
-                if not _grows(explorer.known, signs, last_quarter, SPREAD_GROWTH):
+                if not _grows(explorer.known, signs, (begun + 3 * before) // 4):
                     return
-    except Spent:
-        return
 
 
-def _grows(known: Known, signs: Floats, begun: int, least: float) -> bool:
+def _grows(known: Known, signs: Floats, begun: int) -> bool:
     """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
-    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))
-    return bool(last - before > least * last)
+    before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))[1]
+    return bool(last - before > LEAST_GROWTH * last)
 
 
-def volumes(values: Floats, counts: Ints) -> Floats:
-    """Hypervolumes of the fronts of the first so many rows of values, shape (designs, goals), less being better.
+def volumes(values: Floats, counts: Ints) -> tuple[Ints, Floats]:
+    """Sizes and hypervolumes of the fronts of the first so many rows of values, shape (designs, goals).
 
-    They are in units of the box between each goal's best value on the front of all rows and its worst, and reach a
-    tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
+    Less is better. Hypervolumes are in units of the box between each goal's best value on the front of all rows and its
+    worst, and reach a tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
     """
-    from pymoo.indicators.hv import HV
-
+    sizes, hypervolumes = np.zeros(len(counts), dtype=np.intp), np.zeros(len(counts))
     if not len(values):
-        return np.zeros(len(counts))
+        return sizes, hypervolumes
     last = values[front(values)]
     low, span = last.min(axis=0), np.ptp(last, axis=0)
     shares = (values - low) / np.where(span > 0, span, 1.0)
-    volume, found = HV(ref_point=np.full(values.shape[1], CORNER)), np.zeros(len(counts))
     rows, done = np.empty(0, dtype=np.intp), 0
     for k in np.argsort(counts, kind="stable").tolist():
         # What another design surpassed once stays off the front.
         rows = np.concatenate([rows, np.arange(done, counts[k])])
         rows, done = rows[front(shares[rows])], int(counts[k])
-        found[k] = volume(shares[rows]) if len(rows) else 0.0
-    return found
+        sizes[k], hypervolumes[k] = len(rows), fronts.hypervolume(shares[rows], CORNER)
+    return sizes, hypervolumes
 
 
 def front(values: Floats) -> Ints:
@@ -300,16 +273,6 @@ def knee(values: Floats) -> int:
     return int(np.argmin(normalised(values) @ plane(values)))
 
 
-def crowding(values: Floats) -> Floats:
-    """Crowding distance of each row of a front: the sum over goals of the normalised gap between its neighbours.
-
-    Infinite at the ends [Deb et al., 2002].
-    """
-    from pymoo.operators.survival.rank_and_crowding.metrics import calc_crowding_distance
-
-    return np.asarray(calc_crowding_distance(values) * values.shape[1])
-
-
 @dataclass(frozen=True)
 class Front:
     """The designs on the front, the best of the first goal first.
@@ -351,7 +314,7 @@ def front_of(designs: Designs) -> Front:
     return Front(feasible[rows], values[rows])
 
 
-def optima(designs: Designs, typed: Floats) -> Designs:
+def optima(designs: Designs, pareto_front: Front, typed: Floats) -> Designs:
     """The designs with the optima of their front: its knee, its ends, and those of the weights that the study types.
 
     The weights of the knee are the factors of the goals in the plane from which it is the farthest.
@@ -360,13 +323,12 @@ def optima(designs: Designs, typed: Floats) -> Designs:
     ----------
     typed : ndarray, shape (rows, goals)
     """
-    found = front_of(designs)
     inside = designs.values[designs.feasible]
-    ranges, spans = np.ptp(inside, axis=0), np.ptp(found.values, axis=0)
-    weights = plane(found.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
+    ranges, spans = np.ptp(inside, axis=0), np.ptp(pareto_front.values, axis=0)
+    weights = plane(pareto_front.values) * np.divide(ranges, spans, out=np.ones_like(spans), where=spans > 0)
     rows = np.concatenate([[weights / weights.max()], np.eye(len(weights)), typed])
     names = ("knee", *(f"best {goal.name}" for goal in designs.goals), *["weights"] * len(typed))
-    chosen = np.array([found.knee, *found.ends], dtype=np.intp)
+    chosen = np.array([pareto_front.knee, *pareto_front.ends], dtype=np.intp)
     return dataclasses.replace(designs, weights=rows, marks=names, chosen=chosen)
 
 
@@ -388,15 +350,17 @@ def growth_table(designs: Designs) -> Table:
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = counts - counts // 10
     values = designs.values[rows] * signs_of(designs)
-    volume, before = np.split(volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier]))), 2)
+    sizes, hypervolumes = volumes(values, np.searchsorted(rows, np.concatenate([counts, earlier])))
+    volume, before = np.split(hypervolumes, 2)
     return HYPERVOLUME.table(HYPERVOLUME.columns(
-        {}, designs=counts, front=[len(front(values[: np.searchsorted(rows, number)])) for number in counts],
+        {}, designs=counts, front=sizes[: len(counts)],
         hypervolume=volume, growth=np.divide(volume - before, volume, out=np.zeros(len(counts)), where=volume > 0),
     ))  # fmt: skip
 
 
-def pareto_table(designs: Designs) -> Table:
+def pareto_table(designs: Designs, pareto_front: Front) -> Table:
     """The designs on the front."""
-    found = front_of(designs)
-    marks = PARETO.columns({}, knee=found.rows == found.knee, crowding=crowding(found.values))
-    return PARETO.table([*designs.columns(found.rows), *marks])
+    marks = PARETO.columns(
+        {}, knee=pareto_front.rows == pareto_front.knee, crowding=fronts.crowding(pareto_front.values)
+    )
+    return PARETO.table([*designs.columns(pareto_front.rows), *marks])
