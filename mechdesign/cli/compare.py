@@ -18,7 +18,7 @@ from mechdesign.errors import StudyError, counted
 from mechdesign.files import FORMATS, check_marked, check_writable, marked
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.comparison import folders
-from mechdesign.report.comparison.differences import OUTCOME, VERDICT, Comparison, Difference, Tolerance, Tolerances
+from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.manifest import Extras
 from mechdesign.report.tables import to_csv
 from mechdesign.study.loading import load_data
@@ -29,10 +29,8 @@ from mechdesign.work.threads import one_thread
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 _HEADER = to_csv(Comparison().table).encode()
-# Of `Difference.change`: a file whose bytes are others.
-_BYTES = "bytes"
 # Differences that are told beside the table.
-_SAID = (VERDICT, OUTCOME)
+_SAID = ("verdict", "outcome")
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
 
@@ -104,11 +102,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
         with tempfile.TemporaryDirectory() as there:
             terminal.say(f"{root / folder}: {content.get('command')} again", quiet=options.quiet)
             _repeat(Path(there), root / folder / manifest.NAME, content, options)
-            found = _verified(folder, root / folder, content, Path(there))
-        total.differences += found.differences
-        total.notes += found.notes
-        total.cases += found.cases
-        total.compared += found.compared
+            _verify(total, folder, root / folder, content, Path(there))
     return _tell(total, "verify", options.junit, as_json=options.json, quiet=options.quiet)
 
 
@@ -134,14 +128,14 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     writer.write(there, study, result, requirements.requirements(study, result), tables)
 
 
-def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> Comparison:
-    """Differences of the kept tables and those that were computed again, and of the bytes of all files."""
+def _verify(found: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
+    """Add differences of the kept tables and those that were computed again, and of the bytes of all files."""
     # The study that is repeated has its overrides in it.
     before, after = content | {"overrides": []}, folders.results(there)["."]
-    found = Comparison(notes=[f"{folder}: {note}" for note in folders.notes(before, after)])
+    found.notes += [f"{folder}: {note}" for note in folders.notes(before, after)]
     folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
     again, listed = after["files"], content["files"]
-    told = {difference.table for difference in found.differences}
+    told = {difference.table for difference in found.differences if difference.folder == folder}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
         table, digest = name.removesuffix(".csv"), listed.get(name, "")
@@ -151,8 +145,7 @@ def _verified(folder: str, kept: Path, content: dict[str, Any], there: Path) -> 
         known = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
         wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in known.items() if other != wanted]
         if wrong and table not in told:
-            found.differences.append(Difference(folder, table, "", _BYTES, old=", ".join(wrong), new=wanted[:_SHOWN]))
-    return found
+            found.differences.append(Difference(folder, table, "", "bytes", old=", ".join(wrong), new=wanted[:_SHOWN]))
 
 
 def _write(out: Path, found: Comparison) -> None:

@@ -213,10 +213,10 @@ def limits(*rows):
 def test_a_limit_that_moved_is_no_other_limit():
     tolerances = dict.fromkeys(("theta", "kind"), Tolerance(1e-9))
     old, new = limits((10.0, "stop"), (80.0, "dead point")), limits((10.5, "stop"), (80.0, "dead point"))
-    [(told, _)] = compare_tables(old, new, tolerances)
-    assert (told["column"], told["change"], told["largest"], told["row"]) == ("theta", "moved", 0.5, "theta 10")
+    [told] = compare_tables(old, new, tolerances)
+    assert (told.column, told.change, told.largest, told.row) == ("theta", "moved", 0.5, "theta 10")
     # Of studies with other poses nobody knows which rows are meant.
-    changes = [told["change"] for told, _ in compare_tables(old, new, tolerances, same_poses=False)]
+    changes = [told.change for told in compare_tables(old, new, tolerances, same_poses=False)]
     assert changes == ["missing", "new"]
 
 

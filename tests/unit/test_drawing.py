@@ -10,9 +10,10 @@ from matplotlib.text import Text
 import mechdesign
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.labels import Label, paper, place_labels
+from mechdesign.report.figures.labels import Label, paper, place_labels, positions
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.scene import hull, pose
+from mechdesign.report.figures.shapes import BAR, Line, Symbol, link_colors, mechanism_shapes
 from mechdesign.results import Result
 
 SLIDER = """
@@ -99,6 +100,20 @@ def test_a_pose_that_cannot_be_assembled_draws_nothing(study):
     assert pose(study.mechanism, configuration) is None
 
 
+def test_pins_lie_on_bars_and_bars_on_the_ground_and_sizes_are_those_of_paper(study):
+    mechanism = study.mechanism
+    configuration = mechanism.plan(("theta",)).solve([np.radians(90.0)])
+    shapes = mechanism_shapes(pose(mechanism, configuration), link_colors(mechanism), {})
+    pins = [shape for shape in shapes if isinstance(shape, Symbol) and shape.fill == "white"]
+    bars = [shape for shape in shapes if isinstance(shape, Line) and shape.width == BAR and not shape.filled]
+    ground = [shape for shape in shapes if isinstance(shape, Symbol) and not shape.point and shape.place == 0]
+    assert min(pin.layer for pin in pins) > max(bar.layer for bar in bars) > max(shape.layer for shape in ground)
+    # The crank is 40 long, and stands upright.
+    (crank,) = [bar for bar in bars if bar.link == "crank"]
+    assert sorted(np.abs(crank.places)) == pytest.approx([0, 40])
+    assert {pin.point: pin.place for pin in pins}["A"] == pytest.approx(40j)
+
+
 @pytest.mark.slow
 def test_user_settings_do_not_reach_the_picture_and_come_back(study):
     import matplotlib
@@ -149,3 +164,13 @@ def test_names_go_where_least_is_covered():
         assert second[1] < -6
         boxes = [Text.get_window_extent(text) for text in axes.texts]
         assert not boxes[0].overlaps(boxes[1])
+
+
+def test_a_name_stands_where_it_covers_least_in_all_poses_together():
+    label, window = Label("P", (0j,), "black"), np.array([[-100.0, -100.0], [100.0, 100.0]])
+    x, y = (side.ravel() for side in np.meshgrid(np.linspace(-60, 60, 31), np.linspace(-60, 60, 31)))
+    # Each pose leaves two sides free; the lower one is free in both.
+    nets = [np.column_stack([x, y])[side] for side in ((x > -3) & (y > -3), (x < 3) & (y > -3))]
+    (position,) = positions([label], [[np.zeros((1, 2))]] * 2, nets, window)
+    assert position.offset[1] < -6
+    assert not position.leader

@@ -102,6 +102,23 @@ def test_a_pin_stays_in_its_slot(name, pin, owner):
     assert share.real.max() < 1
 
 
+@pytest.mark.parametrize("name", ["scotch_yoke", "oldham"])
+def test_names_of_points_do_not_overlap_in_the_first_pose(name):
+    part, _ = shown(name)
+    boxes = []
+    for group in ElementTree.fromstring(part.drawing).iterfind("./g[@data-at]"):
+        text = group.find("text")
+        if text is not None and group.get("data-turn") is None:
+            size = float(text.get("font-size"))
+            middle = places(part.data, group.get("data-at"))[0] + complex(float(text.get("x", 0)), float(text.get("y")))
+            boxes.append((middle, 0.6 * size * len(text.text), size))
+    assert len(boxes) > 3
+    for k, (place, wide, high) in enumerate(boxes):
+        for other, other_wide, _ in boxes[:k]:
+            apart = place - other
+            assert abs(apart.real) >= (wide + other_wide) / 2 or abs(apart.imag) >= high
+
+
 def test_numbers_and_velocities_are_those_of_the_table():
     part, result = shown("four_bar")
     data, table = part.data, result.tables["motion"]

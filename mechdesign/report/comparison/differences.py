@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from mechdesign.errors import counted
 from mechdesign.numerics.arrays import Floats
 from mechdesign.results import Column, Table
 
-# Kinds of difference.
-MOVED, MISSING, NEW, UNIT, VERDICT, OUTCOME = "moved", "missing", "new", "unit", "verdict", "outcome"
+# What is otherwise; of `bytes` a file that is to be the same again.
+Change = Literal["moved", "missing", "new", "unit", "verdict", "outcome", "bytes"]
 
 
 class Tolerance(NamedTuple):
@@ -43,7 +43,7 @@ class Difference:
     folder: str
     table: str  # empty where it is the whole folder
     column: str  # empty where it is the whole table, or rows of it
-    change: str  # `MOVED`, ...
+    change: Change
     rows: int = 0  # how many
     largest: float = math.nan  # absolute difference; inf between a number and none; nan of words
     relative: float = math.nan  # that difference over the old value
@@ -51,11 +51,21 @@ class Difference:
     new: str = ""
     row: str = ""  # its pose or key
     unit: str = ""
+    # For the picture: all numbers of a column that moved, before and after; the pose where it alone tells rows apart.
+    values: tuple[Floats, Floats] | None = field(default=None, compare=False, repr=False)
+    along: Column | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def share(self) -> float:
+        """The largest difference over the largest old value."""
+        assert self.values is not None
+        scale = np.abs(self.values[0][np.isfinite(self.values[0])]).max(initial=0.0)
+        return self.largest / float(scale) if scale else math.inf
 
     def __str__(self) -> str:
         place = ": ".join(part for part in (self.folder, ".".join(filter(None, (self.table, self.column)))) if part)
         at = f" at {self.row}" if self.row else ""
-        if self.change in (MISSING, NEW):
+        if self.change in ("missing", "new"):
             whole = "column" if self.column else "table" if self.table else "result"
             what = counted(self.rows, "row") if self.rows else whole
             return f"{place}: {what} {self.change}{f', the first{at}' if at else ''}"
@@ -65,27 +75,19 @@ class Difference:
         return f"{place}: {self.change}{size}{at}: {self.old} -> {self.new}{rows}"
 
 
-@dataclass(frozen=True, eq=False)
-class Moved:
-    """A column of numbers that moved, before and after, for the picture."""
-
-    name: str
-    unit: str
-    old: Floats
-    new: Floats
-    share: float  # largest difference over the largest old value
-    along: Column | None = None  # the pose, where it alone tells the rows apart
-
-
 @dataclass
 class Comparison:
     """Everything that two folders of results differ in; `compared` counts tables and columns of both."""
 
     differences: list[Difference] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    moved: list[Moved] = field(default_factory=list)
     compared: Counter[str] = field(default_factory=Counter)
     cases: list[tuple[str, str]] = field(default_factory=list)  # folder and table of each that was compared
+
+    @property
+    def moved(self) -> list[Difference]:
+        """The columns of numbers that moved, those first that moved most for their size."""
+        return sorted((each for each in self.differences if each.values), key=lambda each: -each.share)
 
     @property
     def table(self) -> Table:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -14,16 +13,7 @@ from pydantic_core import PydanticCustomError
 from mechdesign.commands import SWEEP
 from mechdesign.errors import Problem, StudyError
 from mechdesign.report import manifest
-from mechdesign.report.comparison.differences import (
-    MISSING,
-    NEW,
-    OUTCOME,
-    VERDICT,
-    Comparison,
-    Difference,
-    Tolerance,
-    Tolerances,
-)
+from mechdesign.report.comparison.differences import Comparison, Difference, Tolerance, Tolerances
 from mechdesign.report.comparison.tables import compare_tables
 from mechdesign.report.tables import from_csv
 from mechdesign.results import VARIED, Table
@@ -54,7 +44,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     unused = set(tolerances.patterns)
     for folder in sorted(before.keys() | after.keys()):
         if folder not in before or folder not in after:
-            found.differences.append(Difference(folder, "", "", MISSING if folder in before else NEW))
+            found.differences.append(Difference(folder, "", "", "missing" if folder in before else "new"))
             continue
         for note in notes(before[folder], after[folder]):
             noted[note].append(folder)
@@ -68,7 +58,6 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     if unfit and not found.differences:
         raise StudyError([Problem(each) for each in unfit])
     found.notes += unfit
-    found.moved.sort(key=lambda each: -each.share)
     return found
 
 
@@ -183,8 +172,7 @@ def compare_results(
     for name in dict.fromkeys((*before["tables"], *after["tables"])):
         table = name.removesuffix(".csv")
         if name not in before["tables"] or name not in after["tables"]:
-            change = MISSING if name in before["tables"] else NEW
-            found.differences.append(Difference(folder, table, "", change))
+            found.differences.append(Difference(folder, table, "", "missing" if name in before["tables"] else "new"))
             continue
         try:
             pair = _read_table(*old, name), _read_table(*new, name)
@@ -202,18 +190,16 @@ def compare_results(
                 chosen[column] = _in_unit(tolerances.patterns[fitting[-1]], fitting[-1], pair[0], column)
         found.compared.update(tables=1, columns=len(chosen))
         found.cases.append((folder, table))
-        for difference, moved in compare_tables(*pair, chosen, given[1][0], same_poses=given[0] == given[1]):
-            found.differences.append(Difference(folder, table, **difference))
-            if moved is not None:
-                found.moved.append(moved if folder == "." else replace(moved, name=f"{folder}/{moved.name}"))
+        same_poses = given[0] == given[1]
+        found.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
     verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
         told = [_verdict(each.get(words)) for each in verdicts]
         if told[0].split(",")[0] != told[1].split(",")[0]:
-            found.differences.append(Difference(folder, "", words, VERDICT, old=told[0], new=told[1]))
+            found.differences.append(Difference(folder, "", words, "verdict", old=told[0], new=told[1]))
     ends = [str(content.get("interrupted") or content.get("failed") or "done") for content in (before, after)]
     if ends[0] != ends[1]:
-        found.differences.append(Difference(folder, "", "", OUTCOME, old=ends[0], new=ends[1]))
+        found.differences.append(Difference(folder, "", "", "outcome", old=ends[0], new=ends[1]))
     return fitted
 
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.report.comparison.differences import MISSING, MOVED, NEW, UNIT, Moved, Tolerance
+from mechdesign.report.comparison.differences import Difference, Tolerance
 from mechdesign.results import Column, Table
 
 # Of the largest number of a unit in a table: what rounding leaves of zero there, on one machine or another.
@@ -22,58 +22,51 @@ Rows = NDArray[np.intp]
 
 
 def compare_tables(
-    old: Table, new: Table, tolerances: Mapping[str, Tolerance], given: Iterable[str] = (), *, same_poses: bool = True
-) -> Iterator[tuple[dict[str, Any], Moved | None]]:
-    """Differences of two tables (fields of `Difference`), and the numbers of columns that moved.
+    old: Table, new: Table, tolerances: Mapping[str, Tolerance], given: Iterable[str] = (), *, folder: str = ".",
+    same_poses: bool = True,
+) -> Iterator[Difference]:  # fmt: skip
+    """Differences of two tables of a folder.
 
     Rows are the same where their keys are: coordinates that are `given`, and then as many of the leading columns as
     tell the rows apart; numbers among them within their tolerance. Where a limit or a boundary lies is found, not
     given: of studies with the `same_poses`, rows that are left over are matched in their order where the words of
     their keys are the same and there are as many in both.
     """
-    for name in old.names:
-        if name not in new:
-            yield {"column": name, "change": MISSING, "unit": old.column(name).unit}, None
-    for name in new.names:
-        if name not in old:
-            yield {"column": name, "change": NEW, "unit": new.column(name).unit}, None
+    differs = partial(Difference, folder, old.name)
+    for table, other in ((old, new), (new, old)):
+        for column in table.columns:
+            if column.name not in other:
+                yield differs(column.name, "missing" if table is old else "new", unit=column.unit)
     keys = _keys(old, new, given)
     widths = {name: _width(old, new, name, tolerances[name]) for name in old.names if name in new}
     first, second = _matched(old, new, keys, {name: (tolerances[name].rtol, widths[name]) for name in keys}, same_poses)
-    for table, rows, change in ((old, first, MISSING), (new, second, NEW)):
+    for table, rows in ((old, first), (new, second)):
         left = np.setdiff1d(np.arange(len(table)), rows)
         if left.size:
-            yield {"column": "", "change": change, "rows": left.size, "row": _words(table, keys, left[0])}, None
+            yield differs("", "missing" if table is old else "new", left.size, row=_words(table, keys, left[0]))
     along = old.column(keys[0]) if len(keys) == 1 else None
-    if along is not None and along.numeric:
-        along = Column(along.name, along.values[first], along.unit)
+    if along is not None:
+        along = Column(along.name, along.values[first], along.unit) if along.numeric else None
     for name in widths:
         before, after = old.column(name), new.column(name)
         if before.unit != after.unit:
-            yield {"column": name, "change": UNIT, "old": before.unit, "new": after.unit}, None
+            yield differs(name, "unit", old=before.unit, new=after.unit)
         if not (before.numeric and after.numeric):
-            apart = np.flatnonzero([a != b for a, b in zip(_text(before, first), _text(after, second), strict=True)])
-            if apart.size:
-                row = apart[0]
-                told = {"old": _text(before, first)[row], "new": _text(after, second)[row]}
-                place = _words(old, keys, first[row])
-                yield {"column": name, "change": MOVED, "rows": apart.size, "row": place, **told}, None
+            words = list(zip(_text(before.values[first]), _text(after.values[second]), strict=True))
+            apart = [row for row, (a, b) in enumerate(words) if a != b]
+            if apart:
+                a, b = words[apart[0]]
+                yield differs(name, "moved", len(apart), old=a, new=b, row=_words(old, keys, first[apart[0]]))
             continue
-        a, b = before.values[first].astype(float), after.values[second].astype(float)
-        size = _apart(a, b)
-        beyond = np.flatnonzero(size > widths[name] + tolerances[name].rtol * np.where(np.isfinite(a), np.abs(a), 0))
+        x, y = before.values[first].astype(float), after.values[second].astype(float)
+        size, scale = _apart(x, y), np.where(np.isfinite(x), np.abs(x), 0)
+        beyond = np.flatnonzero(size > widths[name] + tolerances[name].rtol * scale)
         if beyond.size:
             row = beyond[np.argmax(size[beyond])]
             with np.errstate(divide="ignore", invalid="ignore"):
-                relative = float(size[row] / (np.abs(a[row]) if np.isfinite(a[row]) else 1))
-            largest = np.abs(a[np.isfinite(a)]).max(initial=0.0)
-            share = float(size[row] / largest) if largest else math.inf
-            told = {"old": f"{a[row]:.12g}", "new": f"{b[row]:.12g}", "unit": before.unit}
-            sizes = {"rows": beyond.size, "largest": float(size[row]), "relative": relative}
-            yield (
-                {"column": name, "change": MOVED, "row": _words(old, keys, first[row]), **told, **sizes},
-                Moved(f"{old.name}: {name}", before.unit, a, b, share, along if along and along.numeric else None),
-            )
+                relative = float(size[row] / (scale[row] if np.isfinite(x[row]) else 1))
+            yield differs(name, "moved", beyond.size, float(size[row]), relative, f"{x[row]:.12g}", f"{y[row]:.12g}",
+                          _words(old, keys, first[row]), before.unit, (x, y), along)  # fmt: skip
 
 
 def _apart(old: Floats, new: Floats) -> Floats:
@@ -100,8 +93,8 @@ def _width(old: Table, new: Table, name: str, tolerance: Tolerance) -> float:
     return ROUNDING * scale
 
 
-def _text(column: Column, rows: Rows) -> list[str]:
-    return [str(value) for value in column.values[rows].tolist()]
+def _text(values: NDArray[Any]) -> list[str]:
+    return [str(value) for value in values.tolist()]
 
 
 def _words(table: Table, keys: Sequence[str], row: int) -> str:
@@ -166,13 +159,9 @@ def _matched(
 
 
 def _texts(table: Table, names: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    columns = [_text(Column(name, _plain(table[name])), np.arange(len(table))) for name in names]
-    return zip(*columns, strict=True) if columns else [()] * len(table)
-
-
-def _plain(values: NDArray[Any]) -> NDArray[Any]:
-    """Numbers as floats: a column whose numbers are all whole reads as integers."""
-    return values.astype(float) if values.dtype.kind in "iub" else values
+    """Rows of some columns as words; a column whose numbers are all whole reads as integers, but is one of floats."""
+    values = [table[name].astype(float) if table[name].dtype.kind in "iub" else table[name] for name in names]
+    return zip(*map(_text, values), strict=True) if values else [()] * len(table)
 
 
 def _numbered(keys: Iterable[tuple[str, ...]]) -> Iterator[tuple[tuple[str, ...], int]]:

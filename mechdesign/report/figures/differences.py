@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from mechdesign.report.comparison.differences import Moved
+from mechdesign.report.comparison.differences import Difference
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS
 
@@ -20,16 +20,17 @@ _DOWN = 0.95
 _TITLE_SIZE = 9.0
 
 
-def differences_figure(moved: Sequence[Moved]) -> Figure:
+def differences_figure(moved: Sequence[Difference]) -> Figure:
     """A panel a column, of those that moved most for the size of their old values; use inside `style.context`."""
     shown = moved[:MAX_PANELS]
     columns = 1 if style.narrow() else min(_COLUMNS, len(shown))
     figure, panels = style.page(len(shown), columns, _HEIGHT, across=_ACROSS, down=_DOWN, **_MARGINS)
     room = panels[0].get_position().width * style.width()
     for axes, each in zip(panels, shown, strict=True):
+        assert each.values is not None
         if each.along is None:
-            axes.plot(each.old, each.new, "o", color=style.VERMILION, markersize=4, linestyle="none")
-            both = np.concatenate([each.old, each.new])
+            axes.plot(*each.values, "o", color=style.VERMILION, markersize=4, linestyle="none")
+            both = np.concatenate(each.values)
             ends = [both[np.isfinite(both)].min(initial=np.inf), both[np.isfinite(both)].max(initial=-np.inf)]
             if ends[0] < ends[1]:
                 axes.plot(ends, ends, color=style.FAINT, linewidth=1.0, zorder=1)
@@ -37,15 +38,14 @@ def differences_figure(moved: Sequence[Moved]) -> Figure:
             axes.set_ylabel(style.axis_label("new", each.unit))
         else:
             order = np.argsort(each.along.values, kind="stable")
-            for values, name, color, dashes in (
-                (each.old, "old", style.BLUE, style.DASHES[0]),
-                (each.new, "new", style.VERMILION, style.DASHES[1]),
-            ):
+            looks = (("old", style.BLUE, style.DASHES[0]), ("new", style.VERMILION, style.DASHES[1]))
+            for values, (name, color, dashes) in zip(each.values, looks, strict=True):
                 axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
             axes.set_xlabel(style.axis_label(each.along.name, each.along.unit))
             axes.set_ylabel(style.axis_label("", each.unit).strip())
             axes.legend(loc="best")
-        axes.set_title(style.folded(each.name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
+        name = f"{each.folder}/{each.table}: {each.column}".removeprefix("./")
+        axes.set_title(style.folded(name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
     left = len(moved) - len(shown)
     more = f"; {left} more in differences.csv" if left else ""
     figure.text(0.01, 1 - 0.1 / figure.get_figheight(), f"what moved most{more}", va="top", fontsize=11)

@@ -76,9 +76,7 @@ def draw_ghost(
         draw(axes, shapes.ghost_shapes(scene, dashes), order=2.0, alpha=alpha)
 
 
-def draw(
-    axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0, size: float = 1.0
-) -> None:  # fmt: skip
+def draw(axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float = 1.0, size: float = 1.0) -> None:
     """Draw shapes; `order` lifts them above drawings of lower order, `size` enlarges symbols and widths of lines."""
     for shape in drawn:
         if isinstance(shape, Symbol):

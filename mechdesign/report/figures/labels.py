@@ -98,7 +98,7 @@ def positions(
         offsets, strains = _offsets(label, half)
         # Only what is within reach of some place can be covered.
         reach = np.abs(offsets).max(axis=0) + half + 2
-        best: tuple[float, Position] | None = None
+        candidates = []
         for rank in range(len(label.anchors)):
             costs, unclear = strains + 0.4 * rank, np.zeros(len(offsets))
             for named, net, boxes_taken in zip(anchors, nets, taken, strict=True):
@@ -113,16 +113,15 @@ def positions(
                 costs = costs + _costs(boxes, near, written, window) / poses + _UNCLEAR * doubtful / poses
                 unclear += doubtful / poses
             k = int(np.argmin(costs))
-            if best is None or costs[k] < best[0]:
-                far = np.hypot(*np.maximum(np.abs(offsets[k]) - half, 0.0)) > label.reach + _LEADERLESS
-                best = float(costs[k]), Position(rank, offsets[k], bool(far or unclear[k] > 0.5))
-        if best is None or (label.optional and best[0] > _NO_ROOM):
+            candidates.append((float(costs[k]), rank, offsets[k], unclear[k] > 0.5))
+        cost, rank, offset, doubt = min(candidates, key=lambda candidate: candidate[0])
+        if label.optional and cost > _NO_ROOM:
             chosen.append(None)
             continue
-        position = best[1]
-        middles = np.array([named[which][position.anchor] for named in anchors]) + position.offset
+        far = np.hypot(*np.maximum(np.abs(offset) - half, 0.0)) > label.reach + _LEADERLESS
+        chosen.append(Position(rank, offset, bool(far or doubt)))
+        middles = np.array([named[which][rank] for named in anchors]) + offset
         taken[:, count], count = np.column_stack([middles - half, middles + half]), count + 1
-        chosen.append(position)
     return chosen
 
 
