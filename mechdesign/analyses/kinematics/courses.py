@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.along import Along
 from mechdesign.numerics.arrays import Flags, Floats
@@ -24,41 +21,49 @@ def course_of(along: Along, asked: Asked) -> Followed | None:
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """A column over motions, or the same part of each; see `mechdesign.statistics.Course`."""
+    """A column over motions of all designs or of one, or the same part of each; see `mechdesign.statistics.Course`.
+
+    `largest` has, by sign, the largest values of all designs times the sign, once they are asked for.
+    """
 
     along: Along
     name: str
+    design: int | None = None
+    largest: dict[int, Floats] = field(default_factory=dict)
+
+    @property
+    def _designs(self) -> slice:
+        return slice(None) if self.design is None else slice(self.design, self.design + 1)
 
     @property
     def followed(self) -> Flags:
         """Which motions are followed between their poses, shape (designs,)."""
-        return ~self.along.curve.spent
+        return ~self.along.curve.spent[self._designs]
 
     def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
         """The largest value times the sign, and its place in rows, shape (designs,)."""
-        return self.along.worst(self.name, sign, absolute=absolute)
+        value, place = self.along.worst(self.name, sign, absolute=absolute)
+        return value[self._designs], place[self._designs]
 
     def at(self, parts: Floats) -> Floats:
         """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
         curve = self.along.curve
-        line = np.repeat(np.arange(curve.lines), len(parts))
-        s = np.tile(parts * curve.poses.end, curve.lines)
-        return self.along.functions.interpolated(self.name, line, s).reshape(curve.lines, -1)
+        lines = np.arange(curve.lines)[self._designs]
+        line, s = np.repeat(lines, len(parts)), np.tile(parts * curve.poses.end, len(lines))
+        return self.along.functions.interpolated(self.name, line, s).reshape(-1, len(parts))
 
-    def shown(self, place: float, design: int = 0) -> str:
-        """A place of the motion of a design in words."""
+    def shown(self, place: float) -> str:
+        """A place of the motion of the first design in words."""
         poses = self.along.question.poses
-        given = poses.along(np.array([design]), np.array([place])).values
+        given = poses.along(np.array([self.design or 0]), np.array([place])).values
         moving = [poses.swept] if poses.swept is not None else given
         return ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
 
     def end(self, sign: int) -> Floats:
         """The largest value, or with the sign -1 the smallest."""
-        return self._ends[sign]
-
-    @cached_property
-    def _ends(self) -> dict[int, Floats]:
-        return {sign: self.worst(sign)[0] for sign in (1, -1)}
+        if sign not in self.largest:
+            self.largest[sign] = self.along.worst(self.name, sign)[0]
+        return self.largest[sign][self._designs]
 
     def mean(self, power: int) -> Floats:
         """Mean of a power of the values; with a pole in it one of an even power is infinite, and another is nan."""
@@ -68,57 +73,12 @@ class Followed:
         """Mean of the absolute values."""
         return self._mean(np.inf, 1, absolute=True)
 
-    def of(self, design: int) -> OfDesign | None:
+    def of(self, design: int) -> Followed | None:
         """The column over the motion of one of the designs; None where it is not followed."""
-        return OfDesign(self, design) if self.followed[design] else None
+        return replace(self, design=(self.design or 0) + design) if self.followed[design] else None
 
     def _mean(self, at_pole: float, power: int, *, absolute: bool = False) -> Floats:
-        mean = self.along.mean(self.name, power, absolute=absolute)
+        mean = self.along.mean(self.name, power, absolute=absolute)[self._designs]
         if not self.along.poled(self.name):
             return mean
         return np.where(np.isinf(self.end(1)) | np.isinf(self.end(-1)), at_pole, mean)
-
-
-@dataclass(frozen=True, eq=False)
-class OfDesign:
-    """A column over the motion of one design of several; see `mechdesign.statistics.Course`."""
-
-    course: Followed
-    design: int
-
-    @property
-    def followed(self) -> Flags:
-        """Whether the motion is followed between its poses, shape (1,)."""
-        return self._own(self.course.followed)
-
-    def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
-        """The largest value times the sign, and its place in rows, shape (1,)."""
-        value, place = self.course.worst(sign, absolute=absolute)
-        return self._own(value), self._own(place)
-
-    def at(self, parts: Floats) -> Floats:
-        """Values at parts of the way, shape (1, parts)."""
-        return self._own(self.course.at(parts))
-
-    def shown(self, place: float) -> str:
-        """A place of the motion in words."""
-        return self.course.shown(place, self.design)
-
-    def end(self, sign: int) -> Floats:
-        """The largest value, or with the sign -1 the smallest."""
-        return self._own(self.course.end(sign))
-
-    def mean(self, power: int) -> Floats:
-        """Mean of a power of the values."""
-        return self._own(self.course.mean(power))
-
-    def size(self) -> Floats:
-        """Mean of the absolute values."""
-        return self._own(self.course.size())
-
-    def of(self, design: int) -> OfDesign:
-        """Itself: there is one design."""
-        return self
-
-    def _own(self, values: NDArray[Any]) -> NDArray[Any]:
-        return values[self.design : self.design + 1]
