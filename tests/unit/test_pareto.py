@@ -121,6 +121,7 @@ def test_front_of_an_arm_and_its_knee():
     assert len(designs) <= 2000
 
 
+@pytest.mark.nightly
 def test_both_ends_of_a_front_are_searched_for():
     """Between short links and good conditioning, where few designs assemble at all."""
     problem = tray(None)
