@@ -282,4 +282,4 @@ def _part(value: Vector, name: str) -> Value:
     if isinstance(value, float):
         return value if name == "real" else 0.0
     part = getattr(value, name)
-    return np.ascontiguousarray(part) if np.ndim(part) else part
+    return part if isinstance(part, float) or not part.ndim else np.ascontiguousarray(part)
