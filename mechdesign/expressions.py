@@ -207,10 +207,10 @@ class Expression:
 
     def substituted(self, values: Mapping[str, Expression | float]) -> Expression:
         """The expression with others, or numbers, in place of its variables; trigonometry has their angle unit."""
-        given = {name: each for name, each in values.items() if isinstance(each, Expression)}
+        given = {name: value for name, value in values.items() if isinstance(value, Expression)}
         parts: dict[str, tuple[_Step, ...]] = {
-            name: each.program if isinstance(each, Expression) else (("constant", each),)
-            for name, each in values.items()
+            name: value.program if isinstance(value, Expression) else (("constant", value),)
+            for name, value in values.items()
         }  # fmt: skip
         program = tuple(
             chain.from_iterable(parts[str(item)] if kind == "name" else ((kind, item),) for kind, item in self.program)

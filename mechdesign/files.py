@@ -142,7 +142,9 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
     """
     patterns = [*names, *map(glob.escape, own)]
     try:
-        there = sorted(path for path in directory.iterdir() if any(fnmatchcase(path.name, each) for each in patterns))
+        there = sorted(
+            path for path in directory.iterdir() if any(fnmatchcase(path.name, pattern) for pattern in patterns)
+        )
     except OSError:
         # There is no folder, as a rule; else who writes there says why not.
         return

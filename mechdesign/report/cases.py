@@ -74,7 +74,9 @@ def best_of(table: Table) -> Best | None:
         first = np.flatnonzero(rank == 1)
         if found is None and len(first):
             row = first[0]
-            changes = [(each.name, each.values[row].tolist()) for each in part.columns if each.meaning == VARIED]
+            changes = [
+                (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
+            ]
             found = int(part["case"][row]), changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
     return None if found is None else Best(*found, *numbers.tolist())

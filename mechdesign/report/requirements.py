@@ -71,7 +71,7 @@ def command_of(requirement: Requirement) -> str:
 
 def judged_by(study: Study, command: str) -> list[int]:
     """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
-    return [k for k, each in enumerate(study.requirements) if command in (command_of(each), SWEEP.name)]
+    return [k for k, requirement in enumerate(study.requirements) if command in (command_of(requirement), SWEEP.name)]
 
 
 def number_of(study: Study, command: str) -> int:

@@ -220,9 +220,9 @@ def _moving(
                for centre in question.centres}  # fmt: skip
     return [
         SpecialPose(
-            *each, configuration, k, {point: complex(value[k]) for point, value in velocities.items()},
+            *word, configuration, k, {point: complex(value[k]) for point, value in velocities.items()},
             {point: complex(value[k]) for point, value in accelerations.items()},
             {centre: complex(value[k]) for centre, value in centres.items()},
         )
-        for k, each in enumerate(words)
+        for k, word in enumerate(words)
     ]  # fmt: skip

@@ -200,12 +200,12 @@ def _none_feasible(designs: Designs) -> str:
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
     told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
-    for each in designs.conditions:
-        index, statistic = split(each.column) if each.regional and each.outline is None else ("", "")
-        values = designs.found[each][np.isfinite(designs.found[each])] if statistic == "min" else np.empty(0)
+    for condition in designs.conditions:
+        index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
+        values = designs.found[condition][np.isfinite(designs.found[condition])] if statistic == "min" else np.empty(0)
         if values.size and (np.abs(values) <= 0).all():
-            told += (f"; {each.column} is 0 in all of them, as it is wherever the region ends at a singularity: bound "
-                     f"{index}_mean, or keep the region off singularities by mechanism.limits")  # fmt: skip
+            told += (f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
+                     f"bound {index}_mean, or keep the region off singularities by mechanism.limits")  # fmt: skip
     return f"no design of {len(designs)} is feasible: {told}"
 
 
@@ -258,11 +258,11 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
     assert study.workspace is not None
     columns = index_columns(study, evaluator.questions[0])
     found = {name: (column.unit, column.meaning) for name, column in columns.items()}
-    for each in evaluator.goals:
-        if each.outline is not None:
-            shape = each.column.removeprefix("scale of ")
+    for goal in evaluator.goals:
+        if goal.outline is not None:
+            shape = goal.column.removeprefix("scale of ")
             told = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-            found[each.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
+            found[goal.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
     if len(evaluator.questions) > 1:
         held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
                 for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
@@ -280,7 +280,11 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
 
 def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
     """Where the optima hold shapes that may lie anywhere, of a single region."""
-    free = [each for each in designs.conditions if each.outline is not None and each.outline.center is None]
+    free = [
+        condition
+        for condition in designs.conditions
+        if condition.outline is not None and condition.outline.center is None
+    ]
     if not free or len(evaluator.questions) > 1:
         return {}
     rows = []
@@ -312,7 +316,7 @@ def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
             contained = list(zip(shapes, _centres(plain, shapes), strict=True))
             return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
     with suppress(MechdesignError):
-        if any(each.command == "kinematics" for each in designs.goals):
+        if any(goal.command == "kinematics" for goal in designs.goals):
             return made, kinematics(made).seen
         return made, Result("kinematics", {}, drawn={"motion": solve_shown(made)})
     return made, Result("kinematics", {})

@@ -37,7 +37,7 @@ class Layout:
 
     def __init__(self, goals: Sequence[Goal], rows: Mapping[Goal, int], assembly: Mapping[str, int]) -> None:
         count = len(goals)
-        self.column = {each: k for k, each in enumerate(goals)}
+        self.column = {goal: k for k, goal in enumerate(goals)}
         self.values, self.errors = slice(0, count), slice(count, 2 * count)
         self.shortfall, self.code, self.head = 2 * count, 2 * count + 1, 2 * count + 2
         ends = np.cumsum([self.head, *rows.values(), *assembly.values()]).tolist()

@@ -109,10 +109,10 @@ def _step(explorer: Explorer, lanes: list[_Lane]) -> None:
     for group in groups:
         programs.append(_Programs(explorer, group, stencil, slice(first, first + len(group))))
         first += len(group)
-    rows = explorer(np.concatenate([each.points.reshape(-1, explorer.dimensions) for each in programs]))
-    for each in programs:
-        shape = each.points.shape[:2]
-        each.judge(rows[: shape[0] * shape[1]].reshape(shape))
+    rows = explorer(np.concatenate([program.points.reshape(-1, explorer.dimensions) for program in programs]))
+    for program in programs:
+        shape = program.points.shape[:2]
+        program.judge(rows[: shape[0] * shape[1]].reshape(shape))
         rows = rows[shape[0] * shape[1] :]
 
 

@@ -71,7 +71,7 @@ class Evaluator:
         self._others: dict[tuple[float, ...], Evaluator] = {}
         # Goals with their bounds in the unit of their column.
         self._bounded: dict[Goal, Goal] = {}
-        self._regional = [each for each in self.goals if each.regional]
+        self._regional = [goal for goal in self.goals if goal.regional]
         whole = [each for each in self._regional if each.outline is None]
         self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
         # One for each value of the held coordinates; of each design the worst counts.
@@ -81,12 +81,12 @@ class Evaluator:
             self.questions = questions(study, GRID_TOLERANCE, self._columns)
             together = shared(study, self.questions, moved) and not remeasured(study, study.optimize.variables)
             self._regions_together = together and all(batched(each.column) for each in whole)
-        commands = dict.fromkeys(each.command for each in self.goals if not each.regional and not each.expression)
+        commands = dict.fromkeys(goal.command for goal in self.goals if not goal.regional and not goal.expression)
         problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
         if problems:
             # A condition of two bounds would be named twice.
             raise StudyError([*dict.fromkeys(problems)])
-        self.goals = tuple(self._bounded.get(each, each) for each in self.goals)
+        self.goals = tuple(self._bounded.get(goal, goal) for goal in self.goals)
         # By command of which every pose must be valid: the number of its assembly margins.
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
@@ -127,7 +127,7 @@ class Evaluator:
         """Bounds that are of another kind than the number of the workspace, or the expression, that they bound."""
         columns = index_columns(self.study, self.questions[0]) if self.questions else {}
         units = {each: columns[each.column].unit for each in self._regional if each.column in columns}
-        units |= {each: unit for each in self.goals if each.expression and (unit := unit_of(self.study, each.column))}
+        units |= {goal: unit for goal in self.goals if goal.expression and (unit := unit_of(self.study, goal.column))}
         for each, unit in units.items():
             try:
                 Amount.of(each.bound).within(unit)
@@ -242,11 +242,11 @@ class Evaluator:
         """Evaluate designs of one study that differ in numbers."""
         batch = Batch(Designs(self.study, designs), self.layout)
         values: dict[str, ArrayLike] = {**self.study.parameters.nominal, **batch.designs.parameters}
-        for each in self.goals:
-            if each.expression is not None:
-                found = np.asarray(each.expression.evaluate(values))
+        for goal in self.goals:
+            if goal.expression is not None:
+                found = np.asarray(goal.expression.evaluate(values))
                 found = np.where(np.isfinite(found), found, np.nan)
-                batch.table[:, self.layout.column[each]] = np.abs(found) if each.absolute else found
+                batch.table[:, self.layout.column[goal]] = np.abs(found) if goal.absolute else found
         if self.questions and self._regions_together:
             self._regions(batch, batch.feasible, self.questions)
         for command, tables in self._together.items():
@@ -255,8 +255,8 @@ class Evaluator:
         if self._alone or not self._regions_together:
             for k in batch.feasible.tolist():
                 batch.reasons[k] = self._one(batch, k)
-        for each, column in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
-            batch.note(slice(None), np.isnan(column), f"{each.name} has no value")
+        for goal, column in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
+            batch.note(slice(None), np.isnan(column), f"{goal.name} has no value")
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
     def _regions(self, batch: Batch, rows: Ints, asked: Sequence[Question]) -> None:
@@ -311,7 +311,7 @@ class Evaluator:
             return
         failed = FAILED[first_reason(stack.reason)]
         wrong = stack.reason != 0
-        partly = all(each.unassembled for goals in tables.values() for each in goals)
+        partly = all(goal.unassembled for goals in tables.values() for goal in goals)
         batch.note(rows, wrong.all(axis=1) if partly else wrong.any(axis=1), failed)
         batch.note(rows, ~stack.whole & (not partly), BETWEEN)
         clear = self.layout.assembly.get(command)
@@ -320,13 +320,13 @@ class Evaluator:
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None and margins.shape[1] == clear.stop - clear.start:
                 batch.table[rows, clear] = margins
-        for each in [each for goals in tables.values() for each in goals]:
+        for each in [goal for goals in tables.values() for goal in goals]:
             lost = np.isnan(batch.judge(each, stack.result, rows))
             batch.note(rows, lost & (failed != ""), failed)
 
     def _needed(self, study: Study) -> Study:
         """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
-        section, columns = study.reliability, [each.column for each in self.goals]
+        section, columns = study.reliability, [goal.column for goal in self.goals]
         if section is None:
             return study
         if "cost_allocated" not in columns:
@@ -348,8 +348,8 @@ class Evaluator:
             other = self._needed(other)
             for command, goals in self._alone.items():
                 result = ask(other, command)
-                partly = [not each.unassembled and missing(each, result) for each in goals]
-                values = [batch.judge(each, result, row) for each in goals]
+                partly = [not goal.unassembled and missing(goal, result) for goal in goals]
+                values = [batch.judge(goal, result, row) for goal in goals]
                 if result.failed or any(partly) or np.isnan(values).any():
                     return self._pose_reason(batch, k, other, command) or (BETWEEN if any(partly) else "")
         except UnknownColumnError as error:

@@ -47,7 +47,7 @@ def design_files(
         try:
             best = variant(form, numbers)
             doubts += [Caution("unassembled", f"{name}.yaml: {words}") for words in _parted(best, designs)]
-            judged = [each for each in (*designs.goals, *designs.conditions) if not each.expression]
+            judged = [goal for goal in (*designs.goals, *designs.conditions) if not goal.expression]
             commands = tuple(dict.fromkeys(each.command for each in judged))
             drawings, given = _drawings(best, commands), _given(best, commands)
             while not _assembles_alike(study, best.mechanism, data, given):
@@ -68,7 +68,7 @@ def design_files(
 
 def _parted(study: Study, designs: Designs) -> Iterator[str]:
     """Listed poses that one drive does not lead from one to the next."""
-    if not any(each.command == "kinematics" and not each.expression for each in designs.goals):
+    if not any(goal.command == "kinematics" and not goal.expression for goal in designs.goals):
         return
     poses = study_poses(study, "kinematics")
     if not poses.listed or len(poses.groups) > 1 or len(poses.names) > 1 or poses.count < 2:
@@ -110,7 +110,7 @@ def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
             valid = np.flatnonzero(pose.valid)
             if valid.size:
                 # A workspace begins at its boundary, where legs are stretched: the pose that is farthest from that.
-                closures = [np.broadcast_to(each, pose.shape)[valid] for each in pose.closures]
+                closures = [np.broadcast_to(closure, pose.shape)[valid] for closure in pose.closures]
                 farthest = int(np.min(closures, axis=0).argmax()) if closures else valid.size // 2
                 yield pose.take(int(valid[farthest]))
                 break

@@ -89,7 +89,9 @@ class Designs:
         """Designs by why they are infeasible: that they cannot be built, else every condition that they miss."""
         found = {word: self.codes == code for code, word in enumerate(self.words) if word}
         built = self.codes == 0
-        return found | {f"not {each.name}": built & ~each.met(self.found[each]) for each in self.conditions}
+        return found | {
+            f"not {condition.name}": built & ~condition.met(self.found[condition]) for condition in self.conditions
+        }
 
     @cached_property
     def reasons(self) -> NDArray[np.object_]:
@@ -112,7 +114,7 @@ class Designs:
     @cached_property
     def values(self) -> Floats:
         """Values of the goals, shape (designs, goals)."""
-        return np.stack([self.found[each] for each in self.goals], axis=1)
+        return np.stack([self.found[goal] for goal in self.goals], axis=1)
 
     @cached_property
     def _ends(self) -> tuple[Floats, Floats]:
@@ -172,9 +174,9 @@ class Designs:
 
     def unit_of(self, name: str) -> str:
         """Unit of a goal or a variable, where it is known."""
-        for each in self.goals:
-            if each.name == name:
-                return self._kind(each)[1]
+        for goal in self.goals:
+            if goal.name == name:
+                return self._kind(goal)[1]
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
@@ -185,19 +187,19 @@ class Designs:
         """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
         for name in self.variables:
             yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
-        for each in self.goals:
+        for goal in self.goals:
             # A parameter that varies is a goal and a variable at once.
-            if each.name not in self.variables:
-                kind, unit, meaning = self._kind(each)
-                words = {"parameter": each.name, "result": each.name, "meaning of the result": meaning}
-                yield kind.column(self.found[each][rows], unit, **words)
+            if goal.name not in self.variables:
+                kind, unit, meaning = self._kind(goal)
+                words = {"parameter": goal.name, "result": goal.name, "meaning of the result": meaning}
+                yield kind.column(self.found[goal][rows], unit, **words)
         for each, error in self.errors.items() if errors else ():
             if each in self.goals:
                 yield DESIGNS["<result>_error"].column(error[rows], self._kind(each)[1], result=each.name)
-        for each in self.conditions:
-            if each.outline is not None:
-                words = {"result": each.column, "meaning of the result": self.meanings[each.column][1]}
-                yield RESULT.column(self.found[each][rows], **words)
+        for condition in self.conditions:
+            if condition.outline is not None:
+                words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
+                yield RESULT.column(self.found[condition][rows], **words)
         yield CPI.column(self.cpi[rows])
 
     def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
@@ -249,9 +251,9 @@ class Judge:
         head, margins = self.layout.head, self.layout.margins
         places = {each: slice(at.start - head, at.stop - head) for each, at in self.layout.rows.items()}
         found = [
-            Part(column, 1.0 if each.smallest else -1.0, each.absolute, places[each], each.bound, each in self._squares)
-            for column, each in enumerate((*self.goals, *self.conditions))
-            if each in places and (column < len(self.goals) or each not in self._squares)
+            Part(column, 1.0 if goal.smallest else -1.0, goal.absolute, places[goal], goal.bound, goal in self._squares)
+            for column, goal in enumerate((*self.goals, *self.conditions))
+            if goal in places and (column < len(self.goals) or goal not in self._squares)
         ]
         if margins.start < margins.stop:
             found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
@@ -267,7 +269,7 @@ class Judge:
 
     def _known(self, u: Floats, found: Floats) -> Known:
         values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
-        margins = [each.margin(values[:, self.layout.column[each]]) for each in self.conditions]
+        margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
         return Known(
             u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
             found[:, self.layout.head :], found[:, self.layout.shortfall],

@@ -31,7 +31,7 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
     following = {
         name: np.asarray(value)
         for name, value in study.parameters.values(parameters).items()
-        if name not in variables and np.ndim(value) and all(name != each.name for each in designs.goals)
+        if name not in variables and np.ndim(value) and all(name != goal.name for goal in designs.goals)
     }
     marks = {"what": np.array(designs.marks, dtype=object)} if designs.marks else {}
     weights, length = zip(designs.goals, designs.weights.T, strict=True), study.units.label("length")
@@ -65,8 +65,16 @@ def nearest_table(designs: Designs, row: int) -> Table:
         found = [(word, np.nan, np.nan, designs.shortfall[row], "")]
     else:
         found = [
-            (each.name, value := designs.found[each][row], each.bound, max(0.0, -each.margin(value)), unit)
-            for each, unit in zip(designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True)
+            (
+                condition.name,
+                value := designs.found[condition][row],
+                condition.bound,
+                max(0.0, -condition.margin(value)),
+                unit,
+            )
+            for condition, unit in zip(
+                designs.conditions, map(designs.unit_of_condition, designs.conditions), strict=True
+            )
         ]
     names, values, bounds_of, missing, units = zip(*found, strict=True)
     return NEAREST.table(NEAREST.columns(
@@ -77,7 +85,7 @@ def nearest_table(designs: Designs, row: int) -> Table:
 
 def bounds_table(designs: Designs) -> Table:
     """Extremes of each goal, by which it is normalised, and where they are."""
-    names = [*(each.name for each in designs.goals), "CPI"]
+    names = [*(goal.name for goal in designs.goals), "CPI"]
     values = np.where(designs.feasible[:, None], np.column_stack([designs.values, designs.cpi]), np.nan)
     low, high = np.nanargmin(values, axis=0), np.nanargmax(values, axis=0)
     numbers = np.arange(len(names))
@@ -133,11 +141,11 @@ def _active(designs: Designs) -> NDArray[np.object_]:
         for k, words in enumerate(held):
             sides = ["from"] * bool(at[name][k] - low[k] <= near[k]) + ["to"] * bool(high[k] - at[name][k] <= above[k])
             words += [f"{name} {' and '.join(sides)}"] if sides else []
-    for each in designs.conditions:
-        values = designs.found[each]
-        far = AT_BOUND * max(abs(each.bound), np.ptp(values[designs.feasible]))
+    for condition in designs.conditions:
+        values = designs.found[condition]
+        far = AT_BOUND * max(abs(condition.bound), np.ptp(values[designs.feasible]))
         for words, value in zip(held, values[rows].tolist(), strict=True):
-            words += [each.name] if abs(value - each.bound) <= far else []
+            words += [condition.name] if abs(value - condition.bound) <= far else []
     return np.array([", ".join(words) for words in held], dtype=object)
 
 
@@ -158,8 +166,8 @@ def sensitivity_table(designs: Designs, judge: Judge) -> Table:
     judge.progress.start(len(asked), "neighbours of the optimum")
     found, layout = judge.evaluate(dict(zip(variables, asked.T, strict=True))), judge.layout
     values, feasible = found[:, layout.values], found[:, layout.code] == 0
-    for each in judge.conditions:
-        feasible &= each.met(values[:, layout.column[each]])
+    for condition in judge.conditions:
+        feasible &= condition.met(values[:, layout.column[condition]])
     which = np.full(inside.shape, len(asked))
     which[inside] = back.ravel()
     changes = np.empty(inside.shape)

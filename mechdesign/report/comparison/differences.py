@@ -87,7 +87,9 @@ class Comparison:
     @property
     def moved(self) -> list[Difference]:
         """The columns of numbers that moved, those first that moved most for their size."""
-        return sorted((each for each in self.differences if each.values), key=lambda each: -each.share)
+        return sorted(
+            (difference for difference in self.differences if difference.values), key=lambda each: -each.share
+        )
 
     @property
     def table(self) -> Table:
@@ -108,6 +110,6 @@ class Comparison:
         kinds: dict[str, type] = {"rows": int, "largest": float, "relative": float}
         columns = []
         for name, meaning in meanings.items():
-            values = [getattr(each, name) for each in self.differences]
+            values = [getattr(difference, name) for difference in self.differences]
             columns.append(Column(name, np.array(values, kinds.get(name, str)), meaning=meaning))
         return Table("differences", tuple(columns), "what moved, is missing or is new")

@@ -183,7 +183,7 @@ def compare_results(
         given = [_given(each, command) for each in (before, after)]
         chosen = {}
         for column in pair[0].names:
-            fitting = [each for each in tolerances.patterns if _fits(each, folder, command, table, column)]
+            fitting = [pattern for pattern in tolerances.patterns if _fits(pattern, folder, command, table, column)]
             fitted.update(fitting)
             chosen[column] = tolerances.default
             if fitting:
@@ -194,7 +194,7 @@ def compare_results(
         found.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
     verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
-        told = [_verdict(each.get(words)) for each in verdicts]
+        told = [_verdict(verdict.get(words)) for verdict in verdicts]
         if told[0].split(",")[0] != told[1].split(",")[0]:
             found.differences.append(Difference(folder, "", words, "verdict", old=told[0], new=told[1]))
     ends = [str(content.get("interrupted") or content.get("failed") or "done") for content in (before, after)]
@@ -237,7 +237,9 @@ def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], An
     resolved = content["study"].get("resolved") or {}
     if command == SWEEP.name:
         columns = [each for about in content["tables"].values() for each in about["columns"]]
-        return frozenset(each["name"] for each in columns if each["meaning"] == VARIED), resolved.get(SWEEP.section)
+        return frozenset(column["name"] for column in columns if column["meaning"] == VARIED), resolved.get(
+            SWEEP.section
+        )
     for section in (resolved.get(command), resolved.get("kinematics")):
         poses = {key: section[key] for key in _POSE_KEYS if section.get(key)} if isinstance(section, dict) else {}
         if not poses:

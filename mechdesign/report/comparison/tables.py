@@ -185,7 +185,7 @@ def _nearest(
     for name in numbers:
         values = [table[name][chosen].astype(float) for table, chosen in zip((old, new), rows, strict=True)]
         rtol, atol = tolerances[name]
-        largest = max(np.abs(each[np.isfinite(each)]).max(initial=0.0) for each in values)
+        largest = max(np.abs(value[np.isfinite(value)]).max(initial=0.0) for value in values)
         width = (atol + rtol * largest) or np.finfo(float).tiny ** 0.5
         for side in (0, 1):
             # Nan and infinities stand further away than numbers do from each other.
