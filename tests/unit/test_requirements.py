@@ -34,7 +34,8 @@ def judge(answer, asked):
     def problem(message, section, index):
         return Problem(message, f"{section}.{index}")
 
-    study = SimpleNamespace(requirements=asked, mechanism=SimpleNamespace(mobility=1), problem=problem)
+    mechanism = SimpleNamespace(mobility=1)
+    study = SimpleNamespace(requirements=asked, mechanism=mechanism, problem=problem, cautions=(), barred=())
     return mechdesign.requirements(study, answer)
 
 
