@@ -37,6 +37,7 @@ def frames(data):
         return found, dict(picture.info)
 
 
+@pytest.mark.nightly
 def test_a_turn_is_a_loop_of_bounded_size(folder, invoke):
     (folder / "slider.yaml").write_text(TURN)
     done = invoke("kinematics", "slider.yaml", "--animate", "--quiet")
@@ -63,6 +64,7 @@ def test_the_same_study_gives_the_same_bytes(folder, invoke):
     assert (folder / "one/motion.gif").read_bytes() == (folder / "two/motion.gif").read_bytes()
 
 
+@pytest.mark.nightly
 def test_a_sweep_that_does_not_close_goes_there_and_back(folder, invoke):
     invoke("kinematics", "slider.yaml", "--animate")
     shown, _ = frames((folder_of(folder) / "motion.gif").read_bytes())
@@ -108,6 +110,7 @@ def test_pictures_wanted_and_not_wanted(folder, invoke):
     assert not (folder / "results").exists()
 
 
+@pytest.mark.nightly
 def test_run_animates_and_resumes(folder, analysis, invoke):
     computed = []
     analysis(lambda study, **options: computed.append(study) or kinematics(study))

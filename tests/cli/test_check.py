@@ -21,6 +21,7 @@ def test_the_sketch_is_drawn_and_the_file_named(folder, invoke):
     assert (folder / drawing).read_bytes().startswith(PNG)
 
 
+@pytest.mark.nightly
 def test_where_the_drawing_goes(folder, invoke):
     (folder / "other.yaml").write_text(SLIDER)
     invoke("check", "slider.yaml", "--out", "one")

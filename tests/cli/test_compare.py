@@ -260,6 +260,7 @@ def test_nothing_to_compare(folder, results, compared):
     assert "motion.csv: is not the table that its manifest describes" in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("key", "value"),
     [

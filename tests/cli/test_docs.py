@@ -11,6 +11,7 @@ from mechdesign.cli.docs import commands
 from mechdesign.reference import entries, find
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("word", "told"),
     [

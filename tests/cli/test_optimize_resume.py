@@ -71,6 +71,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", METHODS)
 def test_resumed_results_are_those_of_an_uninterrupted_run(study, invoke, interrupt, method):
     path = study(method)

@@ -46,6 +46,7 @@ def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, 
     assert manifest["files"] == {each: hashlib.sha256((out / each).read_bytes()).hexdigest() for each in files}
 
 
+@pytest.mark.nightly
 def test_every_picture_fails(folder, invoke, monkeypatch):
     from mechdesign.report.figures import style
 
@@ -68,6 +69,7 @@ def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
     assert "warning: picture mechanism.png could not be drawn: internal error: RuntimeError" in done.stderr
 
 
+@pytest.mark.nightly
 def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, monkeypatch):
     from mechdesign.report.figures import kinematics
 

@@ -228,6 +228,7 @@ def test_a_study_on_standard_input(folder, analysis):
     assert wrong.stderr.startswith("<study>:6:19: mechanism.links.crank")
 
 
+@pytest.mark.nightly
 def test_pictures_as_vectors_are_the_same_bytes_at_every_run(folder, invoke):
     for out in ("one", "two"):
         done = invoke("kinematics", template_path("two_link_arm"), "--format", "svg,pdf", "--out", out)

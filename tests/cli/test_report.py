@@ -176,6 +176,7 @@ def test_what_a_study_says_stays_text(folder, invoke):
     assert "%3Cb%3E/report.html" in [each["href"] for each in Page("results/index.html").all("a")]
 
 
+@pytest.mark.nightly
 def test_an_index_tells_of_every_study(asks, analysis, invoke):
     def fail(study, **options):
         raise AssemblyError("cannot reach <there>")

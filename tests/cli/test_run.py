@@ -222,6 +222,7 @@ def test_junit_shows_warnings_and_log_lines_name_their_study(studies, analysis, 
     assert outputs == ["warning: mind the gap", "warning: mind the gap", None]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("spoil", ["nothing", "file", "study", "seed", "override", "plots"])
 def test_resume_computes_again_only_what_is_not_whole_and_the_same(studies, analysis, invoke, spoil):
     computed = []

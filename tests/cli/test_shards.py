@@ -69,6 +69,7 @@ def test_shards_of_one_command(studies, invoke, name):
     assert content("parts") == content("whole")
 
 
+@pytest.mark.nightly
 def test_shards_of_cases_that_the_command_line_names(studies, invoke):
     asked = ["sweep", "offset_slider_crank.yaml", "--no-plots", "--vary", "mechanism.parameters.r=1.4:1.8:0.2"]
     assert invoke(*asked, "--out", "whole").exit_code == 0

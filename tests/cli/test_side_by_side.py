@@ -41,6 +41,7 @@ def studies(folder):
     return folder
 
 
+@pytest.mark.nightly
 def test_results_and_messages_do_not_depend_on_the_processes(studies, invoke, monkeypatch):
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     told, files = [], []

@@ -116,6 +116,7 @@ def test_github_shows_requirements_that_cases_do_not_meet(study, invoke, monkeyp
     assert "1 of 2 cases do not meet it" in done.stderr
 
 
+@pytest.mark.nightly
 def test_options_are_in_place_of_the_matrix_of_the_study(study, invoke):
     matrix = f"matrix: {{vary: {{{R}: '20:30'}}, method: sobol, samples: 8, results: [kinematics.B.x.max]}}\n"
     (study / "press.yaml").write_text(STUDY + matrix)
@@ -139,6 +140,7 @@ def test_cases_of_a_file_are_looked_for_where_the_command_is_given(study, invoke
     assert list(manifest["inputs"]) == ["built.csv"]
 
 
+@pytest.mark.nightly
 def test_pictures_and_report(study, invoke):
     done = invoke(
         "sweep", "press.yaml", "--vary", f"{R}=25,30", "--vary", "mechanism.branch=side,follow", "--quiet", "--report"
@@ -167,6 +169,7 @@ def test_the_best_case_is_told_on_the_terminal_and_in_the_report_also_of_what_is
     assert (study / "results/press/sweep/response.png").exists()
 
 
+@pytest.mark.nightly
 def test_the_best_case_is_told_by_sweep_run_and_merge(study, invoke):
     best = "best: {maximize: kinematics.B.x.range}"
     (study / "press.yaml").write_text(STUDY + f"matrix: {{vary: {{{R}: [25, 40, 30]}}, {best}}}\n")

@@ -62,6 +62,7 @@ def test_a_study_is_not_removed_with_the_results_that_it_stands_among(folder, an
     assert (folder / "out/optimum.yaml").read_text() == SLIDER
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "options"),
     [

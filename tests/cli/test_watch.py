@@ -66,6 +66,7 @@ def test_it_answers_again_after_a_save_and_goes_on_after_a_mistake(folder, watch
     assert process.wait(30) == 0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_termination_is_no_success(folder, watched, number):
     process, until = watched("slider.yaml", "kinematics")

@@ -96,6 +96,7 @@ def test_a_listed_pose_outside_the_limits_is_exit_code_three(folder, invoke) -> 
     assert (folder / "results/study/kinematics/motion.csv").read_text().splitlines()[-1].endswith(",0")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("study", "command", "result", "told"),
     [

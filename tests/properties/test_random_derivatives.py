@@ -95,6 +95,7 @@ def test_velocities_and_accelerations_are_derivatives(made: Made) -> None:
         )
 
 
+@pytest.mark.nightly
 @settings(max_examples=30)
 @given(mechanisms())
 def test_a_jacobian_holds_the_derivatives_by_each_drive(made: Made) -> None:

@@ -59,6 +59,7 @@ def same(a: Configuration, b: Configuration) -> None:
         assert np.array_equal(one, two, equal_nan=True)
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(mechanisms())
 def test_a_sketch_is_assembled_in_the_pose_it_was_drawn_in(made: Made) -> None:
@@ -134,6 +135,7 @@ def test_a_drawing_moved_scaled_mirrored_renamed_and_reordered_is_the_same_mecha
         assert np.abs(got - expected)[both].max() < bound, point
 
 
+@pytest.mark.nightly
 @settings(max_examples=40)
 @given(mechanisms())
 def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
@@ -148,6 +150,7 @@ def test_a_rough_drawing_chooses_the_same_assembly(made: Made) -> None:
         assert complex(pose.point(point)) == pytest.approx(place, abs=1e-9)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30)
 @given(mechanisms(), st.sampled_from([0.5, 3.0]))
 def test_an_assembly_is_kept_along_a_sweep(made: Made, reach: float) -> None:
@@ -240,6 +243,7 @@ def test_other_coordinates_given_lead_back_to_the_drives(made: Made, time: float
         assert np.abs(back.point(point) - forward.point(point)).max() < 1e-8, (given_names, point)
 
 
+@pytest.mark.nightly
 @settings(max_examples=30)
 @given(mechanisms(triads=False, anyhow=False))
 def test_dyads_agree_with_newton(made: Made) -> None:

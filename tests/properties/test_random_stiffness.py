@@ -57,6 +57,7 @@ def test_compliance_is_that_of_finite_elements(case: Sprung) -> None:
     agree(matrix(result, "C"), Structure(*posed(text)).compliance(), 1e-6)
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung())
 def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) -> None:
@@ -65,12 +66,15 @@ def test_displacements_of_all_points_are_those_of_finite_elements(case: Sprung) 
     table = ask_stiffness(text).tables["displacements"]
     structure = Structure(*posed(text))
     moved, _ = structure.frame.respond(structure.asked, np.array([load_case]).T)
-    largest = np.abs(moved).max()
+    # Of a rigid body the finite elements leave rounding in proportion to the load; what gives moves 1e-6 of it or more.
+    largest, rounding = np.abs(moved).max(), 1e-12 * np.linalg.norm(load_case)
     bodies = [body for body in case.layout.bodies.values() if body.name != GROUND]
     assert len(table) == sum(len(body.points) + bool(body.to) for body in bodies)
     for link, point, dx, dy in zip(*(table[name] for name in ("link", "point", "dx", "dy")), strict=True):
         node = structure.nodes[link, point]
-        assert complex(dx, dy) == pytest.approx(complex(*moved[3 * node : 3 * node + 2, 0]), abs=1e-6 * largest + 1e-12)
+        assert complex(dx, dy) == pytest.approx(
+            complex(*moved[3 * node : 3 * node + 2, 0]), abs=1e-6 * largest + rounding
+        )
 
 
 @pytest.mark.nightly
@@ -123,6 +127,7 @@ def test_ends_of_pins_and_turns_of_links_in_a_reliability_are_those_of_finite_el
             assert slope == pytest.approx(at, abs=tolerance), (output, source)
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung())
 def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> None:
@@ -158,6 +163,7 @@ def test_every_part_is_in_equilibrium_and_pins_bear_no_moment(case: Sprung) -> N
             assert total[part] == pytest.approx(np.zeros(3), abs=1e-8 * (1 + shares[part])), part
 
 
+@pytest.mark.nightly
 @settings(max_examples=25)
 @given(sprung())
 def test_stiffness_is_symmetric_positive_and_the_inverse_of_compliance(case: Sprung) -> None:
@@ -223,6 +229,7 @@ def test_another_point_of_the_same_body_is_the_same_matrix_seen_from_there(case:
             agree(matrix(there, "K"), transform.T @ matrix(here, "K") @ transform, 1e-6)
 
 
+@pytest.mark.nightly
 @settings(max_examples=50)
 @given(st.integers(0, 2**32 - 1))
 def test_on_serial_legs_reciprocal_wrenches_forces_and_finite_elements_agree(seed: int) -> None:

@@ -156,6 +156,7 @@ def test_two_arms_bored_in_one_setting() -> None:
     assert table["failure_low"][own][0] < expected < table["failure_high"][own][0]
 
 
+@pytest.mark.nightly
 def test_precision_of_a_five_bar_over_its_workspace() -> None:
     # u_i . dC = u_i . dD_i + dl_i; a circle of a bivariate normal error by quadrature over the direction:
     # P(|dC| > R) is the mean over directions u of exp(-R^2/(2 u' S u)) weighted with the density of the direction.

@@ -115,6 +115,7 @@ def test_straightest_line_in_the_textbooks_steps() -> None:
     assert 100 * row(extremes, "P.y")["range"] / row(extremes, "P.x")["range"] == pytest.approx(0.096, abs=5e-4)
 
 
+@pytest.mark.nightly
 def test_straightest_line_between_the_textbooks_steps() -> None:
     """The bottom of the valley, by a search against a simplex of the closed form."""
     best = minimize(

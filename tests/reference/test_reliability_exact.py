@@ -80,6 +80,7 @@ def test_importance_sampling_and_auto_are_precise_at_every_limit(limit: float) -
     assert np.mean(covered) >= share_needed(len(covered))
 
 
+@pytest.mark.nightly
 def test_one_in_a_billion_for_less_than_25000_evaluations() -> None:
     """A coefficient of variation below 5 %: half of the interval is 2.97 of them."""
     for seed in range(6):

@@ -103,6 +103,7 @@ def test_numbers_of_designs() -> None:
     assert optimised("two_rrr_printed").counts == {"designs": 4556, "infeasible": 0}
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "gii", "gri", "sui", "area"),
     [

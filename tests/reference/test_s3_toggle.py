@@ -31,6 +31,7 @@ def column(order: str, method: str, name: str) -> np.ndarray:
     return table[name][(table["order"] == order) & (table["method"] == method)]
 
 
+@pytest.mark.nightly
 def test_the_whole_cycle_by_5_degrees() -> None:
     table = result().tables["moments"]
     assert np.unique(table["theta2"]) == pytest.approx(np.arange(0, 361, 5))

@@ -40,6 +40,7 @@ def mean(function, l1: float, l2: float) -> float:
     return quad(lambda q2: function(q2) * np.sin(q2), 0, np.pi, epsabs=1e-12)[0] / 2
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("l1", "l2"), LENGTHS)
 def test_the_region_of_two_links_is_an_annulus(l1: float, l2: float) -> None:
     """Between the circles of |l1 - l2| and l1 + l2: J. J. Craig, Introduction to Robotics, the two-link planar arm."""
@@ -72,6 +73,7 @@ def test_two_links_of_root_two_to_one_are_isotropic_at_135_degrees() -> None:
     assert inverse_condition(np.sqrt(2), 1, np.radians(135)) == pytest.approx(1, abs=1e-7)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("l1", "l2"), LENGTHS)
 def test_yoshikawas_manipulability_of_two_links(l1: float, l2: float) -> None:
     """w = sqrt(det(J J^T)) = l1 l2 |sin q2|, greatest with the elbow at a right angle whatever the lengths.
@@ -110,6 +112,7 @@ def test_joint_limits_cut_the_annulus(first: tuple[float, float], second: tuple[
     assert found["GRI"][0] == pytest.approx(area / exact, rel=1e-4)
 
 
+@pytest.mark.nightly
 def test_a_hand_held_at_an_angle_moves_the_annulus() -> None:
     """Three links, the hand's angle held: the wrist's annulus about the end of the hand turned round."""
     text = """

@@ -153,7 +153,7 @@ def test_where_the_model_is_careless_simulation_makes_it_tighter() -> None:
 UNIFORM = "{{a: {{tolerance: 0.1, distribution: uniform}}, b: {{tolerance: {b}, distribution: uniform}}}}"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("asked", [0.9, 0.99, 0.999])
 @pytest.mark.parametrize("price", [1.0, 5.0])
 def test_two_uniform_tolerances_are_as_cheap_as_can_be(asked: float, price: float) -> None:

@@ -120,7 +120,7 @@ def test_listed_poses() -> None:
     assert again["both"][1] == pytest.approx(again["a"][1] + again["b"][1])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_drives_on_the_boundary_of_a_shipped_robot() -> None:
     study = load(Path(__file__).parents[2] / "configs/gallery/scara.yaml")
     boundary = workspace(study).tables["boundary"]

@@ -116,7 +116,7 @@ def test_fold_distance_is_linear_through_a_fold() -> None:
     assert np.isfinite(margins).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_region_between_folds_has_its_area() -> None:
     (question,) = questions(study_of(PLATFORM.format(held="lead: [0.45]", assembly="any")), wanted=("area",))
     found = answer(question, {}, 1, BATCH)

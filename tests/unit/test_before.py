@@ -82,7 +82,7 @@ def test_curves_and_paths_before_are_dashed_under_those_now():
         assert len(found[name].legends[-1].get_texts()) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_boundary_before_is_in_the_picture_of_the_workspace():
     now, then = (study_of(ARM.format(lower=lower)) for lower in (30, 40))
     result, _ = overlaid("workspace", now, then)

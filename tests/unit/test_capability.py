@@ -176,7 +176,7 @@ def test_limits_that_make_no_sense_are_refused(limit: str, message: str) -> None
         study_of(LEVER, f"reliability.limits={{P.x: {limit}}}")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_limits_of_the_value_over_a_workspace() -> None:
     """The index at each node is what the first order says there; P.x alone is limited, far from most of the nodes."""
     study = study_of("""

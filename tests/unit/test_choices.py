@@ -82,7 +82,7 @@ def test_goals_of_designs_are_those_of_studies_with_these_entries() -> None:
         assert row["stiffness.k_min"] == pytest.approx(mechdesign.stiffness(alone).main["k_min"].min(), rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["search", "pareto"])
 def test_search_and_front_find_the_optimum_of_the_grid_and_evaluate_each_design_once(method: str) -> None:
     asked = mechdesign.optimize(press("", f"optimize.method={method}", "optimize.weights=[[1, 1]]"))

@@ -66,7 +66,7 @@ def ring_of_rectangle(width: float, height: float, inner: float, outer: float) -
     return float(brentq(lambda s: np.hypot(s * width / 2, inner + s * height) - outer, 0, 100))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_largest_scale_of_a_free_circle_and_rectangle_in_a_ring() -> None:
     rng = np.random.default_rng(2)
     upper, fore = rng.uniform(60, 140, 12), rng.uniform(40, 100, 12)
@@ -153,7 +153,7 @@ def test_other_pieces_of_the_region_contain_nothing() -> None:
     assert scales(text, Shape(0.4, 0.4, True, 0.25 + 1j)) == pytest.approx([-1.25])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
     shapes = "[{contains: {rectangle: [180, 90], center: free}}, {contains: {circle: 20, center: [0, 80]}}]"
     study = study_of(ARM, f"optimize.subject_to={shapes}")
@@ -180,7 +180,7 @@ def test_designs_are_feasible_where_the_workspace_contains_the_shape() -> None:
     assert "not rectangle 180 x 90 contained" in designs["reason"].tolist()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_search_ends_where_the_shape_just_fits() -> None:
     study = study_of(
         ARM, "optimize.variables={l1: {from: 60, to: 140}, l2: {from: 60, to: 61}}", "optimize.method=search",

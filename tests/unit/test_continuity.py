@@ -46,7 +46,7 @@ def motion(text: str, *overrides: str) -> dict[str, np.ndarray]:
     return {name: table[name] for name in table.names}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("step", [60, 90, 150, 180, 200, 300, 360, 450, 600])
 @pytest.mark.parametrize("text", [FOUR_BAR, DRAG_LINK])
 def test_the_step_of_a_sweep_does_not_matter(text: str, step: int) -> None:

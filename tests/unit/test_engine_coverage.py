@@ -95,7 +95,7 @@ def test_importance_sampling_that_ends_at_its_precision(name: str) -> None:
     check(intervals, case.exact)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "samples"), [("half_space_2", 2**14), ("parabola", 2**17), ("half_space_5", 2**15)])
 def test_quasi_monte_carlo(name: str, samples: int) -> None:
     """Where replicates give the interval, and not the few failures."""

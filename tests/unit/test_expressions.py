@@ -53,7 +53,7 @@ def test_a_batch_is_nan_where_there_is_no_value():
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "text",
     [

@@ -82,7 +82,7 @@ def test_a_rocker_between_its_limits(step: int) -> None:
     assert np.isnan(crank["time_ratio"])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "drive", "steps"),
     [

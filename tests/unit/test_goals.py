@@ -283,7 +283,7 @@ kinematics: {sweep: {crank: {from: 0, to: 300, number: 6}}, outputs: [P, S]}
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("text", "name", "value", "output"),
     [
@@ -526,7 +526,7 @@ def test_the_unit_of_an_expression_is_given_where_it_is_known(expression: str, u
     assert unit_of(study_of(FOUR_BAR), expression) == unit
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("method", ["search", "pareto"])
 def test_expressions_alone_are_searched(method: str) -> None:
     section = f"""

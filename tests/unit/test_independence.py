@@ -56,7 +56,7 @@ def spoil(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(4))
 def test_the_verdict_on_a_long_train_does_not_depend_on_its_order(seed: int) -> None:
     """Its equations as a whole are singular but for rounding in many a draw: one that is not tells."""

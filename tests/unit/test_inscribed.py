@@ -49,7 +49,7 @@ def test_lens_of_two_circles() -> None:
     assert main["area"][0] == pytest.approx(2 * (9 * np.arccos(1 / 3) - np.sqrt(8)), rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.3, 0.9]"])
 def test_a_ring_keeps_its_hole_free(about: str) -> None:
     """The circle is as wide as the ring; the rectangle lies on the hole, or beside it."""
@@ -62,7 +62,7 @@ def test_a_ring_keeps_its_hole_free(about: str) -> None:
     assert area == pytest.approx(2 * (y - 0.5) * np.sqrt(2.5**2 - y * y), rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scan_of_half_a_turn_bounds_the_region() -> None:
     """The upper half of the lens: the rectangle stands on the scan's side, the circle touches it."""
     main = mechdesign.workspace(study_of(LEGS, "workspace.scan={about: [0, 0], from: 0, to: 180}")).main
@@ -97,7 +97,7 @@ def test_shapes_lie_inside() -> None:
     assert least(middle + border * (1 + 1e-6)) < 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_side_along_which_one_margin_ends_the_region() -> None:
     """Half of what two rings share, above the line through their middles: its lower side is a line of singularities."""
     limits = "mechanism.limits=[{drive: l1, min: 0.5, max: 2}, {drive: l2, min: 0.5, max: 2}]"

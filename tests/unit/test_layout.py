@@ -63,7 +63,7 @@ def rank(name: str) -> int:
     return RANKS[name]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_file_imports_itself_by_way_of_others():
     # A cycle raises an error that names its files. The package itself imports a question's module when it is used.
     TopologicalSorter({name: used - {"mechdesign.__init__"} for name, used in imports().items()}).prepare()

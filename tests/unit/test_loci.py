@@ -63,7 +63,7 @@ def each(table: Table) -> list[tuple[str, str, np.ndarray]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("about", ["[0, 0]", "[0.05, 0.45]"])
 def test_forward_singularities_of_a_five_bar(about: str) -> None:
     """Both forearms in line: with elbows out, both on the same side of P, so that the elbows meet at (0, +-0.2).
@@ -85,7 +85,7 @@ def test_forward_singularities_of_a_five_bar(about: str) -> None:
         assert steps.sum() == pytest.approx(2 * 0.4 * np.arcsin(0.24 / 0.4), rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_they_bound_the_region_of_one_assembly() -> None:
     """The same curves, now told as the boundary: to the corners where a leg is folded or stretched as well."""
     tables = {

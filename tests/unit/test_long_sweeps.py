@@ -76,7 +76,7 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "POSES_AT_ONCE", 50)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("text", "all_modes"), [(FOUR_BAR, True), (ARM, False), (GRID, False)], ids=["four_bar", "arm", "grid"]
 )

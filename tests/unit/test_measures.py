@@ -138,7 +138,7 @@ workspace: {point: P, at: {reach: 12}, characteristic_length: 5, scan: {rays: 40
     assert indices["area"] == pytest.approx(np.pi * (15**2 - 9**2), rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_expression_is_held_at_a_value_far_from_the_sketchs() -> None:
     """At the point's place in the sketch the held value cannot be had at all."""
     study = study_of("""

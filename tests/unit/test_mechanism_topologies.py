@@ -134,7 +134,7 @@ mechanism:
     assert list(mechanism.solve({"arm": [10, 80, 80 + 1e-9, 10 - 1e-9]}).valid) == [True, True, False, False]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_acceleration_of_an_expression_does_not_depend_on_poses_that_fail() -> None:
     text = FOUR_BAR.replace("crank: [O, A, 1]", "crank: [O, A, 3]") + (
         "kinematics: {sweep: {crank: {from: 60, to: %d, step: 20}}, rates: {crank: 1 rad/s}, outputs: [odd]}\n"

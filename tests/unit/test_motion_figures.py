@@ -198,7 +198,7 @@ def test_listed_poses_are_drawn_one_by_one_and_have_no_curves():
     assert titles == ["theta = 0 deg", "theta = 30 deg"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
     study = study_of(FOUR_BAR, "kinematics.rates={theta: 1 rad/s}", "kinematics.outputs=[A, rocker.angle]")
     figure = drawn(study)["poses"]
@@ -271,7 +271,7 @@ def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
     study = study_of(FOUR_BAR)
     (axes,) = drawn(study)["transmission"].axes
@@ -287,7 +287,7 @@ def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
     assert worst.get_xdata() == [0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_place_is_marked():
     advantage = "kinematics.mechanical_advantage={rocker.angle: theta}"
     study = study_of(FOUR_BAR, advantage)

@@ -173,7 +173,7 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert "1 of 2 requirements met" in repr(result)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_many_requirements_those_that_are_not_met_are_shown() -> None:
     asked = [{"result": "kinematics.B.x", "at_least": limit} for limit in [*range(60), 99]]
     page = Page(mechdesign.kinematics(mechdesign.load(DATA | {"requirements": asked}))._repr_html_())

@@ -157,8 +157,9 @@ class Long:
 
 
 def test_a_long_function_is_read_once_by_each_worker(tmp_path):
-    fresh = multiprocessing.get_context("spawn")
-    with on(Pool(lambda: ProcessPoolExecutor(2, mp_context=fresh), 2)):
+    fresh, root = multiprocessing.get_context("spawn"), str(Path(__file__).parents[2])
+    # Workers import this module, by its name below the root.
+    with on(Pool(lambda: ProcessPoolExecutor(2, fresh, sys.path.append, (root,)), 2)):
         found = [*map_chunks(Long(tmp_path), range(300), travels=True)]
     assert found == [100_000 + k for k in range(300)]
     assert 1 <= len([*tmp_path.iterdir()]) <= 2

@@ -140,7 +140,7 @@ def test_two_pieces_of_equal_determinant_signs(about: str) -> None:
     assert result.main["rectangle_y"][0] > 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_means_and_extremes_are_of_the_sketchs_piece() -> None:
     """As of a scan that meets nothing else."""
     text = (FIVE_BAR, "workspace.indices=[inverse_condition, resistivity]")
@@ -152,7 +152,7 @@ def test_means_and_extremes_are_of_the_sketchs_piece() -> None:
         assert one[name][0] == pytest.approx(alone.main[name][0], rel=1e-4), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_piece_over_angle_zero_is_one() -> None:
     """Two lenses left and right of a gap along the vertical, seen from the middle: the right one lies about angle 0."""
     limits = f"mechanism.limits=[{WIDE}, {{measure: across, min: 0.2}}]"
@@ -393,7 +393,7 @@ def test_a_design_is_the_same_alone_and_in_a_batch() -> None:
             assert together[name][k] == pytest.approx(alone[name][0], rel=1e-9), (name, k)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_poses_all_over_the_workspace_are_of_the_same_piece() -> None:
     poses = workspace_nodes(study_of(FIVE_BAR))
     (group,) = poses.groups

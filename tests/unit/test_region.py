@@ -112,7 +112,7 @@ def test_five_bar_with_holes(about: str) -> None:
     assert error < 1e-6
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_five_bar_cut_by_limits_and_singularities() -> None:
     """Against samples whose legs are solved here: elbows out, motors within limits."""
     limits = "mechanism.limits=[{drive: t1, min: 30, max: 200}, {drive: t2, min: -20, max: 150}]"

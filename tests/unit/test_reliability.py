@@ -55,7 +55,7 @@ def pick(result: Result, table: str, column: str, **chosen: object) -> np.ndarra
     return found[column][rows]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["two_link_arm", "toggle"])
 def test_the_number_of_threads_changes_no_bit(name: str) -> None:
     study = mechdesign.load(CONFIGS / f"{name}.yaml", overrides=["reliability.samples=20000"])

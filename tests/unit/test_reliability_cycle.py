@@ -56,7 +56,7 @@ def row(result: Result, method: str) -> dict[str, Any]:
     return {column.name: column.values[rows[0]] for column in table.columns}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_share_of_four_bars_that_cannot_turn_fully() -> None:
     """0.02975 of 1, 3.5, 3, 4 with +-0.8 on crank, coupler and rocker; both extremes, 0 and 180 deg, are poses."""
     result = ask(FOUR_BAR, jobs=2)

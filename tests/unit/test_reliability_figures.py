@@ -91,7 +91,7 @@ def test_every_method_alone_is_drawn(method: str) -> None:
     assert legend(found["reliability"])[0].startswith(look(method).words)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_listed_pose_without_a_value_is_left_empty() -> None:
     found, _ = drawn(ARM, "reliability.poses=[{q1: 30, q2: 90}, {P.x: 300, P.y: 0}]",
                      "reliability.methods=[analytic, monte_carlo]")  # fmt: skip
@@ -165,7 +165,7 @@ def test_a_far_limit_does_not_squeeze_the_bands() -> None:
     assert axes.get_title(loc="right") == "limit +9 mm, outside"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_velocities_have_panels_and_limits_of_their_own() -> None:
     found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]", "reliability.rates={crank: 60}",
                      "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
@@ -227,7 +227,7 @@ def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None
         drawn(SLIDER, "reliability.poses=[{crank: 80}, {crank: 10}]", *overrides)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_far_limit_is_told_in_words() -> None:
     found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
     axes = found["histogram"].axes[0]
@@ -235,7 +235,7 @@ def test_a_far_limit_is_told_in_words() -> None:
     assert max(abs(x) for x in axes.get_xlim()) < 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
     found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]")
     axes = found["histogram"].axes
@@ -272,7 +272,7 @@ def limit_of(axes):
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
     axes, figure, _ = contours("reliability.methods=[auto]")
     assert limit_of(axes).get_radius() == 0.25
@@ -283,7 +283,7 @@ def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
     assert "auto: holds 90 %" in legend(figure)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ellipses_hold_their_shares() -> None:
     axes, _, result = contours("reliability.methods=[analytic, monte_carlo]")
     samples = result.drawn["samples"]
@@ -311,7 +311,7 @@ def test_smoothed_regions_hold_their_shares_and_end_where_samples_end() -> None:
     assert smoothed(errors[:, :50]) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_samples_that_fail_are_marked() -> None:
     axes, figure, result = contours("reliability.methods=[monte_carlo]")
     (marks,) = [line for line in axes.lines if line.get_marker() == "x"]
@@ -321,7 +321,7 @@ def test_samples_that_fail_are_marked() -> None:
     assert f"2,000 samples, {failures} of them fail" in texts(figure)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_open_and_far_limits_of_a_density() -> None:
     axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits={P.x: {max: 0.2}, P.y: 9}")
     (left, low), (right, high) = limit_of(axes).get_bbox().get_points()
@@ -332,7 +332,7 @@ def test_open_and_far_limits_of_a_density() -> None:
     assert "limits outside: -9 mm of P.y, +9 mm of P.y" in texts(figure)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_far_circle_of_a_density_is_told() -> None:
     axes, figure, _ = contours("reliability.methods=[monte_carlo]", "reliability.limits.P.radius=9")
     assert texts(figure).endswith("limit: 9 mm from no error, outside")
@@ -358,7 +358,7 @@ def test_density_of_an_output_and_its_velocity() -> None:
     assert axes.get_aspect() == "auto"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
     axes, _, result = contours("reliability.methods=[monte_carlo]",
                                "reliability.dimensions={'*.length': {tolerance: [0, 0.6]}}")  # fmt: skip
@@ -374,7 +374,7 @@ def test_density_of_one_sided_tolerances_lies_about_their_mean() -> None:
     assert left < -0.25 < table["P.x_error"].max() < right
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_workspace_has_maps() -> None:
     found, _ = drawn(ARM, "reliability.poses=workspace", "reliability.methods=[analytic]")
     assert set(found) == {"deviation_map", "failure_map", "contributions"}

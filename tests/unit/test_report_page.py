@@ -72,7 +72,7 @@ def test_pictures_of_one_page_share_no_names() -> None:
         assert set(re.findall(r"#([\w-]+-\d+)", each)) == set(own)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_large_as_lines_is_a_picture_of_pixels() -> None:
     random = np.random.default_rng(0)
     with style.context():

@@ -40,7 +40,7 @@ def contours(figure: Figure) -> list[Floats]:
     return [each.get_paths()[0].vertices for each in sets if np.array_equal(each.levels, [0.0])]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("design", [{}, {"method": "sobol", "samples": 128}])
 def test_limits_are_contours_where_the_closed_form_has_them(design):
     vary = {R: "30:46", L: "90:130"} if design else {R: "30:46:2", L: "90:130:4"}
@@ -122,7 +122,7 @@ def test_triangles_between_scattered_cases_follow_a_plane_and_leave_out_what_fai
     assert np.isfinite(plane.field(values, every, REDUCTIONS[0][0])).sum() < known.sum()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("vary", [{R: "30:46:2"}, {R: "30:46:2", "mechanism.branch": ["side", "follow"]}])
 def test_there_is_no_map_of_one_number_that_varies(vary):
     assert "response" not in answer_of(vary).figures
@@ -132,7 +132,7 @@ def test_cases_on_a_line_span_no_map():
     assert Plane.of(axis("x", [0, 1, 2]), axis("y", [5, 6, 7]), others=False) is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_many_cases_a_sample_is_drawn_with_the_best_and_the_front(monkeypatch: pytest.MonkeyPatch):
     count = 40_000
     rank = np.where(np.arange(count) == 12_345, 1.0, 2.0)

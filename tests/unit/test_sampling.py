@@ -199,7 +199,7 @@ def with_outliers(seed: int, count: int) -> Measured:
     return Measured.of(np.concatenate([rng.normal(0, 0.002, many), rng.normal(0.1, 0.002, count // 20)]), 0.0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("one", "other", "asked"),
     [

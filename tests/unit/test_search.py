@@ -76,7 +76,7 @@ def least(function, dimensions, margins=None, seed=0):
     return known.known.u[row], known.known.values[row, 0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(5))
 def test_minimum_of_branin(seed):
     assert least(branin, 2, seed=seed)[1] == pytest.approx(0.39788735773, abs=1e-5)
@@ -158,7 +158,7 @@ def test_along_a_narrow_valley_of_two_rows():
     assert at == pytest.approx([0.75, 0.5], abs=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_worst_rows_weighed_under_a_condition_that_is_one():
     """|x - 1/2| and |y - 1/2|, and both x and y at most 0.4: the nearest corner."""
 
@@ -234,7 +234,7 @@ def test_bounds_that_leave_no_value():
         mechdesign.optimize(study_of(ARM, "optimize.variables.r2={from: 40, to: r1}"))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_optimum_at_a_bound_and_a_condition():
     """Turned less to the x axis, the forearm is as long as may be; the upper arm makes up what the height lacks."""
     result = mechdesign.optimize(study_of(ARM))

@@ -42,7 +42,7 @@ workspace: {{point: P, assembly: any, indices: [], scan: {{about: {about}}}}}
     assert found["SUI_error"][0] <= 0.02
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_three_links_over_a_range_of_orientations() -> None:
     """Reached where some orientation of the hand lets all three joints be within their limits, by a raster."""
     study = study_of("""

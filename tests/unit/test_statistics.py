@@ -299,7 +299,7 @@ GOALS = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_goals_of_many_designs_are_those_of_each_alone() -> None:
     study = study_of(FOUR_BAR + OPTIMIZE % ", ".join(GOALS))
     assert study.optimize is not None

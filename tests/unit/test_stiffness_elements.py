@@ -56,7 +56,7 @@ def check(text: str, *overrides: str) -> None:
     assert (np.abs(found - expected) <= 1e-6 * np.outer(size, size) + 1e-18).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("section", SECTIONS)
 @pytest.mark.parametrize("text", TEXTS)
 def test_sections_in_mechanisms(text: str, section: str) -> None:

@@ -393,7 +393,7 @@ def test_what_is_echoed_is_short_and_printable() -> None:
     assert r"\x1b[2J\u202e\n\x00x" in told[0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_mechanism_has_a_bounded_number_of_links() -> None:
     links = "".join(f"    a{index}: [O, P{index}, 1]\n" for index in range(20_000))
     with pytest.raises(StudyError, match=r"mechanism\.links: 20001 links are too many"):

@@ -52,7 +52,7 @@ def spots(data):
         yield from spots(value)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_damaged_studies(data):
@@ -73,7 +73,7 @@ def test_damaged_studies(data):
             mechdesign.load(path)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", templates())
 def test_half_written_studies(name, tmp_path):
     lines = template(name).splitlines(keepends=True)

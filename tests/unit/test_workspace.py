@@ -70,7 +70,7 @@ def test_from_outside_the_region_too() -> None:
     assert about["area"][0] == pytest.approx(np.pi * (2.5**2 - 0.5**2), rel=1e-7)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_assembly_of_the_sketch_ends_at_a_singularity() -> None:
     """All round, two legs reach above and below their base; only one half is the sketch's assembly."""
     half = mechdesign.workspace(study_of(LEGS))
@@ -80,7 +80,7 @@ def test_the_assembly_of_the_sketch_ends_at_a_singularity() -> None:
     assert half.tables["local"]["y"].min() > -1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_margin_is_left_out_of_the_means_only() -> None:
     whole = mechdesign.workspace(study_of(LEGS, UPPER)).main
     cut = mechdesign.workspace(study_of(LEGS, UPPER, "workspace.margin=20")).main
@@ -112,7 +112,7 @@ def test_panels_end_where_the_active_limits_change() -> None:
     assert np.abs(panels.high - np.angle(corner)).min() < 1e-12
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_batch_of_designs_equals_one_by_one() -> None:
     study = study_of(LEGS, UPPER)
     question = questions(study)[0]
@@ -217,7 +217,7 @@ workspace: {point: P, at: {platform.angle: [0, -20]}, characteristic_length: 0.2
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("assembly", ["any", "same"])
 def test_every_pose_is_singular_where_platform_and_base_are_similar(assembly: str) -> None:
     """Not turned against the base, the platform's legs always meet in one point; its area is known all the same."""

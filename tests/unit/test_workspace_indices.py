@@ -133,7 +133,7 @@ def test_infinite_statistics_are_said_to_be() -> None:
         assert row["sigma_max_min"][0] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_five_bar() -> None:
     """Links 0.25 and 0.40, motors at (+-0.15, 0): the part that two rings share, and J at a point, elbows out."""
     row = mechdesign.workspace(study_of(FIVE_BAR)).main
@@ -177,7 +177,7 @@ def test_platform_in_one_assembly(angle: float) -> None:
     assert table["sigma_min"][k] == pytest.approx(homogeneous[-1], rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_platform_on_three_cranks_at_several_orientations() -> None:
     """3-RRR: the forward problem is Newton's, the inverse closed form; rings of three legs, moved by the platform."""
     section = "workspace={point: P, at: {platform.angle: [0, 15]}, characteristic_length: 60, assembly: any}"
@@ -191,7 +191,7 @@ def test_platform_on_three_cranks_at_several_orientations() -> None:
         assert row["area"][k] == pytest.approx((reach <= 240).all(axis=-1).sum() * 0.2**2, rel=2e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_only_the_indices_asked_for() -> None:
     result = mechdesign.workspace(study_of(FIVE_BAR, "workspace.indices=sigma_min"))
     statistics = [name for name in result.main.names if name.startswith(("sigma", "mani", "inverse", "resis"))]
@@ -323,7 +323,7 @@ workspace: {point: P, at: {plate.angle: [-20, 20, -10]}, characteristic_length: 
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_totals_over_all_held_values_and_empty_regions_among_them() -> None:
     result = mechdesign.workspace(study_of(PLATFORM))
     indices, totals = result.tables["indices"], result.tables["totals"]
