@@ -4,6 +4,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import site
 import sys
 import threading
 import time
@@ -159,7 +160,7 @@ class Long:
 def test_a_long_function_is_read_once_by_each_worker(tmp_path):
     fresh, root = multiprocessing.get_context("spawn"), str(Path(__file__).parents[2])
     # Workers import this module, by its name below the root.
-    with on(Pool(lambda: ProcessPoolExecutor(2, fresh, sys.path.append, (root,)), 2)):
+    with on(Pool(lambda: ProcessPoolExecutor(2, fresh, site.addsitedir, (root,)), 2)):
         found = [*map_chunks(Long(tmp_path), range(300), travels=True)]
     assert found == [100_000 + k for k in range(300)]
     assert 1 <= len([*tmp_path.iterdir()]) <= 2
