@@ -39,6 +39,7 @@ mechanism:
 """
 
 
+@pytest.mark.slow
 def test_both_modes_of_a_four_bar() -> None:
     result = kinematics(study_of(FOUR_BAR), all_modes=True)
     motion, modes = result.tables["motion"], result.tables["modes"]

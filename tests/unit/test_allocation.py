@@ -60,6 +60,7 @@ def ask(text: str, *overrides: str) -> Result:
     return mechdesign.reliability(study_of(text, *overrides))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
 def test_a_linear_chain_has_lagranges_tolerances(exponent: float) -> None:
     """Minimise sum a/T^k where sum (s T)^2 is given: T ~ (a/s^2)^(1/(k + 2)); the motor's s is 3, of its sigma."""
@@ -86,6 +87,7 @@ def test_a_linear_chain_has_lagranges_tolerances(exponent: float) -> None:
     assert table["cost_allocated"].sum() < 0.99 * (a / (alike * given) ** exponent).sum()
 
 
+@pytest.mark.slow
 def test_the_simulation_confirms_it_and_the_study_written_reaches_it() -> None:
     result = ask(CHAIN)
     confirmation = result.tables["confirmation"]
@@ -101,6 +103,7 @@ def test_the_simulation_confirms_it_and_the_study_written_reaches_it() -> None:
     assert table["reliability"][~simulated] == pytest.approx([0.999], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_file_keeps_its_comments_and_says_the_new_tolerances(tmp_path: Path) -> None:
     (tmp_path / "chain.yaml").write_text(CHAIN)
     result = mechdesign.reliability(mechdesign.load(tmp_path / "chain.yaml"))
@@ -117,6 +120,7 @@ def test_the_file_keeps_its_comments_and_says_the_new_tolerances(tmp_path: Path)
     )
 
 
+@pytest.mark.slow
 def test_rare_failures_are_confirmed_by_auto() -> None:
     result = ask(CHAIN, "reliability.allocate.reliability=0.9999999")
     confirmation = result.tables["confirmation"]
@@ -126,6 +130,7 @@ def test_rare_failures_are_confirmed_by_auto() -> None:
     assert confirmation["evaluations"][0] < 100_000
 
 
+@pytest.mark.slow
 def test_where_the_model_is_too_careful_simulation_makes_it_cheaper() -> None:
     """Uniform deviations have no tails: the normal model asks for tighter tolerances than they need."""
     text = CHAIN.replace("b: 0.2", "b: {tolerance: 0.2, distribution: uniform}")
@@ -137,6 +142,7 @@ def test_where_the_model_is_too_careful_simulation_makes_it_cheaper() -> None:
     assert any("was corrected" in note for note in map(str, result.warnings))
 
 
+@pytest.mark.slow
 def test_where_the_model_is_careless_simulation_makes_it_tighter() -> None:
     """A lognormal deviation of large spread has a longer tail than the normal of the same moments."""
     text = LEVER + "  dimensions: {lever.length: {sigma: 3, distribution: lognormal}}\n"
@@ -172,6 +178,7 @@ def test_two_uniform_tolerances_are_as_cheap_as_can_be(asked: float, price: floa
     assert confirmation["low"] < asked < confirmation["high"]
 
 
+@pytest.mark.slow
 def test_one_uniform_tolerance_reaches_just_beyond_its_limit() -> None:
     """Beyond L of the half width t with 1 - L/t."""
     result = ask(CHAIN, "reliability.dimensions={a: {tolerance: 0.1, distribution: uniform}}",
@@ -192,6 +199,7 @@ def test_what_is_held_and_cannot_break_the_limits_is_no_reason_to_refuse() -> No
     assert result.tables["confirmation"]["low"] < 0.99 < result.tables["confirmation"]["high"]
 
 
+@pytest.mark.slow
 def test_the_advice_where_it_cannot_be_reached_works() -> None:
     text = LEVER.replace("theta: 0}", "theta: 90}").replace("P.x: 0.3", "P.x: 0.005") + (
         "  dimensions: {lever.length: 0.2}\n  clearances: {O: {fit: 20 H7/g6, link: lever}}\n"
@@ -220,6 +228,7 @@ def test_every_pose_reaches_it() -> None:
     assert found["theta"] == pytest.approx(np.degrees(alone / 100), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_what_has_no_influence_is_as_wide_as_allowed_and_is_told() -> None:
     result = ask(CHAIN, "reliability.dimensions.c=0.05")
     assert allocated(result)["c"] == pytest.approx(0.5)
@@ -227,6 +236,7 @@ def test_what_has_no_influence_is_as_wide_as_allowed_and_is_told() -> None:
     assert allocated(result)["a"] == pytest.approx(allocated(ask(CHAIN))["a"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_what_only_simulation_sees_is_not_widened() -> None:
     """At a stretched lever the angle's error counts in the second order only: 100 (1 - cos)."""
     result = ask(LEVER + "  dimensions: {lever.length: 0.2, theta: 2}\n", "reliability.limits={P.x: 0.5}")
@@ -242,6 +252,7 @@ def test_loose_limits_do_not_run_away() -> None:
     assert sum("as wide as allowed" in note for note in map(str, result.warnings)) == 3
 
 
+@pytest.mark.slow
 def test_held_clearances_that_break_the_limits_alone_are_named_with_what_is_reachable() -> None:
     text = LEVER.replace("theta: 0}", "theta: 90}") + (
         "  dimensions: {lever.length: 0.2}\n  clearances: {O: {radial: 0.3, link: lever}}\n"
@@ -261,6 +272,7 @@ def test_held_clearances_that_break_the_limits_alone_are_named_with_what_is_reac
     assert allocated(result)["O"] == pytest.approx(0.3 / -ndtri(0.0005) * 3, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_limits_that_no_tolerance_keeps() -> None:
     assert "shrink to nothing" in ask(CHAIN, "reliability.limits.B.x=1e-5").failed
     moved = ask(CHAIN, "reliability.dimensions.a=[0.5, 0.7]")
@@ -273,6 +285,7 @@ def test_limits_that_no_tolerance_keeps() -> None:
     assert "held" not in result.failed
 
 
+@pytest.mark.slow
 def test_asymmetric_tolerances_keep_their_middle() -> None:
     result = ask(CHAIN, "reliability.dimensions.a=[-0.05, 0.15]")
     found = study_of(result.files["allocated.yaml"]).reliability
@@ -301,6 +314,7 @@ reliability:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("angle", "names"), [("0", ["*.length"]), ("60", ["upper.length", "fore.length"])])
 def test_a_wildcard_is_written_out_unless_its_places_stay_alike(angle: str, names: list[str]) -> None:
     result = ask(WILD.replace("ANGLE", angle))
@@ -358,6 +372,7 @@ stiffness: {link: lever, at: P, actuators: {theta: 1e6}}
     assert np.hypot(angle, 0.01) == pytest.approx((0.3 - 0.1) / -ndtri(0.01), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_diameter_stays_a_diameter() -> None:
     text = LEVER.replace("theta: 0}", "theta: 90}") + (
         "  clearances: {O: {diametral: 0.8, tolerance: [-0.1, 0.3], link: lever}}\n"

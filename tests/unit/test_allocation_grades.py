@@ -172,6 +172,7 @@ def test_a_cpk_in_any_numbers_is_reached_exactly() -> None:
     assert result.tables["allocation"]["allocated"] == pytest.approx([3 * 0.1 / (3 * 1.33) / 2] * 4, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_every_output_at_every_pose_has_the_cpk() -> None:
     result = ask(PLANE, "reliability.allocate={cpk: 1.33}", "reliability.limits={P.x: 0.08, T.y: 0.1}")
     again = mechdesign.load(text=result.files["allocated.yaml"])
@@ -180,6 +181,7 @@ def test_every_output_at_every_pose_has_the_cpk() -> None:
     assert cpk.min() >= 1.33
 
 
+@pytest.mark.slow
 def test_simulation_corrects_grades_too() -> None:
     """A uniform deviation has no tails: it may reach to the limit, and by the normal model to half of it."""
     uniform = SUM.replace("a: 0.05, b: 0.05, c: 0.05, travel: 0.02", "a: {tolerance: 0.05, distribution: uniform}")
@@ -195,6 +197,7 @@ def test_what_the_finest_grades_do_not_reach_is_told() -> None:
     assert "allocation" not in result.tables
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("overrides", "message"), [
     (["reliability.allocate={cpk: 1.33, reliability: 0.9}"], "either a 'reliability' or a 'cpk'; reliability and cpk"),
     (["reliability.allocate={grades: true}"], "either a 'reliability' or a 'cpk'"),

@@ -82,6 +82,7 @@ def test_a_range_is_the_same_for_designs_together() -> None:
     assert designs["kinematics.extremes.range"] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [5, 30, 100])
 def test_a_limit_of_a_measure_follows_the_motion(step: int) -> None:
     limited = FOUR_BAR.replace("kinematics:", "  limits: [{measure: m, min: -100, max: 900}]\nkinematics:")
@@ -95,6 +96,7 @@ def test_a_limit_of_a_measure_follows_the_motion(step: int) -> None:
     assert limits["theta"] == pytest.approx(np.interp([-100, 900], free["m"], free["theta"]), abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("low", "high"), [(0, 500), (0, 360), (-60, 60), (200, 260)])
 def test_a_drive_that_turns_on_counts_as_given(low: float, high: float) -> None:
     limited = FOUR_BAR.replace("kinematics:", f"  limits: [{{drive: theta, min: {low}, max: {high}}}]\nkinematics:")

@@ -135,6 +135,7 @@ def test_large_batches_come_out_as_small_ones(jobs: int) -> None:
     assert np.array_equal(one.point("B"), grid.point("B")[1234], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_rates_go_smoothly_through_the_change_points_that_are_followed() -> None:
     study = study_of(
         PARALLELOGRAM + "kinematics:\n  sweep: {theta: {from: -180, to: 360, step: 45}}\n  rates: {theta: 1 rad/s}\n"

@@ -43,6 +43,7 @@ def overlaid(command, now, then):
     return laid_under(now, results[0], then, results[1]), results[1]
 
 
+@pytest.mark.slow
 def test_names_are_drawn_letter_by_letter():
     """No formula of TeX, and no mark that turns the letters round, which no font has."""
     now, then = (

@@ -32,6 +32,7 @@ def capability(*overrides: str) -> Table:
     return mechdesign.reliability(study_of(LEVER, *overrides)).tables["capability"]
 
 
+@pytest.mark.slow
 def test_limits_of_the_value_hold_at_every_pose() -> None:
     methods = "reliability.methods=[analytic, second_order, monte_carlo, form, importance_sampling]"
     table = mechdesign.reliability(study_of(LEVER, methods)).tables["reliability"]
@@ -109,6 +110,7 @@ def test_a_radial_limit_has_ppm_and_sigma_level() -> None:
     assert np.isnan(table["cpk"]).all()
 
 
+@pytest.mark.slow
 def test_each_of_several_limits_is_judged_by_itself_by_all_methods() -> None:
     """x and y of a shifted point are independent, and the radius is Rayleigh's."""
     table = capability(
@@ -148,6 +150,7 @@ def test_designs_are_centred_between_limits_of_the_value() -> None:
     assert best["reliability.capability.P.x.cpk"] == pytest.approx(0.125 / 0.15, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_tolerances_are_allocated_to_limits_of_the_value() -> None:
     pose = "reliability.poses=[{theta: 60}]"
     asked = (pose, "reliability.allocate={reliability: 0.99}", "reliability.samples=2000")

@@ -77,6 +77,7 @@ def test_numbers_and_limits_that_follow_are_those_of_each_case_alone():
     assert [each.margin for each in found.verdicts] == [pytest.approx(5), pytest.approx(-3)]
 
 
+@pytest.mark.slow
 def test_cases_come_in_their_order_whatever_the_workers():
     cases: list[dict[str, object]] = [{"mechanism.parameters.l": 100 + k} for k in range(7)]
     one, two = (asked(SLIDER_CRANK, cases, STROKE, jobs=jobs) for jobs in (1, 2))

@@ -72,6 +72,7 @@ def test_a_grid_has_every_choice_and_whole_number_and_bounds_that_follow_from_a_
     assert designs_of(mechdesign.optimize(study)) == BRUTE
 
 
+@pytest.mark.slow
 def test_goals_of_designs_are_those_of_studies_with_these_entries() -> None:
     table = mechdesign.optimize(press()).tables["designs"]
     for row in list(table)[:6:5]:
@@ -189,6 +190,7 @@ def test_tolerance_classes_are_choices() -> None:
     assert tables["optimum"]["active"].tolist() == [""]
 
 
+@pytest.mark.slow
 def test_sensitivities_are_of_ranges_and_whole_numbers_move_by_whole_steps() -> None:
     tables = mechdesign.optimize(press()).tables
     assert tables["sensitivity"]["variable"].tolist() == ["l"]
@@ -199,6 +201,7 @@ def test_sensitivities_are_of_ranges_and_whole_numbers_move_by_whole_steps() -> 
     assert tables["sensitivity"]["score_up"][0] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_a_choice_that_fails_only_together_with_another_is_an_infeasible_design() -> None:
     named = "stiffness.sections.tube.inner_diameter: {choices: [15, 21]}, stiffness.sections.tube.diameter: "
     changes = "stiffness.elastic.rod=tube", "stiffness.sections.tube={E: 2e5, diameter: 24, inner_diameter: 15}"
@@ -215,6 +218,7 @@ def test_the_nearest_of_designs_that_miss_a_condition_names_its_choices() -> Non
         mechdesign.optimize(press("", condition))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("variables", "message"),
     [
@@ -268,6 +272,7 @@ def test_pictures_name_the_choices(variables: str, method: str) -> None:
     assert {"bar", "tube"} <= words
 
 
+@pytest.mark.slow
 def test_every_combination_of_words_is_one_design() -> None:
     links = ("crank", "rod")
     named = ", ".join(f"stiffness.elastic.{link}: {{choices: [bar, tube]}}" for link in links)

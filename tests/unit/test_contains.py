@@ -258,6 +258,7 @@ def test_worst_of_several_held_values_counts() -> None:
     assert designs.column("GII").meaning.endswith("the worst at platform.angle = -20, 40")
 
 
+@pytest.mark.slow
 def test_held_values_that_leave_nothing_are_named() -> None:
     result = mechdesign.optimize(study_of(RRR, "optimize.variables.crank={from: 90, to: 160, step: 70}",
                                           "workspace.at.platform.angle=[0, 60]", "optimize.subject_to=[]"))  # fmt: skip

@@ -65,6 +65,7 @@ def judged(text: str, *requirements: str) -> list[Verdict]:
     return list(mechdesign.requirements(study, kinematics(study)))
 
 
+@pytest.mark.slow
 def test_a_circle_of_seven_poses_has_the_extremes_of_the_circle() -> None:
     text = FIVE_BAR + "kinematics: {path: {C: {circle: {center: [10, 150], radius: 35}, points: 7}}, outputs: [C]}\n"
     result = kinematics(study_of(text))
@@ -78,6 +79,7 @@ def test_a_circle_of_seven_poses_has_the_extremes_of_the_circle() -> None:
     assert [verdict.met for verdict in judged(text, *wanted)] == [True, True]
 
 
+@pytest.mark.slow
 def test_a_line_that_leaves_the_reach_between_its_poses_meets_nothing() -> None:
     # The arm reaches no nearer to its base than 100 - 80.
     text = ARM + "kinematics: {path: {P: {line: [[-100, 10], [100, 10]], points: 4}}, outputs: [P, E]}\n"
@@ -103,6 +105,7 @@ def test_a_polyline_has_its_extremes_in_its_sides_and_at_its_corners() -> None:
     assert (reach["min"], reach["max"]) == pytest.approx((40, np.hypot(90, 100)), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_design_that_does_not_assemble_in_between_is_not_the_best() -> None:
     # The crank turns where 100 + a does not exceed 90 + 60; it then swings the rocker between two stretched poses.
     optimize = "optimize:\n  maximize: {GOAL}\n  variables: {a: {from: 20, to: 60, step: 5}}\n"
@@ -125,6 +128,7 @@ def test_an_angle_of_an_expression_goes_on_without_a_jump() -> None:
     assert table["unit"][table["output"].tolist().index("behind")] == "deg"
 
 
+@pytest.mark.slow
 def test_a_measure_of_angles_is_followed_over_whole_turns() -> None:
     text = """\
 mechanism:
@@ -166,6 +170,7 @@ def test_a_verdict_on_a_motion_says_nothing_of_poses() -> None:
     assert "asked poses" not in str(verdict)
 
 
+@pytest.mark.slow
 def test_a_goal_of_magnitudes_does_not_take_the_least_signed() -> None:
     # The drive's moment is -10 N P.x: of the shortest crank the least in magnitude, of the longest the lowest.
     study = study_of(LOADED.replace("GOAL", "{result: kinematics.crank_effort, abs: true}"))
@@ -233,6 +238,7 @@ def test_a_limit_behind_a_dead_centre_ends_the_motion_there() -> None:
     assert row(result, "J.x")["max"] == pytest.approx(60, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_least_magnitudes_do_not_jump_over_zero_at_a_corner() -> None:
     # C turns back at (110, 60): the rate of the elbow changes its sign there, and its least magnitude is at a row.
     path = "kinematics: {path: {C: [[60, 60], [110, 60], [60, 60]]}, speed: 100, outputs: [C]}\n"
@@ -247,6 +253,7 @@ def test_least_magnitudes_do_not_jump_over_zero_at_a_corner() -> None:
     assert (below.met, above.met) == (True, False)
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_touched_ends_no_motion() -> None:
     text = """\
 mechanism:

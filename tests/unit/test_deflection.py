@@ -74,6 +74,7 @@ def test_an_output_errs_by_compliance_times_load() -> None:
     assert pick(result, "contributions", "share") == pytest.approx(np.ones(3))
 
 
+@pytest.mark.slow
 def test_a_random_load_is_a_source_beside_the_dimensions() -> None:
     text = ARM + LOADED
     result = ask(text, "reliability.methods=[analytic, second_order, monte_carlo, quasi_monte_carlo]")
@@ -93,6 +94,7 @@ def test_a_random_load_is_a_source_beside_the_dimensions() -> None:
     assert shift / scale == pytest.approx(soft @ [100, -50, 10], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_every_method_counts_the_deflection() -> None:
     """The error of P.x is normal: C F on the average, its deviation C11 sigma; the limit is three of it off."""
     text = ARM + LOADED
@@ -175,6 +177,7 @@ reliability: {poses: [{q: 25}], dimensions: {load.fy: 1}, outputs: [arm.angle, t
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("arm", "at", "a"), [
     ("{from: O, to: P, length: 0.8, points: {M: [0.3, 0]}}", "P", 0.8),
     ("{from: O, to: P, length: 0.8, points: {M: [0.3, 0]}}", "M", 0.3),
@@ -275,6 +278,7 @@ reliability:
     assert pick(result, "moments", "sigma", method="monte_carlo") == pytest.approx(np.abs(soft[:, 1]) * 5, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_pose_that_does_not_hold_the_load_is_not_valid() -> None:
     """A platform whose three struts meet turns about their common point: it bears no moment."""
     text = (
@@ -381,6 +385,7 @@ def test_sobol_indices_know_the_load() -> None:
     assert table["sobol_total"] == pytest.approx(table["share"], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_designs_that_differ_in_what_the_stiffness_section_says() -> None:
     """Found at once, all of them had the deflections of the study's own beam and load."""
     text = """

@@ -112,6 +112,7 @@ def test_an_over_constrained_part_is_found_where_the_count_agrees(drawn: str) ->
     assert "the count gives mobility 1, yet with these dimensions it moves with 2 degrees of freedom" in message
 
 
+@pytest.mark.slow
 def test_a_part_that_floats_and_holds_itself_too_often() -> None:
     # The count of equations for each link and pin is right; that within the floating part is not.
     assert "mechanism.links.q: the count gives mobility 0, yet" in told(
@@ -131,6 +132,7 @@ def test_a_truss_without_drives_is_a_structure_and_stays() -> None:
     assert "mobility: 0, loops: 1, drives: none" in described("a: [O, A, 80], b: [D, A, 70]", "[]", "{A: [50, 50]}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("roller", ["{B: [0, 0]}", "{B: [0, 0], Q: [5, 0]}"])
 def test_a_roller_turns_idly(roller: str) -> None:
     message = told(f"{FOUR_BAR}, roller: {roller}")

@@ -59,6 +59,7 @@ def test_the_table_tells_tolerances_and_sections():
     assert by_link["theta"][3] == "\N{PLUS-MINUS SIGN}0.5 deg"
 
 
+@pytest.mark.slow
 def test_the_pose_that_fails_most_is_drawn_beside_the_sketch():
     from mechdesign.report.figures.mechanism import mechanism_figure
 

@@ -32,6 +32,7 @@ def test_a_study_without_a_slip_has_no_warning():
     assert doubts() == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("unit", "start", "end", "meant"),
     [

@@ -176,6 +176,7 @@ def test_a_limit_out_of_reach_of_a_bounded_variable_is_never_broken() -> None:
     assert sampled(case.problem, most=10_000).failure < 1e-12
 
 
+@pytest.mark.slow
 def test_pins_in_contact() -> None:
     """Two pins on their rims: the x offset of both beyond a limit, against the integral over the one's direction."""
     from mechdesign.analyses.reliability.laws import PIN_LAWS

@@ -131,6 +131,7 @@ def test_auto(name: str, used: str) -> None:
     check(intervals, case.exact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spread", "expected"), [(0.0, 5), (0.3, 5), (0.6, 50), (1.0, 500)])
 def test_mean_of_weights_that_are_rare_and_skewed(spread: float, expected: float) -> None:
     """Lognormal weights at a few of 10,000 samples: the interval knows that more of the largest may come."""

@@ -143,6 +143,7 @@ def test_auto_along_a_sweep() -> None:
     assert set(table["used"][auto].tolist()) <= {"monte_carlo", "importance_sampling"}
 
 
+@pytest.mark.slow
 def test_where_no_failure_is_within_reach_there_is_a_value_of_0_and_a_bound() -> None:
     """Uniform links of the arm reach 0.06 together at the most."""
     dimensions = "{r1: {tolerance: 0.03, distribution: uniform}, r2: {tolerance: 0.03, distribution: uniform}}"

@@ -44,6 +44,7 @@ def by_name(table: Table) -> dict[str, dict[str, float]]:
     return {str(output): {name: float(table[name][k]) for name in names} for k, output in enumerate(table["output"])}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [0, -170, 7])
 @pytest.mark.parametrize("step", [5, 24, 40, 60])
 def test_the_stroke_of_a_slider_crank(first: int, step: int) -> None:
@@ -61,6 +62,7 @@ def test_the_stroke_of_a_slider_crank(first: int, step: int) -> None:
     assert row["time_ratio"] == pytest.approx(part / (360 - part), rel=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [5, 15, 30])
 def test_a_rocker_between_its_limits(step: int) -> None:
     # At the limits rod and rocker are in line: the law of cosines gives the crank there.
@@ -104,6 +106,7 @@ def test_extremes_do_not_depend_on_the_step(name: str, drive: str, steps: tuple[
             assert coarse[output][end] == pytest.approx(row[end], rel=1e-9, abs=1e-9), output
 
 
+@pytest.mark.slow
 def test_a_second_peak_beside_the_end_of_the_sweep() -> None:
     # y = cos(2 t) + cos(t) / 8 of a cardan arm: 1.125 at 0, a second peak of 0.875 at 180.
     text = SLIDER + "  measures: {wave: cos(2*(theta - 173)) + cos(theta - 173)/8}\n"
@@ -115,6 +118,7 @@ def test_a_second_peak_beside_the_end_of_the_sweep() -> None:
         assert row["min"] == pytest.approx(2 / 32**2 - 1 - 1 / (8 * 32), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_peak_torque_lies_between_the_rows() -> None:
     # By virtual work the effort is 500 times the slope of B.x = 40 cos t + sqrt(120^2 - (40 sin t + 20)^2).
     def slope(degrees: float) -> float:
@@ -134,6 +138,7 @@ def test_the_peak_torque_lies_between_the_rows() -> None:
         assert (row["min_at"], row["max_at"]) == pytest.approx((low.x, high.x), abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [5, 30, 36])
 def test_an_advantage_is_infinite_at_a_dead_centre_and_an_effort_where_the_drive_holds_nothing(step: int) -> None:
     rows = extremes(
@@ -155,6 +160,7 @@ def test_an_advantage_is_infinite_at_a_dead_centre_and_an_effort_where_the_drive
     assert abs(row[f"{infinite}_at"]) == pytest.approx(limit, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_designs_that_reach_a_limit_are_answered_with_the_others() -> None:
     text = ROCKER.replace("A: [60, 0], B: [94, 50]", "A: [52, 30], B: [100, 50]")
     text += "kinematics: {sweep: {crank: {from: 0, to: 60, step: 10}}, outputs: [B.x]}\n"
@@ -169,6 +175,7 @@ def test_designs_that_reach_a_limit_are_answered_with_the_others() -> None:
         assert (table["min"][k], table["max"][k]) == pytest.approx((row["min"], row["max"]), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_an_open_sketch_is_told_under_follow_as_under_side() -> None:
     texts = []
     for branch in ("side", "follow"):

@@ -96,6 +96,7 @@ def test_grashofs_classes(lengths: tuple[float, float, float, float], expected: 
     assert loop.excess == pytest.approx(p + q - shortest - longest, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lengths", "turns"),
     [
@@ -181,6 +182,7 @@ def test_links_in_line_at_a_pose_and_at_both_ends_of_a_turn() -> None:
     assert list(table["state"]) == ["extended", "folded", "extended"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("r", "l", "e", "expected"),
     [

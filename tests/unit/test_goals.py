@@ -92,6 +92,7 @@ def test_values_ranges_and_errors_of_a_sweep() -> None:
     agree(study, goals, around(study, names, 6, 0.03))
 
 
+@pytest.mark.slow
 def test_targets_follow_the_parameters_of_each_design() -> None:
     study = varied("gallery/function_generator.yaml", ["follower_0"])
     goals = [goal("kinematics.targets.rms", smallest=True), goal("kinematics.follower.angle_error", smallest=True)]
@@ -128,6 +129,7 @@ def test_studies_of_the_gallery(path: str) -> None:
     agree(study, goals, around(study, names, 3, 0.02))
 
 
+@pytest.mark.slow
 def test_groups_without_a_closed_form_start_from_their_own_sketch() -> None:
     study = mechdesign.load(CONFIGS / "gallery" / "rrr_platform.yaml")
     names = [name for name in study.mechanism.nominal if name.endswith(".length")][:2]
@@ -145,6 +147,7 @@ def test_jacobian_and_limits_of_listed_poses() -> None:
     agree(study, goals, around(study, ["R", "lower_1.length"], 5, 0.05))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["planar_3rpr.yaml", "five_bar.yaml"])
 def test_stiffness(path: str) -> None:
     names = [n for n in mechdesign.load(CONFIGS / path).mechanism.nominal if n.endswith((".x", ".length"))][:4]
@@ -228,6 +231,7 @@ def test_transmission_angles_of_the_loops(changes: tuple[str, ...]) -> None:
     agree(study, goals if "kinematics.sweep=" in changes else goals[:1], designs)
 
 
+@pytest.mark.slow
 def test_workspaces_where_the_section_depends_on_a_variable() -> None:
     """Asked of each design then, with the same numbers as all at once."""
     study, other = (varied("two_rrr.yaml", ["l_min"], f"workspace.scan.about=[{x}, 0]") for x in ("0", "0*l_min"))
@@ -254,6 +258,7 @@ def test_stiffness_as_an_index_of_the_workspace() -> None:
     assert found.table[0, 0] != found.table[1, 0]
 
 
+@pytest.mark.slow
 def test_numbers_of_the_section_that_depend_on_a_variable() -> None:
     study = varied("gallery/function_generator.yaml", ["crank_turn"])
     designs = {"crank_turn": np.array([50.0, 60.0, 66.0])}
@@ -336,6 +341,7 @@ def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() ->
     assert np.isnan(found.table[:, 0]).tolist() == [False, True, True, True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("goals", "message"),
     [
@@ -376,6 +382,7 @@ def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None
         Evaluator(study, [goal("kinematics.V.x")])
 
 
+@pytest.mark.slow
 def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
     from mechdesign.analyses import poses
 
@@ -430,6 +437,7 @@ optimize:
 """
 
 
+@pytest.mark.slow
 def test_goals_of_chosen_rows():
     """The rocker's swing by the triangles of its two dead centres; its pin's travel beside it."""
     choice = "{result: kinematics.extremes.range, where: {output: %s}}"
@@ -445,6 +453,7 @@ def test_goals_of_chosen_rows():
     assert mechdesign.optimize(weighted).main["w_kinematics.extremes.range (output rocker.angle)"][0] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wanted", "told"),
     [
@@ -466,6 +475,7 @@ def test_conditions_do_not_compare_millimetres_with_degrees():
         mechdesign.optimize(study_of(SWUNG, *changes))
 
 
+@pytest.mark.slow
 def test_listed_poses_that_follow_the_variables_are_solved_together():
     """With one design's poses and dimensions after the other's, as one by one."""
     poses = "[{A.y: a/2}, {A.y: 5}, {A.y: y + 2}]"
@@ -490,6 +500,7 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 30}}, outputs: [C, mu, tota
 """
 
 
+@pytest.mark.slow
 def test_expressions_over_parameters_are_goals_and_conditions() -> None:
     section = """
 optimize:

@@ -73,6 +73,7 @@ def test_a_draw_that_happens_to_be_singular_or_undefined_is_not_believed(
     assert train(1, Random(0)).forward.iterative
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [0.0, np.nan])
 def test_what_no_draw_determines_is_refused(value: float, monkeypatch: pytest.MonkeyPatch) -> None:
     spoil(value, monkeypatch)

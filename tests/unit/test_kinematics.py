@@ -99,6 +99,7 @@ kinematics: {sweep: {theta: {from: 0, to: 360, step: 7.2}}, outputs: [B, theta]}
     assert (table["min"][2], table["max"][2]) == (0, 360)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sweep", ["P.x: {from: -14, to: 14, step: STEP}", "t1: {from: 10, to: 80, step: STEP}"])
 def test_extremes_of_an_inverse_motion_lie_between_its_poses(sweep: str) -> None:
     coarse, fine = (

@@ -114,6 +114,7 @@ def test_inverse_singularities_lie_where_a_leg_is_stretched_or_folded() -> None:
         assert np.abs(z - told[leg]) == pytest.approx(np.full(len(z), 0.65 if how == "stretched" else 0.15), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_two_legs_in_line_along_a_ray_of_the_scan() -> None:
     """The line through both bases: a ray runs along it, where the function is zero but for rounding."""
     curves = each(mechdesign.workspace(study_of(LEGS, "workspace.assembly=any")).tables["singularities"])
@@ -125,6 +126,7 @@ def test_two_legs_in_line_along_a_ray_of_the_scan() -> None:
     assert sum(abs(z[-1] - z[0]) for z in forward) == pytest.approx(1, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_limits_are_named_by_what_they_limit() -> None:
     edge = mechdesign.workspace(study_of(LEGS, "workspace.assembly=any")).tables["boundary"]
     assert set(edge["at"]) == {"l1 min", "l1 max", "B2-C min", "B2-C max"}

@@ -109,6 +109,7 @@ def test_a_long_table_is_read_as_any_other(request: pytest.FixtureRequest) -> No
     assert repr(long) == repr(whole)
 
 
+@pytest.mark.slow
 def test_extremes_of_rates_are_in_the_pictures(at_once: None) -> None:
     study = study_of(FOUR_BAR)
     result = mechdesign.kinematics(study)

@@ -71,6 +71,7 @@ def test_measured_values_are_correlated_with_others(tmp_path: Path) -> None:
     assert np.corrcoef(drawn)[0, 1] == pytest.approx(0.6, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "asked", "message"),
     [
@@ -96,6 +97,7 @@ def test_what_is_wrong_with_measured_values_is_said_at_once(
         load(tmp_path, f"dimensions: {{lever.length: {{measured: levers.csv{', ' * bool(asked)}{asked}}}}}")
 
 
+@pytest.mark.slow
 def test_designs_need_to_know_what_measured_values_deviate_from(tmp_path: Path) -> None:
     write(tmp_path, column(VALUES))
     optimize = """
@@ -116,6 +118,7 @@ optimize:
     assert result.files["input_levers.csv"] == column(VALUES)
 
 
+@pytest.mark.slow
 def test_allocated_tolerances_leave_measured_values_as_they_are(tmp_path: Path) -> None:
     write(tmp_path, column(VALUES))
     dimensions = "dimensions: {lever.length: {measured: levers.csv, column: length}, theta: 0.03}"

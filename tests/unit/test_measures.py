@@ -37,6 +37,7 @@ mechanism:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("poses", "given"),
     [
@@ -177,6 +178,7 @@ def test_measures_take_parameters() -> None:
         study_of(PARAMETRIC, "mechanism.measures.reach=B.x - doubel")
 
 
+@pytest.mark.slow
 def test_measures_follow_the_parameters_of_designs() -> None:
     section = (
         "optimize: {variables: {r: {from: 20, to: 40, number: 3}, k: {from: 1, to: 3, number: 2}},"
@@ -191,6 +193,7 @@ def test_measures_follow_the_parameters_of_designs() -> None:
         assert row["feasible"] == (row["r"] + 90 <= 125)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_varies_changes_measures_directly_too() -> None:
     section = """
 reliability:

@@ -122,6 +122,7 @@ def test_newton_group_and_inverse_problem_agree_on_a_platform() -> None:
         assert forward[name] == pytest.approx(value, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_what_newton_cannot_reach_is_not_passed_off_as_the_asked_assembly() -> None:
     mechanism = study_of(PLATFORM).mechanism
     pose = mechanism.solve({"l1": [1.0, 0.1], "l2": [1.0, 3.0], "l3": [1.2, 0.1]})
@@ -183,6 +184,7 @@ def test_limits_keep_the_position_and_say_why() -> None:
     assert np.array_equal(held, configuration.valid)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -173,6 +173,7 @@ def test_rates_are_those_of_drives() -> None:
         study_of(FOUR_BAR + "kinematics: {sweep: {crank: 60}, rates: {B.x: 1}}\n")
 
 
+@pytest.mark.slow
 def test_change_points_are_warned_about_between_poses_and_on_them() -> None:
     def between(text: str) -> list[str]:
         return [warning for warning in map(str, kinematics(study_of(text)).warnings) if "change point at" in warning]

@@ -146,6 +146,7 @@ def test_what_stands_still_is_drawn_straight_and_only_where_it_is_asked_for():
     assert axes.get_ylabel() == "angle\n[deg]"
 
 
+@pytest.mark.slow
 def test_limits_of_motion_and_what_is_not_valid_are_marked():
     study = study_of(ROCKER)
     result = mechdesign.kinematics(study)
@@ -162,6 +163,7 @@ def test_limits_of_motion_and_what_is_not_valid_are_marked():
     assert words == {"dead centre", "not valid"}
 
 
+@pytest.mark.slow
 def test_a_rate_without_bound_does_not_flatten_the_rest():
     limit = max(mechdesign.kinematics(study_of(ROCKER)).tables["limits"]["crank"])
     study = study_of(ROCKER, f"kinematics.sweep={{crank: {{from: {limit + 1e-4}, to: 180, step: 2}}}}")
@@ -175,6 +177,7 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
     assert max(map(abs, axes.get_ylim())) < 5 * usual
 
 
+@pytest.mark.slow
 def test_an_animation_of_a_turn_with_a_gap_has_no_jump():
     sweep = sweep_of(study_of(ROCKER))
     assert not sweep.closed
@@ -191,6 +194,7 @@ def test_a_long_sweep_is_drawn_at_a_bounded_number_of_poses():
     assert sweep.closed
 
 
+@pytest.mark.slow
 def test_listed_poses_are_drawn_one_by_one_and_have_no_curves():
     found = drawn(study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}"))
     assert set(found) == {"poses"}
@@ -220,6 +224,7 @@ def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
     assert key["acceleration"].get_linestyle() == "--"
 
 
+@pytest.mark.slow
 def test_a_limit_of_motion_is_a_special_pose_without_rates():
     poses = mechdesign.kinematics(study_of(ROCKER)).drawn["special"]()
     limits = [each for each in poses.shown if each.what.startswith("limit of motion: dead centre")]

@@ -89,6 +89,7 @@ def test_a_rocker_driven_from_its_pivot_ends_where_the_cosine_law_says() -> None
     assert np.angle(b - 4, deg=True) % 360 == pytest.approx(table["rocker.angle"] % 360, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_limits_do_not_depend_on_the_direction_or_the_step() -> None:
     forth = limits(ROCKER)["crank"]
     assert limits(ROCKER, "kinematics.sweep.crank.step=0.7")["crank"] == pytest.approx(forth, abs=1e-9)
@@ -97,6 +98,7 @@ def test_limits_do_not_depend_on_the_direction_or_the_step() -> None:
     assert limits(text)["crank"] == pytest.approx(forth[::-1], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0, 2.5])
 def test_a_gap_narrower_than_a_step_is_found(start: float) -> None:
     # a + d = 3.9 is longer than b + c by 1e-5: the crank cannot pass 180 deg, where a pose lies or does not.
@@ -124,6 +126,7 @@ def test_a_sweep_that_begins_in_a_gap_enters_the_motion() -> None:
     assert table["crank"] == pytest.approx([52.3, 52.5], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(0, 90), (0, 30), (-30, 30), (-30, 0)])
 def test_limits_at_poses_and_at_the_ends_of_the_sweep(begin: float, end: float) -> None:
     table = limits(SLIDER, f"kinematics.sweep.crank.from={begin}", f"kinematics.sweep.crank.to={end}")
@@ -175,6 +178,7 @@ kinematics: {sweep: {leg: {from: -1, to: 4, step: 0.3}}, outputs: [B]}
     assert table["joint"][0] == "leg"
 
 
+@pytest.mark.slow
 def test_slides_that_become_parallel_are_a_singularity() -> None:
     # A pin in a fixed slot y = 2 and in a slot along a lever: x = 2/tan(lever) is infinite at 180 deg.
     result = kinematics(
@@ -196,6 +200,7 @@ kinematics: {sweep: {lever: {from: 10, to: 352, step: 9}, pin: 0}, outputs: [Q.x
     assert np.isnan(table["Q.x"]).all()
 
 
+@pytest.mark.slow
 def test_a_platform_ends_where_its_three_legs_meet_in_a_point() -> None:
     table = limits(THREE_RPR)
     assert list(table["kind"]) == ["singularity"]
@@ -210,6 +215,7 @@ def test_a_platform_ends_where_its_three_legs_meet_in_a_point() -> None:
     assert np.linalg.det(wrenches) == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_change_points_at_poses_at_the_ends_and_between() -> None:
     def places(*overrides: str) -> list[str]:
         told = warnings(PARALLELOGRAM, *overrides)

@@ -89,6 +89,7 @@ def test_a_rigid_part_stays_with_the_points_of_its_link(name):
     assert met
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "pin", "owner"), [("whitworth", "A", "arm"), ("scotch_yoke", "A", "yoke")])
 def test_a_pin_stays_in_its_slot(name, pin, owner):
     part, _ = shown(name)

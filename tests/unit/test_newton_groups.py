@@ -76,6 +76,7 @@ def last_and_slope(mechanism: Mechanism, crank: float) -> tuple[float, float]:
     return float(configuration.value(last)), float(first(configuration, last, rates))
 
 
+@pytest.mark.slow
 def test_the_end_of_a_motion_is_found_to_the_last_digits() -> None:
     # Driven through its floating side the six-bar turns back where, driven by its crank, that side stands still.
     by_crank, by_last = six_bar("crank"), six_bar("last")
@@ -106,6 +107,7 @@ def test_no_end_is_found_where_there_is_none() -> None:
     assert turning_point(mechanism.forward, lambda value: [value, *given[1:]], given[0], 0.1, sketch) is None
 
 
+@pytest.mark.slow
 def test_a_pose_does_not_depend_on_its_batch_or_order() -> None:
     mechanism = mechdesign.load(CONFIGS / "planar_3rpr.yaml").mechanism
     random = np.random.default_rng(1)

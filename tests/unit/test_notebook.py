@@ -74,6 +74,7 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.found if name == tag]
 
 
+@pytest.mark.slow
 def test_a_study_as_a_mapping_a_text_and_a_file_is_the_same() -> None:
     file = template_path("four_bar")
     tables = [
@@ -131,6 +132,7 @@ def test_an_optimum_of_a_mapping_is_written_as_a_study() -> None:
     assert files
 
 
+@pytest.mark.slow
 def test_a_study_shows_its_mechanism_and_its_words_stay_text() -> None:
     mechanism = DATA["mechanism"] | {"parameters": {"a": 30, "unused": 1}}
     data = DATA | {"name": HOSTILE, "mechanism": mechanism}
@@ -194,6 +196,7 @@ def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.Mon
         result.figure("motion")
 
 
+@pytest.mark.slow
 def test_rows_of_several_quantities_show_their_units() -> None:
     vary = {"dimensions": {"arm.length": 0.3}, "poses": [{"arm": 0}], "methods": ["analytic"]}
     page = Page(mechdesign.reliability(mechdesign.load(ARM | {"reliability": vary}))._repr_html_())

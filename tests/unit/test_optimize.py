@@ -72,6 +72,7 @@ def test_ties_go_to_the_first_design() -> None:
     assert compare([1.0, 2.0, 2.0, 9.0], feasible=3).winners.tolist() == [1]
 
 
+@pytest.mark.slow
 def test_scores_are_weighted_sums_of_normalised_indices() -> None:
     tables = rrr("optimize.weights=[[2, 0, 1], {SUI: 3}]").tables
     optimum, designs = tables["optimum"], tables["designs"]
@@ -97,6 +98,7 @@ def test_conditions_leave_designs_out_and_are_counted() -> None:
     assert np.isnan(designs["CPI"][area < 9]).all()
 
 
+@pytest.mark.slow
 def test_no_feasible_design_says_why() -> None:
     with pytest.raises(AssemblyError, match=r"not workspace\.area at least 1000"):
         rrr("optimize.subject_to=[{result: workspace.area, at_least: 1000}]")
@@ -113,6 +115,7 @@ def test_a_design_without_workspace_is_infeasible() -> None:
     assert result.counts == {"designs": 4, "infeasible": 2}
 
 
+@pytest.mark.slow
 def test_a_workspace_that_follows_each_design() -> None:
     """A find: indices of a section that depends on a variable had no meaning, which was an error."""
     variables = "optimize.variables={l_min: {from: 2, to: 2.2, number: 2}}"
@@ -176,6 +179,7 @@ PLATFORM = (
 )
 
 
+@pytest.mark.slow
 def test_design_of_dyads_that_closes_at_the_poses_asked_but_not_at_the_sketchs() -> None:
     with pytest.raises(StudyError, match="the sketch cannot be assembled"):
         study_of(FOUR_BAR.replace("r: 30", "r: 60"))

@@ -74,6 +74,7 @@ def test_the_best_design_is_marked_and_drawn_with_its_own_dimensions() -> None:
     assert np.hypot(outline[:, 0] - 5, outline[:, 1]).max() == pytest.approx(a + b, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_single_goal_is_shown_in_its_own_unit() -> None:
     found, result = drawn("a", goals="minimize: [kinematics.P.x]")
     axes = found["objective"].axes[0]
@@ -173,6 +174,7 @@ def test_scattered_designs_are_dots_over_their_lower_envelope() -> None:
         assert lowest <= values[cost][near].min()
 
 
+@pytest.mark.slow
 def test_few_designs_of_a_grid_are_cells() -> None:
     found, result = drawn("a", "b", goals="minimize: [kinematics.P.x]")
     (cells,) = [each for each in found["objective"].axes[0].collections if isinstance(each, PolyCollection)]
@@ -202,6 +204,7 @@ def optimum(targets: str, poses: str, goal: str):
         return figures(study, result)["optimum"], mechdesign.kinematics(best).tables["motion"]
 
 
+@pytest.mark.slow
 def test_the_optimum_shows_the_function_wanted_and_reached_and_the_error() -> None:
     figure, motion = optimum("{rocker.angle: 100 + 0.2*crank}", "{sweep: {crank: {from: 20, to: 80, number: 40}}}",
                              "kinematics.rocker.angle_error")  # fmt: skip
@@ -214,6 +217,7 @@ def test_the_optimum_shows_the_function_wanted_and_reached_and_the_error() -> No
     assert error.get_ylabel() == "error [deg]"
 
 
+@pytest.mark.slow
 def test_the_optimum_at_listed_poses_shows_places_wanted_and_the_worst_pose() -> None:
     figure, motion = optimum("{B.y: [54, 50, 45]}", "{poses: [{crank: 30}, {crank: 60}, {crank: 90}], outputs: [B]}",
                              "kinematics.B.y_error")  # fmt: skip

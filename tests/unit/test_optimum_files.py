@@ -79,6 +79,7 @@ def test_the_optimum_runs_alone_and_has_the_indices_of_the_table(tmp_path, metho
             assert again.main[index][0] == pytest.approx(result.main[index][row], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_comments_are_kept_and_numbers_changed_in_place(arm, tmp_path):
     result = written(mechdesign.load(arm), tmp_path / "out")
     text = result.files["optimum.yaml"]
@@ -88,6 +89,7 @@ def test_comments_are_kept_and_numbers_changed_in_place(arm, tmp_path):
     assert text.partition("\n")[2] == body.replace("line.csv", '"input_line.csv"')
 
 
+@pytest.mark.slow
 def test_files_that_the_study_names_come_along(arm, tmp_path):
     result = written(mechdesign.load(arm), tmp_path / "out")
     (arm.parent / "line.csv").unlink()
@@ -114,6 +116,7 @@ def test_overrides_that_change_more_than_numbers(arm, tmp_path):
     assert result.files.keys() == {"optimum.yaml"}
 
 
+@pytest.mark.slow
 def test_texts_are_hashed_and_removed_when_a_new_result_has_none(arm, tmp_path):
     study = mechdesign.load(arm, ["optimize.weights=[[1], [2]]"])
     written(study, tmp_path)

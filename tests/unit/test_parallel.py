@@ -92,6 +92,7 @@ def fatal(marks, times, k):
     return k * k
 
 
+@pytest.mark.slow
 @forked
 def test_a_lost_worker_costs_its_chunk(tmp_path):
     assert [*map_chunks(partial(fatal, tmp_path, 1), range(200), 2, processes=True)] == [k * k for k in range(200)]
@@ -100,6 +101,7 @@ def test_a_lost_worker_costs_its_chunk(tmp_path):
     assert len([*tmp_path.glob("199_*")]) == 1
 
 
+@pytest.mark.slow
 @forked
 def test_a_chunk_that_is_always_lost_is_named(tmp_path):
     found = []

@@ -183,6 +183,7 @@ def test_pieces_that_touch_in_the_centre_of_the_scan_are_two() -> None:
         assert not result.warnings
 
 
+@pytest.mark.slow
 def test_a_hole_that_cuts_a_ring_in_two() -> None:
     """A narrow ring about a wall's pin: the arm's hole divides it on one side, and its farthest reach on the other."""
     text = (ARM, "mechanism.parameters={low: 1.32, high: 1.45}", "mechanism.sketch={E: [0, 1.5], P: [1.2, 1.4]}")
@@ -210,6 +211,7 @@ def test_the_largest_piece_counts_where_the_sketch_lies_in_none() -> None:
     assert "largest" in str(result.warnings[0])
 
 
+@pytest.mark.slow
 def test_one_piece_makes_no_table() -> None:
     result = mechdesign.workspace(study_of(ARM, "mechanism.limits=[]"))
     assert "pieces" not in result.tables
@@ -304,6 +306,7 @@ workspace: {point: P, indices: []}
     assert found == pytest.approx(np.bincount(label.ravel())[1:].max() * (x[1] - x[0]) ** 2, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_angles_in_a_limited_expression_are_near_each_designs_own_sketch() -> None:
     """They were near those of the study's, and their turns other ones."""
     text = """

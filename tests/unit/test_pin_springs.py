@@ -144,6 +144,7 @@ def midway(result: Result) -> list[str]:
     return [text for text in map(str, result.warnings) if "is midway" in text]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_every_link_has_its_own_end_of_a_pin(case: Case) -> None:
     expected, _ = case.solve()
@@ -286,6 +287,7 @@ def test_the_asked_pin_is_that_of_the_stiffness_section() -> None:
         assert set(result.tables["contributions"]["on"]) == {change.split("=")[1] or "rod slider"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("changes", "message"), [
     (["stiffness.at=ground.O", "stiffness.link="], "belongs to the ground"),
     (["stiffness.at=rod.B"], "link 'slider' has no point 'rod.B'"),
@@ -341,6 +343,7 @@ CLEARANCE = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outputs", ["slider.B.x, T", "rod.B.x, T", "T, rod_end", "T, slider_end"])
 def test_a_pin_with_a_clearance_has_the_same_two_ends(outputs: str) -> None:
     """An offset d along the rod moves the slider by d / cos b, one across the guide the rod's end by d tan b.
@@ -366,6 +369,7 @@ def test_measures_of_two_ends_of_a_clearance_are_refused(outputs: str) -> None:
         study_of(SLIDER_CRANK, *CLEARANCE, more, f"reliability.outputs=[{outputs}]")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("link", ["rod", "slider"])
 def test_a_pin_with_a_clearance_that_gives_is_of_one_link_for_both(link: str) -> None:
     alone = shift(mechdesign.reliability(study_of(SLIDER_CRANK)))

@@ -169,6 +169,7 @@ def test_a_circle_beside_a_limit_that_counts_as_well() -> None:
     assert found == pytest.approx(p + q, rel=0.02)
 
 
+@pytest.mark.slow
 def test_circles_of_many_poses_are_those_one_by_one() -> None:
     """Ovals from round to a line, radii from a tenth of a deviation to twelve, means at the centre and far outside."""
     rng = np.random.default_rng(4)

@@ -23,6 +23,7 @@ def swept(best: dict[str, Any], vary: dict[str, Any] | None = None) -> Any:
     return mechdesign.sweep(mechdesign.load(text=SLIDER_CRANK, overrides={"matrix": {"vary": vary, "best": best}}))
 
 
+@pytest.mark.slow
 def test_one_goal_ranks_the_cases_that_meet_every_requirement_by_itself():
     table = swept({"minimize": ANGLE}).main
     met = table["exit_code"] == 0
@@ -36,6 +37,7 @@ def test_one_goal_ranks_the_cases_that_meet_every_requirement_by_itself():
     np.testing.assert_array_equal(table["front"], table["rank"] == 1)
 
 
+@pytest.mark.slow
 def test_several_goals_rank_by_the_sum_of_parts_of_their_ranges_and_mark_the_front():
     table = swept({"maximize": STROKE, "minimize": ANGLE}).main
     met = table["exit_code"] == 0
@@ -64,6 +66,7 @@ def test_equal_cases_share_a_rank_and_rounding_makes_none_better():
     np.testing.assert_array_equal(flat.rank, ranking.rank)
 
 
+@pytest.mark.slow
 def test_a_goal_has_a_column_among_the_results_and_what_was_there_stays_where_it_was():
     plain = mechdesign.sweep(mechdesign.load(text=SLIDER_CRANK, overrides={"matrix": {"vary": {R: [35, 40]}}})).main
     names = swept({"maximize": [STROKE, "kinematics.B.x.max"]}, {R: [35, 40]}).main.names
@@ -71,6 +74,7 @@ def test_a_goal_has_a_column_among_the_results_and_what_was_there_stays_where_it
     assert "rank" not in plain
 
 
+@pytest.mark.slow
 def test_the_best_case_may_be_the_first_row_and_cases_without_a_rank_come_last_in_their_order():
     plain, table = (swept({"maximize": STROKE, "sort": sort}).main for sort in (False, True))
     met = int((plain["exit_code"] == 0).sum())
@@ -82,6 +86,7 @@ def test_the_best_case_may_be_the_first_row_and_cases_without_a_rank_come_last_i
         np.testing.assert_array_equal(table[column.name][rows], column.values)
 
 
+@pytest.mark.slow
 def test_what_is_best_is_told_in_words():
     result = swept({"maximize": STROKE, "minimize": ANGLE})
     best, table = best_of(result.main), result.main
@@ -110,6 +115,7 @@ def test_where_no_case_meets_every_requirement_none_is_ranked():
     assert headlines(result) == []
 
 
+@pytest.mark.slow
 def test_a_case_that_does_not_turn_has_no_rank_and_is_told_unless_it_may_be_so():
     text = SLIDER_CRANK.partition("requirements")[0]
     # A rod shorter than the crank does not let it turn, and the slider moves the farther before it sticks.
@@ -125,6 +131,7 @@ def test_a_case_that_does_not_turn_has_no_rank_and_is_told_unless_it_may_be_so()
     assert np.isfinite(mechdesign.sweep(allowed).main["rank"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("best", "message"),
     [

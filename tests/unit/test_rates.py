@@ -149,6 +149,7 @@ def test_a_polyline_turns_at_its_corners_and_does_not_accelerate() -> None:
     assert vectors(closed, "_velocity") == pytest.approx([7, 7j, -7 * (0.6 + 0.8j), 7])
 
 
+@pytest.mark.slow
 def test_a_spline_through_a_circle_is_nearly_the_circle() -> None:
     angles = np.radians(np.arange(0, 361, 15))
     places = ", ".join(f"[{8 + 2 * np.cos(a):.12f}, {6 + 2 * np.sin(a):.12f}]" for a in angles[:-1])
@@ -169,6 +170,7 @@ def test_what_is_listed_beside_a_path_moves_with_it() -> None:
     assert table["B1.x_velocity"] == pytest.approx([2, 2, 2])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "message"),
     [
@@ -198,6 +200,7 @@ def test_wrong_paths_and_speeds(section: str, message: str) -> None:
     assert message in str(caught.value)
 
 
+@pytest.mark.slow
 def test_rates_that_lead_away_from_the_motion_are_told() -> None:
     told = "1 of 2 steps of the motion do not go where the rates of P.x, P.y lead"
     assert any(
@@ -273,6 +276,7 @@ def test_units_of_the_jacobian_of_legs() -> None:
     assert (units["B1.x_by_leg1"], units["platform.angle_by_leg3"]) == ("", "rad/mm")
 
 
+@pytest.mark.slow
 def test_no_jacobian_where_outputs_and_drives_differ_in_number() -> None:
     assert "jacobian" not in kinematics(study_of(ARM)).tables
     assert "jacobian" not in kinematics(study_of(ARM, "kinematics.outputs=[P.x]")).tables
@@ -305,6 +309,7 @@ def test_numbers_at_a_singularity_are_nan_and_told() -> None:
     assert any("3 poses lie at a dead centre or change point" in warning for warning in map(str, result.warnings))
 
 
+@pytest.mark.slow
 def test_conditioning_stands_in_every_motion() -> None:
     table = kinematics(study_of(ARM)).tables["motion"]
     assert table["conditioning"] == pytest.approx(1)
@@ -337,6 +342,7 @@ def test_outputs_of_the_jacobian_are_named_apart_from_those_shown() -> None:
         study_of(ARM, "kinematics={poses: [{t1: 30, t2: 75}], outputs: [P], jacobian: [P.x]}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "place"),
     [

@@ -25,6 +25,7 @@ def words(name: str) -> list[str]:
     return [entry.word for entry in find(ENTRIES, name)]
 
 
+@pytest.mark.slow
 def test_every_key_has_a_text():
     told = {entry.word: entry.text for entry in ENTRIES if entry.kind == "key"}
     assert [key.path for key in keys() if len(told.get(key.path, "")) < 8] == []

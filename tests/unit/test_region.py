@@ -259,6 +259,7 @@ def test_panels_end_at_corners_and_where_rays_touch(assembly: str, effort: Effor
         assert np.abs((ends - angle + np.pi) % (2 * np.pi) - np.pi).min() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effort", [BATCH, SINGLE], ids=["batch", "single"])
 def test_holes_smaller_than_a_cell_of_the_raster(effort: Effort) -> None:
     text = """

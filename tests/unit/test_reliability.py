@@ -66,6 +66,7 @@ def test_the_number_of_threads_changes_no_bit(name: str) -> None:
             assert column.values.tobytes() == two.tables[key][column.name].tobytes()
 
 
+@pytest.mark.slow
 def test_seed_zero_is_a_seed(tmp_path: Path) -> None:
     lines = ["dimensions: {a: 0.3}", "samples: 1000"]
     text = SLIDER_CRANK.replace("  samples: 50000\n", "")
@@ -183,6 +184,7 @@ def test_limit_of_a_point_by_a_radius_and_of_one_side(tmp_path: Path) -> None:
     assert pick(side, "reliability", "failure", method="monte_carlo") == pytest.approx([ndtr(-2.0)], rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_pose_given_by_outputs_is_held_by_its_drives() -> None:
     """The same poses given by the tip: the drives are solved once and then held, so the errors are the same."""
     base = mechdesign.load(CONFIGS / "two_link_arm.yaml")
@@ -273,6 +275,7 @@ def test_nothing_varies(tmp_path: Path) -> None:
         ask(tmp_path, SLIDER_CRANK)
 
 
+@pytest.mark.slow
 def test_velocity_errors_of_a_group_without_a_closed_form(tmp_path: Path) -> None:
     """A 3-RPR platform's forward problem: Newton's method for every sample, three orders."""
     text = """

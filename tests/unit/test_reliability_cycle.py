@@ -70,6 +70,7 @@ def test_share_of_four_bars_that_cannot_turn_fully() -> None:
     assert result.counts["cycles"] == 200_000
 
 
+@pytest.mark.slow
 def test_a_sweep_that_steps_over_the_extremes_sees_fewer() -> None:
     """The step is the resolution: far from 0 and 180 deg cranks that cannot turn fully seem to."""
     missed = ask(FOUR_BAR, "reliability.sweep.theta.from=60", "reliability.sweep.theta.to=120", jobs=2)
@@ -137,6 +138,7 @@ def test_a_cycle_is_a_sweep_along_one_coordinate_or_a_path(poses: str, scopes: s
     assert set(mechdesign.reliability(study).tables["reliability"]["scope"]) == scopes
 
 
+@pytest.mark.slow
 def test_a_cycle_through_a_pose_that_cannot_be_assembled_has_no_probability() -> None:
     """The nominal crank of 2.6 does not pass 180 deg: nan, and not valid."""
     change = "mechanism.parameters.a=2.6"
@@ -154,6 +156,7 @@ def test_the_number_of_threads_changes_nothing(method: str) -> None:
     assert one["used"] == "monte_carlo"
 
 
+@pytest.mark.slow
 def test_auto_stops_at_its_precision() -> None:
     changes = ["reliability.methods=[auto]", "reliability.precision={half_width: 0.01}", "reliability.samples=1000000"]
     found = row(ask(FOUR_BAR, *changes), "auto")
@@ -171,6 +174,7 @@ def test_auto_tells_that_its_precision_was_not_reached() -> None:
     )
 
 
+@pytest.mark.slow
 def test_without_a_failure_monte_carlo_warns_and_quasi_monte_carlo_gives_the_bound() -> None:
     changes = ["reliability.dimensions={lever.length: 0.03}", "reliability.methods=[monte_carlo, quasi_monte_carlo]"]
     result = ask(LEVER, *changes, "reliability.samples=40000")

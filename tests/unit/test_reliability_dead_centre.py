@@ -130,6 +130,7 @@ def test_links_that_are_solved_together() -> None:
     assert found["analytic"] == pytest.approx(found["monte_carlo"], rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [FOUR_BAR, SLIDER_CRANK, LEVER, platform(20.0)])
 def test_slopes_of_the_margins_are_their_differences(text: str) -> None:
     mechanism = study_of(text).mechanism

@@ -61,6 +61,7 @@ def test_an_unknown_method_is_refused() -> None:
         study_of(LEVER, "reliability.methods=[cautious]")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("cautious")
 def test_a_declared_method_is_in_schema_tables_and_pictures() -> None:
     for form in schema()["$defs"]["ReliabilitySection"]["properties"]["methods"]["anyOf"]:

@@ -112,6 +112,7 @@ def check(study, names):
     assert varied > 0
 
 
+@pytest.mark.slow
 def test_loads_and_measured_values_follow_designs(tmp_path):
     values = 80 + 0.02 * np.random.default_rng(3).standard_normal(30)
     (tmp_path / "lengths.csv").write_text("\n".join(map(str, ["L", *values])))

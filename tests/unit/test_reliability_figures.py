@@ -396,6 +396,7 @@ def test_grid_of_drives_has_maps_over_them() -> None:
     assert axes.get_aspect() == "auto"
 
 
+@pytest.mark.slow
 def test_patches_of_a_workspace_are_kept_apart() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
     poses = study_poses(study, "reliability")
@@ -411,6 +412,7 @@ def test_patches_of_a_workspace_are_kept_apart() -> None:
         assert np.abs(np.diff(z[patch], axis=0)).max() < 0.4 * np.ptp(over.x)
 
 
+@pytest.mark.slow
 def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/gallery/five_bar_precision_map.yaml")
     over = plane(study, study_poses(study, "reliability"))
@@ -430,6 +432,7 @@ def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     assert found["reliability"].axes[0].lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
 
 
+@pytest.mark.slow
 def test_a_sweep_of_a_single_pose_is_drawn_as_one_that_is_listed() -> None:
     found, _ = drawn(SLIDER, "reliability.sweep={crank: 30}", "reliability.methods=[analytic]")
     (place,) = found["reliability"].axes[0].get_xticklabels()
@@ -464,6 +467,7 @@ def test_contributions_are_one_bar_with_sobol_indices_where_these_differ() -> No
     assert legend(figure) == ["share, to the first order", "Sobol index, alone", "Sobol index, with all interactions"]
 
 
+@pytest.mark.slow
 def test_shares_of_correlated_sources_are_explained() -> None:
     found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic]",
                           "reliability.correlation=[[r, l, -0.9]]")  # fmt: skip

@@ -156,6 +156,7 @@ def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
     assert result.interrupted.endswith(f"analytic, {method}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["form", "importance_sampling", "monte_carlo", "analytic"])
 def test_a_limit_of_the_smallest_number_there_is(method):
     """Every sample breaks it; numbers beyond all bounds on the way are no warnings."""

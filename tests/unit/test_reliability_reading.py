@@ -124,6 +124,7 @@ def test_what_is_larger_than_any_length_is_refused_when_read(change: str, messag
         study_of(SLIDER_CRANK, f"reliability.{change}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [
     "limits={B.x: 0}", "limits={A: {radius: 0}}", "limits={B.x: {min: 0.1, max: 0.1}}",
     "dimensions={crank.length: 500}",

@@ -174,6 +174,7 @@ def test_where_the_first_order_sees_nothing() -> None:
     assert failure["second_order"] == pytest.approx(expected, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_before_the_upright_crank_the_mean_is_shifted() -> None:
     """A crank of 100 and a rod of 105: the nearer to where they line up, the more their errors bend the slider's."""
     result = ask(SLIDER_CRANK, jobs=2)
@@ -183,6 +184,7 @@ def test_before_the_upright_crank_the_mean_is_shifted() -> None:
         assert abs(first - drawn) > 10 * moment(result, "monte_carlo", "sigma", order) / 1000
 
 
+@pytest.mark.slow
 def test_near_a_dead_point_against_simulation() -> None:
     """One degree beside the slider's dead point the drive's error of two degrees acts by its square."""
     dimensions = "reliability.dimensions={theta: {sigma: 2}, crank.length: {sigma: 0.02}, rod.length: {sigma: 0.02}}"
@@ -196,6 +198,7 @@ def test_near_a_dead_point_against_simulation() -> None:
     assert sigmas[1] == pytest.approx(sigmas[2], rel=0.01)
 
 
+@pytest.mark.slow
 def test_velocities_and_every_source_against_simulation() -> None:
     changes = ["reliability.rates={theta: 1}", "reliability.outputs=[C, rocker.angle]", "reliability.samples=400000"]
     # A lognormal rod of 10 % is left to the test of cumulants: higher orders than the second count there.

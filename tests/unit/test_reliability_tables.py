@@ -38,6 +38,7 @@ def ask(*changes: str) -> Result:
     return mechdesign.reliability(study_of(FOLD, *changes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["monte_carlo", "quasi_monte_carlo", "auto"])
 def test_histogram_counts_what_was_drawn_at_the_first_pose(method: str) -> None:
     result = ask("reliability.poses=[{theta: 60}]", f"reliability.methods=[{method}]", "reliability.precision=0.1")
@@ -84,6 +85,7 @@ def test_estimate_counts_what_cannot_be_assembled_and_ends_at_the_result() -> No
     assert trend["mean"][trend["output"] == "B.x"][-1] == pytest.approx(moments["mean"][0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_estimate_of_many_samples_goes_on_at_powers_of_two() -> None:
     study = mechdesign.load(
         CONFIGS / "two_link_arm.yaml",
@@ -98,6 +100,7 @@ def test_estimate_of_many_samples_goes_on_at_powers_of_two() -> None:
     assert result.tables["histogram"]["count"].sum() == 2 * 320_000
 
 
+@pytest.mark.slow
 def test_no_estimate_without_limits_and_no_histogram_without_samples() -> None:
     assert "estimate" not in ask("reliability.limits={}").tables
     assert "histogram" in ask("reliability.limits={}").tables

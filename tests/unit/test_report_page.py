@@ -32,6 +32,7 @@ def figure(curve=np.sin, name="C.x"):
     return made
 
 
+@pytest.mark.slow
 def test_a_curve_is_where_it_was_drawn() -> None:
     with style.context():
         made = figure()
@@ -47,6 +48,7 @@ def test_a_curve_is_where_it_was_drawn() -> None:
     assert inside[:, 1] == pytest.approx(np.sin(inside[:, 0]), abs=5e-3)
 
 
+@pytest.mark.slow
 def test_texts_are_texts_and_stay_it() -> None:
     hostile = "<script>'\"&</text>"
     with style.context():
@@ -62,6 +64,7 @@ def test_texts_are_texts_and_stay_it() -> None:
     assert "http" not in drawn
 
 
+@pytest.mark.slow
 def test_pictures_of_one_page_share_no_names() -> None:
     with style.context():
         drawn = [vector.inline(figure(), name, "") for name in ("one", "two")]

@@ -107,6 +107,7 @@ def test_conditions_and_goals_of_another_kind_are_mistakes(section):
         optimised(section)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "key"),
     [

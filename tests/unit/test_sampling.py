@@ -40,6 +40,7 @@ U = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + 0.5 * np.diff(EDGES)[:, None] * N
 DENSITY = (0.5 * np.diff(EDGES)[:, None] * WEIGHTS).ravel() * np.exp(-0.5 * U * U) / np.sqrt(2 * np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_moments_are_those_of_the_quantiles(law: Marginal) -> None:
     mean, *central = law.moments
@@ -118,6 +119,7 @@ def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
         assert law.moments[1] == pytest.approx(0.04 * cut, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PIN_LAWS)
 def test_pins(name: str) -> None:
     law = PIN_LAWS[name]
@@ -130,6 +132,7 @@ def test_pins(name: str) -> None:
     assert np.mean(x * x * y * y) == pytest.approx(law.fourth / 3, rel=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PIN_LAWS)
 def test_pins_from_normal_variables_have_the_same_law(name: str) -> None:
     law = PIN_LAWS[name]
@@ -172,6 +175,7 @@ def test_pins_that_are_uniform_fill_the_disc_evenly() -> None:
     assert np.abs(shares / SAMPLES - 0.1).max() < 4 * np.sqrt(0.09 / SAMPLES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [("normal", "uniform"), ("lognormal", "triangular"), ("uniform", "uniform")])
 def test_correlation_of_any_two_laws_is_what_was_asked(names: tuple[str, str]) -> None:
     laws = [LAWS[name] for name in names]

@@ -54,6 +54,7 @@ def rows(table, **wanted):
     return {name: table[name][keep] for name in (column.name for column in table.columns)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pin", VARIANCES)
 def test_a_slider_shifts_and_tilts_as_its_ends_lie_in_the_guide(pin):
     result = mechdesign.reliability(mechdesign.load(text=GUIDED.replace("PIN", pin)), seed=1)
@@ -99,6 +100,7 @@ def test_a_pin_in_a_slot_shifts_across_it_with_all_its_rates():
     assert set(first["order"]) == {"position", "velocity", "acceleration"}
 
 
+@pytest.mark.slow
 def test_every_method_agrees_on_a_slider_crank_with_slide_and_pin_clearances():
     text = """
     mechanism:
@@ -146,6 +148,7 @@ def test_a_slot_and_a_pin_have_no_length_and_form_no_walls():
             mechdesign.load(text=text.replace("second_order", "form"))
 
 
+@pytest.mark.slow
 def test_a_guide_is_where_its_links_have_it_however_their_pins_lie() -> None:
     """Pins with clearances at all points of a guide: its line through two points, at an angle, and what slides on it.
 

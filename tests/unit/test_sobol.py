@@ -144,6 +144,7 @@ reliability:
     assert table["sobol_first"] == pytest.approx([1.0, 1.0], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_which_poses_are_asked() -> None:
     def columns(*overrides: str) -> np.ndarray | None:
         table = mechdesign.reliability(study_of(SLIDER_CRANK, *overrides)).tables["contributions"]
@@ -179,6 +180,7 @@ def test_mechanisms_that_cannot_be_assembled_are_told() -> None:
     assert np.isfinite(result.tables["contributions"]["sobol_first"]).all()
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_no_bit() -> None:
     one, two = (mechdesign.reliability(study_of(SLIDER_CRANK), jobs=jobs).tables["contributions"] for jobs in (1, 2))
     assert one["sobol_first"].tobytes() == two["sobol_first"].tobytes()

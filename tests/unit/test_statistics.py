@@ -93,6 +93,7 @@ def close(found: Mapping[str, float], expected: Mapping[str, float], tolerance: 
         assert found[word] == pytest.approx(value, rel=tolerance, abs=tolerance * size), word
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("column", ["C.x", "C.x_velocity", "C.y_acceleration", "theta_effort"])
 def test_every_word_is_that_of_a_dense_table(column: str) -> None:
     found = numbers(FOUR_BAR, "", *(f"{column}.{word}" for word in WORDS))
@@ -175,6 +176,7 @@ def test_what_stands_still_is_even() -> None:
     assert numbers(text, "", "theta_velocity.evenness")["theta_velocity.evenness"] == 1
 
 
+@pytest.mark.slow
 def test_extremes_of_velocities_and_accelerations_lie_between_the_poses() -> None:
     result = mechdesign.kinematics(study_of(FOUR_BAR))
     table = result.tables["extremes"]
@@ -190,6 +192,7 @@ def test_extremes_of_velocities_and_accelerations_lie_between_the_poses() -> Non
         assert np.ptp(result.tables["motion"][name]) < row["range"][0] * (1 - 1e-4)
 
 
+@pytest.mark.slow
 def test_what_goes_to_infinity_has_no_mean() -> None:
     """A press at its dead centres, where the crank can bear any load: its advantage is infinite there."""
     text = IN_LINE + (
@@ -349,6 +352,7 @@ optimize:
     assert (designs["reason"] == "").tolist() == feasible.tolist()
 
 
+@pytest.mark.slow
 def test_results_of_a_matrix() -> None:
     section = """
 matrix:
@@ -374,6 +378,7 @@ def test_a_range_of_angles_wraps() -> None:
     assert interval.holds(values).tolist() == [True, True, True, False, False, True, True, False]
 
 
+@pytest.mark.slow
 def test_columns_and_units_of_goals() -> None:
     study = study_of(FOUR_BAR + OPTIMIZE % ", ".join(GOALS[:4]))
     assert study.optimize is not None

@@ -88,6 +88,7 @@ def test_what_is_rigid_altogether_has_no_compliance_at_all(text: str) -> None:
     assert np.isnan(free(result)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [TRIPOD, PUSHED])
 def test_a_point_far_away_moves_as_the_body_turns(text: str) -> None:
     """5 km from a platform of a metre: the matrices are carried there, not made there."""
@@ -105,6 +106,7 @@ def test_a_point_far_away_moves_as_the_body_turns(text: str) -> None:
 UPRIGHT = "stiffness.poses=[{P.x: 0, P.y: 1, platform.angle: 0}]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [TRIPOD, PUSHED])
 def test_concurrent_legs_leave_a_turn_about_their_common_point(text: str) -> None:
     """At x = 0 the three legs meet at (0, 1). They hold that point three ways in two directions, and K is finite."""
@@ -145,6 +147,7 @@ def test_springs_through_one_point_add_up() -> None:
     assert_allclose(stiff[:2, :2], expected, rtol=1e-9, atol=1e-9 * expected.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [TRIPOD, PUSHED])
 @pytest.mark.parametrize("actuators", ["{}", "{leg_3: 1e4}"])
 def test_rigid_legs_that_meet_hold_their_point_rigidly_and_leave_the_turn(text: str, actuators: str) -> None:
@@ -168,6 +171,7 @@ IN_LINE_PUSHED = pushed(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "how"), [(IN_LINE, "serial legs"), (IN_LINE_PUSHED, "force method")])
 def test_legs_in_one_line_leave_two_twists_free(text: str, how: str) -> None:
     result = ask_stiffness(text)
@@ -290,6 +294,7 @@ def in_millimetres(text: str) -> str:
     return yaml.safe_dump(study, sort_keys=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [TRIPOD, PUSHED])
 def test_the_same_answer_in_metres_and_millimetres(text: str) -> None:
     metres, millimetres = ask_stiffness(text), ask_stiffness(in_millimetres(text))
@@ -332,6 +337,7 @@ CARRIAGE = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [BOOM, CARRIAGE], ids=["leg", "carriage"])
 @pytest.mark.parametrize("at", ["P", "B"])
 def test_a_driven_leg_of_no_length_gives_with_its_motors_only(text: str, at: str) -> None:

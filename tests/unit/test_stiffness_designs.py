@@ -192,6 +192,7 @@ stiffness:
 """
 
 
+@pytest.mark.slow
 def test_points_of_an_elastic_link_lie_in_another_order_in_each_design() -> None:
     """F b x (L^2 - b^2 - x^2) / 6EIL on the way to the force [Roark, Table 8.1]; a bracket's foot lies below it."""
     place, modulus, height = np.array([30, 120, 210, 249, 251, 380.0]), np.linspace(1e5, 3e5, 6), np.linspace(30, 60, 6)
@@ -315,6 +316,7 @@ def test_goals_of_designs_are_those_of_their_own_answers(
     np.testing.assert_allclose(found.table[:, 0], largest, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_leg_that_has_a_spring_in_one_design_only() -> None:
     """An elbow that is free bears nothing; at full stretch the leg is a strut."""
     legs = PLATFORM.replace("    platform: {P", "    near: [A4, C, q]\n    far: [C, P, 0.6]\n    platform: {P")

@@ -63,6 +63,7 @@ def test_sections_in_mechanisms(text: str, section: str) -> None:
     check(TEXTS[text], f"stiffness.sections={{beam: {SECTIONS[section]}}}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("section", SECTIONS)
 def test_a_cantilever_of_every_section(section: str) -> None:
     """Stretch L/EA, lift L^3/3EI + L/(factor G A), turn L/EI, written out for each form."""
@@ -91,6 +92,7 @@ stiffness: {{link: bar, at: P, sections: {{beam: {SECTIONS[section]}}}, elastic:
     assert_allclose(matrix(ask_stiffness(text), "C"), expected, rtol=1e-12, atol=1e-22)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "bearings"),
     [
@@ -136,6 +138,7 @@ def test_a_link_of_one_point_has_no_beam_and_is_said_to_be_rigid() -> None:
     assert_allclose(matrix(single, "C"), matrix(result, "C"), rtol=1e-9, atol=1e-20)
 
 
+@pytest.mark.slow
 def test_an_asked_pin_lies_midway_in_the_bearing_of_its_two_links() -> None:
     """Each rod, else rigid, holds the pin along itself by half of its bearing; between them there is all of it."""
     rigid = ["stiffness.actuators={}", "stiffness.bearings={P: 1e6}"]

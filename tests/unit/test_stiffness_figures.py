@@ -64,6 +64,7 @@ def test_beams_and_brackets_are_drawn_in_the_mechanism() -> None:
         assert lengths == pytest.approx([0.5])
 
 
+@pytest.mark.slow
 def test_what_is_rigid_on_the_way_has_no_curve() -> None:
     """An arm that its drives hold rigidly; with a soft one, seen from its hinge, it gives to moments only."""
     along = [
@@ -75,10 +76,12 @@ def test_what_is_rigid_on_the_way_has_no_curve() -> None:
     assert pictures(ARM, *along, "stiffness.link=upper", "stiffness.at=O") == {"stiffness"}
 
 
+@pytest.mark.slow
 def test_a_leg_without_springs_has_no_picture_of_them() -> None:
     assert pictures(ARM, "stiffness.loads=[[0, -100, 0]]") == {"directions", "deflections"}
 
 
+@pytest.mark.slow
 def test_poses_that_fail_are_left_out() -> None:
     assert "springs" in pictures(FIVE_BAR, "stiffness.poses=[{P.x: 9, P.y: 9}, {P.x: 0.05, P.y: 0.45}]")
 
@@ -97,6 +100,7 @@ def test_ellipse_of_a_point_has_the_axes_of_its_compliance() -> None:
     assert np.angle(np.diff(stiff)[0] ** 2) == pytest.approx(np.angle(np.exp(2j * np.radians(table["k_angle"][0]))))
 
 
+@pytest.mark.slow
 def test_each_load_is_drawn_alone_and_legs_stay_on_their_pins() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/planar_2rpr_rp.yaml")
     result = mechdesign.stiffness(study)
@@ -146,6 +150,7 @@ stiffness:
 """
 
 
+@pytest.mark.slow
 def test_joint_forces_of_a_slider_crank_are_those_of_its_triangle() -> None:
     """The rod bears F / cos(phi), the guide F tan(phi), the crank's drive F r sin(theta + phi) / cos(phi)."""
     study = study_of(CRANK)
@@ -192,6 +197,7 @@ stiffness: {at: T, actuators: {q1: 1e5, q2: 1e5, q3: 1e5}, poses: workspace}
 """
 
 
+@pytest.mark.slow
 def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
     """With its hand held the arm's tip reaches the ring of its wrist, from 10 to 70, moved by the hand."""
     study = study_of(HAND)

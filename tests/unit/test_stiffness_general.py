@@ -136,6 +136,7 @@ def test_displacements_of_all_points_are_those_of_the_deflected_mechanism() -> N
     assert rigid["deflections"]["dy"][0] == pytest.approx(-1000 * ratio**2 / 2000, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text", [FIVE_BAR, ARM, SLIDER, BENT, SLOTTED], ids=["five_bar", "arm", "slider", "bent", "slot"]
 )

@@ -256,6 +256,7 @@ def test_a_lug_beside_the_line_is_continuous_with_one_on_it() -> None:
     assert_allclose(apart, on, rtol=0.02, atol=1e-3 * np.abs(on).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", [-30.0, 10.0])
 def test_both_solvers_ride_on_the_beam(pose: float) -> None:
     """A platform on two levers in whose slots its pins slide, and a strut: serial legs."""

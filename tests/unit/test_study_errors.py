@@ -171,6 +171,7 @@ CURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slip", CURES)
 def test_a_slip_of_writing_is_answered_with_what_to_write(tmp_path, monkeypatch, slip):
     old, new, message = CURES[slip]

@@ -35,6 +35,7 @@ def tolerance(study, name):
     return study.reliability.dimensions[name].tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("override", "read", "value"),
     [
@@ -129,6 +130,7 @@ USES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("use", ["name=x", *USES])
 def test_a_parameter_that_nothing_uses_is_told(use, tmp_path):
     path = tmp_path / "study.yaml"
@@ -153,6 +155,7 @@ def test_odd_overrides(override, load):
     assert len(str(caught.value)) < 2000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "word", ["a\N{GRINNING FACE}b", "\U0001d4b3", "\u2028x", "\x7f\x85", "\U000e0041", "\\ud83d\\ude00"]
 )

@@ -105,6 +105,7 @@ def test_nothing_is_assumed_without_reason(poses, text, message):
         poses(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "message"),
     [

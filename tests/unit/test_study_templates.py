@@ -43,6 +43,7 @@ def test_the_built_in_arm_has_the_dimensions_of_its_source():
     assert study.reliability.clearances["O"].radius == 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs").glob("*.yaml")), ids=lambda p: p.stem)
 def test_the_schema_accepts_the_shipped_studies(path, validator):
     validator.validate(read(path.read_bytes(), path.name).data)

@@ -101,6 +101,7 @@ def test_quantities_in_a_file_of_cases_are_numbers(tmp_path: Path):
     np.testing.assert_allclose(table[STROKE], [80, 50], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_cases_of_a_file(tmp_path: Path):
     (tmp_path / "cases.csv").write_text(f"{R},mechanism.branch\n# longer\n40,side\n25,follow\n40,side\n")
     (tmp_path / "study.yaml").write_text(SLIDER_CRANK + "matrix: {cases: cases.csv}\n")
@@ -110,6 +111,7 @@ def test_cases_of_a_file(tmp_path: Path):
     assert str(result.warnings[0]) == "1 of 3 cases are repeated; case 3 (r 40, branch side) is case 1 once more"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("matrix", "message"),
     [
@@ -160,6 +162,7 @@ def test_nothing_asked_of_a_case_is_an_error():
         mechdesign.sweep(study)
 
 
+@pytest.mark.slow
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     study = study_of({"vary": {R: [20, 30, 40]}})
     whole = mechdesign.sweep(study).main

@@ -56,6 +56,7 @@ def test_angle_errors_are_wrapped() -> None:
     assert motion('{crank.angle: "theta + 180"}')["crank.angle_error"] == pytest.approx(180)
 
 
+@pytest.mark.slow
 def test_functions_of_other_coordinates_see_them_continuous() -> None:
     table = motion('{rod.angle: "crank.angle**2/1000"}', "kinematics.sweep.theta.to=720")
     turn = (table["rod.angle"] - table["theta"] ** 2 / 1000 - table["rod.angle_error"]) / 360
@@ -80,6 +81,7 @@ def test_what_has_a_target_is_an_output_but_not_of_the_jacobian() -> None:
     assert names == ("theta", "rocker.angle", "C.y", "C.y_error", "det_J", "inverse_condition", "conditioning", "valid")
 
 
+@pytest.mark.slow
 def test_a_path_with_as_many_rows_as_poses_is_prescribed_timing() -> None:
     free = motion("{}")
     rows = [[round(float(x), 3), round(float(y), 3) + 1] for x, y in zip(free["C.x"], free["C.y"], strict=True)]
@@ -89,6 +91,7 @@ def test_a_path_with_as_many_rows_as_poses_is_prescribed_timing() -> None:
     assert table["C_error"] == pytest.approx(np.hypot(table["C.x_error"], table["C.y_error"]))
 
 
+@pytest.mark.slow
 def test_a_path_of_its_own_is_met_at_its_nearest_point_not_at_a_corner() -> None:
     table = motion("{C: [[-100, 50], [200, 50]]}")
     assert table["C.x_error"] == pytest.approx(0, abs=1e-12)
@@ -133,6 +136,7 @@ def test_files_stand_beside_the_study(tmp_path: Path) -> None:
     assert table["B.y_error"] == pytest.approx(table["B.y"] - 7)
 
 
+@pytest.mark.slow
 def test_errors_of_a_turn_are_those_of_the_curve() -> None:
     targets = '{rocker.angle: "100", C: [[0, 50], [60, 50]]}'
     table = kinematics(study_of(FOUR_BAR.replace("TARGETS", targets), "kinematics.sweep.theta.step=30"))
@@ -204,6 +208,7 @@ def test_nearest_points_of_a_polyline() -> None:
     assert found == pytest.approx(distance, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("targets", "message"),
     [
@@ -252,6 +257,7 @@ def test_no_single_drive_to_interpolate_over() -> None:
         study_of(ARM.replace("TARGETS", "{P: [[0, 1, 2], [9, 3, 4]]}"), "kinematics.poses=[{upper: 1, fore: 2}]")
 
 
+@pytest.mark.slow
 def test_an_optimisation_minimises_the_largest_error(tmp_path: Path) -> None:
     # The target is what a rocker of 60 does; its length is found again among others.
     values = [round(float(value), 6) for value in motion("{}")["rocker.angle"]]

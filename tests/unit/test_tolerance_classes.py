@@ -189,6 +189,7 @@ def test_an_angle_goes_by_its_shorter_leg():
         mechdesign.load(text=text + "reliability: {dimensions: {plate.angle: ISO 2768-c}}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("section", "message"),
     [
@@ -222,6 +223,7 @@ def test_a_fit_is_the_difference_of_its_hole_and_shaft():
         assert pin.ends[1] == pytest.approx(0.0205)
 
 
+@pytest.mark.slow
 def test_a_fit_of_uniform_sizes_is_a_trapezoid():
     from scipy.special import ndtri
 

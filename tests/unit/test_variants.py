@@ -136,6 +136,7 @@ def test_each_kind_of_place_against_the_changed_file(changed: dict[str, float], 
     alike(variant(found, {}), reloaded, ())
 
 
+@pytest.mark.slow
 def test_several_at_once_and_a_variant_of_a_variant() -> None:
     reloaded = study_of(SLIDER_CRANK, "mechanism.parameters.e=-10", "mechanism.links.rod.length=118")
     both = variant(study_of(SLIDER_CRANK), {"e": -10.0, "rod.length": 118.0})
@@ -152,6 +153,7 @@ def test_a_telescopic_leg_and_its_limits(value: float) -> None:
     alike(variant(study_of(LEG), {"boom.length": value}), study_of(LEG, f"mechanism.links.boom.length={value}"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changed", "override"),
     [

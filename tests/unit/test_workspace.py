@@ -45,6 +45,7 @@ workspace: {point: C, scan: {about: [0, 0]}}
 UPPER = "workspace.scan={about: [0, 0], from: 0, to: 180}"
 
 
+@pytest.mark.slow
 def test_annulus_of_a_two_link_arm() -> None:
     """About its base a ring, between |a - b| and a + b; inverse condition and det J from sin q2 alone."""
     result = mechdesign.workspace(study_of(ARM, "workspace.scan.about=[0, 0]"))
@@ -191,6 +192,7 @@ def test_platform_at_constant_orientation() -> None:
         assert table["area"][row] == pytest.approx(inside.mean() * 16.016, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_region_without_an_end_says_so() -> None:
     with pytest.raises(AssemblyError, match="has no end"):
         mechdesign.workspace(study_of(LEGS, "mechanism.limits=[]"))

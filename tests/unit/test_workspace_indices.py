@@ -231,6 +231,7 @@ def test_stiffness_and_position_errors_are_indices() -> None:
     assert expected.min() < row["reliability_mean"][0] < row["reliability_max"][0] <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -295,6 +296,7 @@ def test_order_of_the_quadrature() -> None:
     assert (errors <= tolerances[:, None]).all()
 
 
+@pytest.mark.slow
 def test_order_of_the_midpoint_rule() -> None:
     """Manipulability has a square root at the boundary, where the midpoint rule is of order 3/2 and no more."""
     exact = arm_statistics()["manipulability_mean"]
