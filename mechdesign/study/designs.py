@@ -134,8 +134,9 @@ class Designs:
         """Why the numbers of each design make no study, shape (count,); empty where they do."""
         reasons = np.full(self.count, "", dtype=object)
 
-        def note(wrong: Any, message: str) -> None:
-            reasons[np.broadcast_to(wrong, self.count) & (reasons == "")] = message
+        def note(wrong: Any, message: str | Callable[[int], str]) -> None:
+            for k in np.flatnonzero(np.broadcast_to(wrong, self.count) & (reasons == "")).tolist():
+                reasons[k] = message if isinstance(message, str) else message(k)
 
         with np.errstate(all="ignore"):
             self._judge_geometry(note)
@@ -149,7 +150,7 @@ class Designs:
         return np.broadcast_to(np.asarray(value, dtype=float), self.count)
 
     def _judge_geometry(self, note: Any) -> None:
-        """Note numbers of the geometry that make no mechanism."""
+        """Note designs whose geometry makes no mechanism; `note` takes a mask of designs and a message."""
         places, nominal = self.places, self.study.mechanism.nominal
         for name, value in (*self.parameters.items(), *places.items()):
             note(~np.isfinite(value), f"{name} has no finite value")
@@ -169,7 +170,7 @@ class Designs:
                     note(np.asarray(end) < 0, f"limits.{index}: a distance is never negative")
 
     def _judge(self, section: Model, name: str, note: Any) -> None:
-        """Note numbers of a section that it does not allow."""
+        """Note designs with numbers that a section of the study does not allow."""
         for key, part in parts_of(section, name):
             moved = [number for number in own_numbers(part) if self.numbers.moves(number)]
             if isinstance(part, Amount) and moved:
@@ -180,8 +181,7 @@ class Designs:
                     note(small, f"{key} must be {positive(part.least, exclusive=part.exclusive)}")
             elif isinstance(part, Model) and moved:
                 for misfit in part.with_numbers(self._numbers_of).misfits():
-                    for k in np.flatnonzero(np.broadcast_to(misfit.wrong, self.count)).tolist():
-                        note(np.arange(self.count) == k, f"{key}: {misfit.message(k)}")
+                    note(misfit.wrong, lambda k, key=key, misfit=misfit: f"{key}: {misfit.message(k)}")
 
     def _numbers_of(self, number: Amount) -> float | Floats:
         """A number of all designs, or of each where they differ in it."""

@@ -118,7 +118,8 @@ def all_breaks(
         low, high = low[~resolved], high[~resolved]
         if not design.size:
             return np.concatenate(owners), np.concatenate(places)
-        pair, angle = _solve(designs, _meetings(intervals, codes, lower, field.singular), design, low, high, reach)
+        meetings = _meetings(intervals, codes, lower, field.singular)
+        pair, angle = _solve(designs, meetings, design, low, high, reach)
         pair, angle = pair[~refuted[pair]], angle[~refuted[pair]]
         width, every = high - low, np.arange(len(design))
         step = np.minimum(np.maximum(BESIDE * width, APART), WITHIN * width)[pair]

@@ -18,7 +18,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
 # Largest number of times that the reach is doubled.
 DOUBLINGS = 16
-# Largest number of rounds that add rays (where the raster shows hidden pieces and holes) or divide panels.
+# Largest number of rounds that add rays (where the raster shows hidden pieces and holes) or divide panels again.
 ROUNDS = 4
 # Place of the ray that stands for a panel, as a fraction of the panel. In symmetric mechanisms the ray at exactly half
 # of it may pass through a single point that divides its interval.
@@ -94,60 +94,73 @@ def find_panels(designs: Designs, cuts: tuple[float, ...] = ()) -> Panels:
     AssemblyError
         If the region is unbounded, or its boundary is lost in rounding.
     """
-    count, scan, number = designs.count, designs.scan, designs.effort.rays + 1
-    raster = Raster.of(designs)
-    least = raster.farthest
-    every, (owner, hole) = np.arange(count), raster.holes
-    design, angle = np.repeat(every, number), np.tile(np.linspace(*scan, number), count)
-    if owner.size:
-        through = ray_through(hole - designs.about, scan[0])
-        on_scan = through < scan[1]
-        rays = np.unique(np.concatenate([design + 1j * angle, (owner + 1j * through)[on_scan]]))
-        design, angle = rays.real.astype(np.intp), rays.imag
-    reach = np.where(least > 0, least, raster.reach)
-    reach, intervals = _extent(designs, design, angle, reach, least)
-    owner = every
-    for _ in range(ROUNDS):
-        owner, hidden = raster.hidden(np.unique(owner), design, angle, intervals)
-        rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * hidden]))
-        if len(rays) == len(design):
+    count, raster = designs.count, Raster.of(designs)
+    design, angle, reach, intervals = _rays(designs, raster)
+    closes = np.bincount(design, intervals.counts, count) > 0
+    cut = raster.cut | (np.bincount(design, intervals.cut, count) > 0)
+    fixed = np.repeat(np.arange(count), 2 + len(cuts)), np.tile([*designs.scan, *cuts], count)
+    broken, breaks, jumped, jumps = design[:0], angle[:0], design[:0], angle[:0]
+    for rounds in range(ROUNDS + 1):
+        split, angles = all_breaks(designs, reach, intervals, design, angle)
+        split, angles = np.concatenate([split, jumped]), np.concatenate([angles, jumps])
+        broken, breaks = np.concatenate([broken, split]), np.concatenate([breaks, angles])
+        owner, low, high = _between(*fixed, broken, breaks)
+        if rounds == ROUNDS:
             break
-        design, angle = rays.real.astype(np.intp), rays.imag
-        reach, intervals = _extent(designs, design, angle, reach, least)
-    broken, breaks = all_breaks(designs, reach, intervals, design, angle)
-    every, fixed = np.repeat(every, 2 + len(cuts)), np.tile([*scan, *cuts], count)
-    owner, low, high = _between(every, fixed, broken, breaks)
-    tested, cut = np.arange(len(low)), raster.cut | (np.bincount(design, intervals.cut, count) > 0)
-    for _ in range(ROUNDS):
         # Rays at both ends of a panel may be alike though two breaks lie between: rays between them differ, or a link
         # jumps from one to the next.
+        tested = np.flatnonzero(np.isin(owner, split) | (rounds == 0))
         probed, rays = np.tile(owner[tested], (len(PROBES), 1)), low[tested] + (high - low)[tested] * PROBES[:, None]
         wide = (high - low)[tested] > TOGETHER / PROBES[0]
         traced = trace(designs, probed.ravel(), rays.ravel(), reach[probed.ravel()])
         cut |= np.bincount(probed.ravel(), traced.cut, count) > 0
-        counts = traced.counts.reshape(rays.shape)
-        differ = (np.ptp(counts, axis=0) > 0) & wide
-        panel, between, jumps = _split_by_turns(designs, probed, rays, traced, reach, wide & ~differ)
+        differ = (np.ptp(traced.counts.reshape(rays.shape), axis=0) > 0) & wide
+        panel, between, jump = _split_by_turns(designs, probed, rays, traced, reach, wide & ~differ)
         differ[panel] = True
         if not differ.any():
             break
-        probed = np.concatenate([probed[:, differ].ravel(), owner[tested[panel]]])
-        rays = np.concatenate([rays[:, differ].ravel(), between])
-        order = np.lexsort((rays, probed))
-        probed, rays = probed[order], rays[order]
-        split, angles = all_breaks(designs, reach, trace(designs, probed, rays, reach[probed]), probed, rays)
-        split, angles = np.concatenate([split, owner[tested[panel[jumps]]]]), np.concatenate([angles, between[jumps]])
-        broken, breaks = np.concatenate([broken, split]), np.concatenate([breaks, angles])
-        owner, low, high = _between(every, fixed, broken, breaks)
-        tested = np.flatnonzero(np.isin(owner, split))
+        turned = owner[tested[panel]]
+        jumped, jumps = turned[jump], between[jump]
+        design = np.concatenate([probed[:, differ].ravel(), turned])
+        angle = np.concatenate([rays[:, differ].ravel(), between])
+        order = np.lexsort((angle, design))
+        design, angle = design[order], angle[order]
+        intervals = trace(designs, design, angle, reach[design])
     # A panel whose middle ray meets nothing is empty, unless it is narrow: it may hold a tip that is lost in rounding.
     middle = low + MIDDLE * (high - low)
     counts = trace(designs, owner, middle, reach[owner]).counts
     full = (counts > 0) | (high - low < NARROW)
-    closes = np.bincount(design, intervals.counts, count) > 0
     area, error = raster.area
     return Panels(designs, owner[full], low[full], high[full], cut, reach, closes, counts[full], area - error,
                   raster.unseen)  # fmt: skip
+
+
+def _rays(designs: Designs, raster: Raster) -> tuple[Ints, Floats, Floats, Intervals]:
+    """Rays that miss no piece and no hole that the raster shows: design and angle of each, reach, and intervals.
+
+    The reach is of shape (designs,).
+    """
+    scan, least, number, searched = designs.scan, raster.farthest, designs.effort.rays + 1, np.arange(designs.count)
+    design, angle = np.repeat(searched, number), np.tile(np.linspace(*scan, number), designs.count)
+    owner, hole = raster.holes
+    through = ray_through(hole - designs.about, scan[0])
+    design, angle = _with_rays(design, angle, owner[through < scan[1]], through[through < scan[1]])
+    reach = np.where(least > 0, least, raster.reach)
+    for rounds in range(ROUNDS + 1):
+        reach, intervals = _extent(designs, design, angle, reach, least)
+        before = len(design)
+        if rounds < ROUNDS:
+            searched, hidden = raster.hidden(np.unique(searched), design, angle, intervals)
+            design, angle = _with_rays(design, angle, searched, hidden)
+        if len(design) == before:
+            break
+    return design, angle, reach, intervals
+
+
+def _with_rays(design: Ints, angle: Floats, owner: Ints, place: Floats) -> tuple[Ints, Floats]:
+    """Rays and more of them at angles `place` of designs `owner`, each once, ascending by design and angle."""
+    rays = np.unique(np.concatenate([design + 1j * angle, owner + 1j * place]))
+    return rays.real.astype(np.intp), rays.imag
 
 
 def _split_by_turns(
