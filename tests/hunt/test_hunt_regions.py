@@ -12,7 +12,8 @@ from scipy import ndimage
 
 import mechdesign
 from mechdesign.analyses.region.rays import BATCH, SINGLE
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.results import Result
 
 Complex = np.ndarray

@@ -8,7 +8,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.study.designs import variant
 
 # A platform on three legs, each a crank and a rod; its angle is asked for as it is, or by a measure.

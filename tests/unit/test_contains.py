@@ -14,8 +14,9 @@ from scipy.optimize import brentq
 import mechdesign
 from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.answer import answer
 from mechdesign.analyses.workspace.contained import Shape, fitting_scale
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
 

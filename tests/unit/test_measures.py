@@ -12,7 +12,8 @@ from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.reliability.analysis import reliability
 from mechdesign.analyses.stiffness.analysis import stiffness
 from mechdesign.analyses.workspace.analysis import workspace
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.report.requirements import requirements
 

@@ -14,7 +14,8 @@ from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.region.curves import workspace_nodes
 from mechdesign.analyses.region.rays import SINGLE
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 

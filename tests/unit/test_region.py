@@ -12,7 +12,8 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.region.panels import find_panels
 from mechdesign.analyses.region.rays import BATCH, SINGLE, Designs, Effort, trace
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 
 ARM = """
 units: {length: dimensionless}

@@ -11,7 +11,8 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.region.panels import find_panels
 from mechdesign.analyses.region.rays import BATCH, Designs, trace
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.answer import answer
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.numerics.roots import bracketed_roots
 

@@ -12,8 +12,9 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.region.rays import BATCH
+from mechdesign.analyses.workspace.answer import answer
 from mechdesign.analyses.workspace.index import Local, prepare
-from mechdesign.analyses.workspace.question import answer, questions
+from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL
 from mechdesign.rows import choose

@@ -29,9 +29,11 @@ from mechdesign.analyses.optimize.tables import (
 from mechdesign.analyses.optimize.variables import Design, check_choices, grid, in_words, parted, snapped, study_of
 from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.region.rays import SINGLE
-from mechdesign.analyses.workspace.analysis import index_columns, workspace
+from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.analyses.workspace.answer import answer
 from mechdesign.analyses.workspace.contained import Shape, fitting_scale
-from mechdesign.analyses.workspace.question import answer, questions, split
+from mechdesign.analyses.workspace.question import questions, split
+from mechdesign.analyses.workspace.tables import index_columns
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.numerics.arrays import Complexes, Floats

@@ -19,10 +19,10 @@ from mechdesign.analyses.optimize.stacked import grouped
 from mechdesign.analyses.optimize.variables import entry_of, shown
 from mechdesign.analyses.poses import solve_poses, study_poses
 from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.analysis import index_columns
+from mechdesign.analyses.workspace.answer import answer
 from mechdesign.analyses.workspace.contained import fitting_scale
-from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, answer, batched, questions, shared, split
-from mechdesign.analyses.workspace.tables import where
+from mechdesign.analyses.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared, split
+from mechdesign.analyses.workspace.tables import index_columns
 from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Result
@@ -278,7 +278,7 @@ class Evaluator:
                 self._regions(batch, half, asked)
             return
         for question, each in zip(asked, given, strict=True):
-            there = where(question) if len(asked) > 1 else ""
+            there = question.where if len(asked) > 1 else ""
             batch.note(rows, ~(each.panels.closes & (each.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
         for goal in self._regional:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import Panels, find_panels
-from mechdesign.analyses.region.pieces import Pieces
+from mechdesign.analyses.region.panels import Panels
+from mechdesign.analyses.region.pieces import Pieces, counted
 from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, Intervals, ray_through
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
@@ -16,7 +17,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
-# Fraction of the reach by which rounding may exchange the ends of an interval that is kept.
+# An interval is kept whose ends rounding has exchanged by up to this fraction of the reach.
 SLACK = 1e-9
 # Least number of rays of a panel.
 FEWEST = 25
@@ -37,12 +38,23 @@ MIN_RAYS = 3
 ENOUGH_RAYS = 36
 
 
+class Edge(NamedTuple):
+    """A curve of a region's boundary: radii and places of shape (rays,), and the margin that is zero on it."""
+
+    side: str  # of the patch: ``inner`` or ``outer``
+    margin: int
+    radius: Floats
+    places: Complexes
+
+
 @dataclass(frozen=True, eq=False)
 class Patch:
     """The part of the region between one inner and one outer curve, over one panel.
 
     Parameters
     ----------
+    about : complex
+        Centre of the rays.
     theta, inner, outer : ndarray, shape (rays,)
         Angles of the rays, and the radii of both curves there.
     enters, leaves : int
@@ -51,6 +63,7 @@ class Patch:
         Number of the piece of the region to which the patch belongs, from 1.
     """
 
+    about: complex
     theta: Floats
     inner: Floats
     outer: Floats
@@ -58,19 +71,33 @@ class Patch:
     leaves: int
     piece: int = 1
 
-    def grid(self, about: complex) -> Complexes:
+    @property
+    def edges(self) -> list[Edge]:
+        """Its curves that bound the region: not the centre of the rays, nor the ends of the scan."""
+        turn = np.exp(1j * self.theta)
+        both = (("inner", self.enters, self.inner), ("outer", self.leaves, self.outer))
+        return [Edge(side, margin, radius, self.about + radius * turn) for side, margin, radius in both if margin >= 0]
+
+    @property
+    def grid(self) -> Complexes:
         """Nodes, shape (rays, GRID), denser towards both curves."""
         radius = self.inner[:, None] + FRACTIONS * (self.outer - self.inner)[:, None]
-        return np.asarray(about + radius * np.exp(1j * self.theta)[:, None])
+        return np.asarray(self.about + radius * np.exp(1j * self.theta)[:, None])
 
-    def middle(self, about: complex) -> complex:
+    @property
+    def width(self) -> float:
+        """Length of the widest interval."""
+        return float(np.max(self.outer - self.inner))
+
+    @property
+    def middle(self) -> complex:
         """The middle of the widest interval, a place inside the patch."""
         k = int(np.argmax(self.outer - self.inner))
-        return complex(about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
+        return complex(self.about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
 
-    def holds(self, z: Complexes, about: complex) -> Flags:
+    def holds(self, z: Complexes) -> Flags:
         """Which places lie in the patch, its curves being interpolated between the rays."""
-        radius, theta = np.abs(z - about), ray_through(z - about, self.theta[0])
+        radius, theta = np.abs(z - self.about), ray_through(z - self.about, self.theta[0])
         inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
         return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
 
@@ -101,7 +128,8 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
         begins = np.searchsorted(ray, kept)
         for slot in range(usual):
             row: Ints = begins + slot
-            yield Patch(angles[kept], inner[row], outer[row], _most(enters[row]), _most(leaves[row]))
+            ends = _most(enters[row]), _most(leaves[row])
+            yield Patch(panels.designs.about, angles[kept], inner[row], outer[row], *ends)
 
 
 def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
@@ -147,34 +175,32 @@ def workspace_nodes(study: Study) -> Poses:
         If nothing is reachable.
     """
     all_regions = regions(study)
-    reachable = [(region, panels) for region in all_regions if (panels := _panels(region)) is not None]
     rays = max(ENOUGH_RAYS, MAX_POSES // GRID // len(all_regions))
-    parts: list[Complexes] = []
-    sectors = [_sectors(region, panels, rays, parts) for region, panels in reachable]
-    if not parts:
+    grids: list[Complexes] = []
+    sectors: list[Sectors] = []
+    held: dict[str, list[Floats]] = {name: [] for name in all_regions[0].held}
+    for region in all_regions:
+        panels, _ = counted(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
+        if not panels.closes[0]:
+            continue
+        begin = len(grids)
+        sectors.append(_sectors(region, panels, rays, grids))
+        for name, value in region.held.items():
+            held[name].append(np.full(sum(grid.size for grid in grids[begin:]), value))
+    if not grids:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
-    z = np.concatenate([grid.ravel() for grid in parts])
+    z = np.concatenate([grid.ravel() for grid in grids])
     point = study.workspace.point if study.workspace is not None else ""
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
-    nodes = [GRID * (grid.patches[-1].rays.stop - grid.patches[0].rays.start) for grid in sectors]
-    for name in all_regions[0].held:
-        values[name] = np.repeat([region.held[name] for region, _ in reachable], nodes)
+    values |= {name: np.concatenate(parts) for name, parts in held.items()}
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
     return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(sectors))
 
 
-def _panels(region: Region) -> Panels | None:
-    """Panels of the region, or of the piece that the sketch's assembly reaches; None where nothing is reachable."""
-    panels = find_panels(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
-    if region.field.same_assembly:
-        panels = Pieces.of(panels).only(0)
-    return panels if panels.closes[0] else None
+def _sectors(region: Region, panels: Panels, most: int, grids: list[Complexes]) -> Sectors:
+    """The patches of one region as sectors; their nodes, on about `most` rays, are appended to `grids`.
 
-
-def _sectors(region: Region, panels: Panels, most: int, parts: list[Complexes]) -> Sectors:
-    """The patches of one region as sectors; their nodes, on about `most` rays, are appended to `parts`.
-
-    Each part is of shape (rays, GRID).
+    Each grid is of shape (rays, GRID).
     """
     coarse = list(patches(panels, min(region.rays or RAYS, most)))
     finer = list(patches(panels, region.rays or RAYS))
@@ -184,13 +210,7 @@ def _sectors(region: Region, panels: Panels, most: int, parts: list[Complexes]) 
     for patch, fine in zip(coarse, finer if len(finer) == len(coarse) else coarse, strict=True):
         number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
         kept = evenly(len(patch.theta), number)
-        begin = sum(len(grid) for grid in parts)
-        parts.append(patch.grid(region.about)[kept])
-        sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid(region.about)))
-    outline = (
-        region.about + radius * np.exp(1j * patch.theta)
-        for patch in finer
-        for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves))
-        if margin >= 0
-    )
-    return Sectors(tuple(sectors), tuple(outline))
+        begin = sum(len(grid) for grid in grids)
+        grids.append(patch.grid[kept])
+        sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid))
+    return Sectors(tuple(sectors), tuple(edge.places for patch in finer for edge in patch.edges))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.rays import Intervals, is_turn
+from mechdesign.analyses.region.panels import Panels, find_panels
+from mechdesign.analyses.region.rays import Designs, Intervals, is_turn
 from mechdesign.analyses.region.rules import cubic, spread
 from mechdesign.mechanism.algebra import picked
 from mechdesign.mechanism.mechanism import drawn, elsewhere
@@ -24,8 +24,8 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 BESIDE = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
 # The largest such distance, as a fraction of the panel.
 PART = 0.125
-# Two intervals are connected if their overlap at twice the distance from the panels' common ray is less than this many
-# times the overlap at that distance: pieces that touch in a single point overlap twice as much there.
+# Two pieces that only touch at a point overlap beside it in proportion to the distance: at twice the distance twice as
+# much. Intervals are connected if the overlap grows by less than this factor.
 TOUCHES = 1.75
 # Quadrature nodes of a panel for the areas by which pieces are ordered.
 NODES = 8
@@ -237,6 +237,16 @@ class _OnePiece(Panels):
         traced = super().trace(design, theta, slack)
         piece = self.pieces.of_intervals(design, theta, traced)
         return traced.kept((piece == self.piece) | ((piece == UNKNOWN) & (self.piece == 0)))
+
+
+def counted(designs: Designs, cuts: tuple[float, ...] = ()) -> tuple[Panels, Pieces | None]:
+    """The panels that count, of the first piece of each design or of all pieces in any assembly, and the pieces.
+
+    Several designs whose pieces all count are not divided: None. `cuts` and errors as in `find_panels`.
+    """
+    panels, first = find_panels(designs, cuts), designs.field.same_assembly
+    pieces = Pieces.of(panels) if first or designs.count == 1 else None
+    return pieces.only(0) if pieces is not None and first else panels, pieces
 
 
 def _doubtful(panels: Panels) -> Flags:

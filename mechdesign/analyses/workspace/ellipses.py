@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.region.curves import Patch
+from mechdesign.analyses.region.field import Field
 from mechdesign.analyses.workspace.index import Local
-from mechdesign.analyses.workspace.question import Question
 from mechdesign.numerics.arrays import Complexes, Floats
 
 # Places wanted, at least; lattices are tried from coarse to fine, by how many places they have in the box around.
@@ -38,14 +38,13 @@ class Ellipses:
     spacing: float
 
 
-def ellipses(question: Question, found: Sequence[Patch]) -> Ellipses | None:
+def ellipses(field: Field, patches: Sequence[Patch]) -> Ellipses | None:
     """Jacobians on a square lattice of some thirty places; None where more is given than the point's place."""
-    field = question.field
     if len(field.outputs) != 2:
         return None
     edge = np.concatenate([
-        question.about + radius * np.exp(1j * patch.theta)
-        for patch in found for radius in (patch.inner, patch.outer)
+        patch.about + radius * np.exp(1j * patch.theta)
+        for patch in patches for radius in (patch.inner, patch.outer)
     ])  # fmt: skip
     low, high = complex(edge.real.min(), edge.imag.min()), complex(edge.real.max(), edge.imag.max())
     size = high - low
@@ -56,8 +55,8 @@ def ellipses(question: Question, found: Sequence[Patch]) -> Ellipses | None:
         x, y = (np.arange(count) - (count - 1) / 2 for count in (int(size.real / spacing), int(size.imag / spacing)))
         lattice = (low + high) / 2 + spacing * (x[:, None] + 1j * y).ravel()
         held = np.zeros((len(lattice), len(around)), dtype=bool)
-        for patch in found:
-            held |= patch.holds(np.asarray(lattice[:, None] + spacing * around, dtype=complex), question.about)
+        for patch in patches:
+            held |= patch.holds(np.asarray(lattice[:, None] + spacing * around, dtype=complex))
         places = lattice[held.all(axis=1)]
         if len(places) >= ENOUGH:
             break

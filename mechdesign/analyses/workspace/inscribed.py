@@ -18,18 +18,24 @@ from mechdesign.analyses.region.field import Field
 from mechdesign.analyses.region.rays import is_turn
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
-# What is told of both shapes.
+# Columns of both shapes.
 INSCRIBED = (
     "circle_x", "circle_y", "circle_radius", "rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height"
 )  # fmt: skip
 # Cells of the raster along each side, and how many of its best places are tried.
 CELLS, TRIALS = 96, 4
-# Places of a border that are always looked at, those of rectangles at its corners, too; and those added beside each of
-# the lowest at which a margin is smallest.
-PLACES, CONTACTS, CLOSER = 64, 12, np.linspace(-1, 1, 9)
-# Rounds of growing, how far one may move (parts of the region's size); what a border may lie outside and a round may
-# still gain at the end, and how far it may lie outside after all rounds.
-ROUNDS, LEAP, DEPTH, LATE = 24, 0.06, 1e-9, 1e-7
+# Places of a border that are judged in every round; a rectangle's corners are among them.
+PLACES = 64
+# Contacts, the places where a margin is smallest: so many at most get further places beside them, at these distances.
+CONTACTS, CLOSER = 12, np.linspace(-1, 1, 9)
+# A shape grows in rounds. Lengths are parts of the region's size.
+ROUNDS = 24
+# The farthest that a side or the centre moves in one round.
+LEAP = 0.06
+# Growing ends when a round gains less than this, and no more than this of the border lies outside.
+DEPTH = 1e-9
+# After the last round so much may lie outside; a border farther out counts as not found.
+LATE = 1e-7
 # A curve shorter than this part of the longest is a point; a trial not nearly as good as the best so far is left.
 POINT, HOPEFUL = 1e-6, 0.8
 # Step of differences, as a part of the size; a margin whose slope is less than this part of it is far from zero.
@@ -41,26 +47,19 @@ Border = Callable[[Floats], Complexes]
 Size = Callable[[Floats], tuple[float, Floats]]
 
 
-def inscribed(
-    field: Field, about: complex, scan: tuple[float, float], patches: Sequence[Patch], others: Sequence[Patch] = ()
-) -> Floats:
+def inscribed(field: Field, scan: tuple[float, float], patches: Sequence[Patch], others: Sequence[Patch]) -> Floats:
     """The largest circle and rectangle inside one region, as `INSCRIBED` names it; nan for what was not found.
 
     Parameters
     ----------
-    about, scan
-        Centre and range of angle (radians) of the scan: what lies beyond a scan of less than a turn does not count.
+    scan : (float, float)
+        Range of angle of the scan (radians): what lies beyond a scan of less than a turn does not count.
     patches : sequence of Patch
         The region's parts.
     others : sequence of Patch
         Parts of pieces that do not count.
     """
-    ends = [
-        (about + r * np.exp(1j * p.theta), margin)
-        for p in patches
-        for r, margin in ((p.inner, p.enters), (p.outer, p.leaves))
-        if margin >= 0
-    ]
+    ends = [(edge.places, edge.margin) for patch in patches for edge in patch.edges]
     # Single points, where a leg has no length, bound nothing.
     extent = max(float(np.ptp(z.real) + np.ptp(z.imag)) for z, _ in ends)
     ends = [(z, margin) for z, margin in ends if np.ptp(z.real) + np.ptp(z.imag) > POINT * extent]
@@ -70,7 +69,7 @@ def inscribed(
     cell = np.array([np.ptp(every.real), np.ptp(every.imag)]) / (CELLS - 2)
     size = float((CELLS - 2) * cell.max())
     x, y = (low + step * (np.arange(CELLS) - 0.5) for low, step in zip((corner.real, corner.imag), cell, strict=True))
-    sector = _sector(about, scan)
+    sector = _sector(patches[0].about, scan)
 
     def margins(z: Complexes) -> Floats:
         return np.concatenate([field.margins(z, {}), sector(z)])
@@ -79,7 +78,7 @@ def inscribed(
     inside = margins(cells) > 0
     counts = inside.all(axis=0)
     for other in others:
-        counts &= ~other.holds(cells, about)
+        counts &= ~other.holds(cells)
     free = counts.reshape(CELLS, CELLS)
     met = (np.stack([every.real - corner.real, every.imag - corner.imag]) / cell[:, None]).astype(int)
     free[tuple(np.clip(met + 1, 1, CELLS - 2))] = False
@@ -92,7 +91,7 @@ def inscribed(
         return np.full(len(start), np.nan) if found is None else size * found
 
     circle, best = np.full(3, np.nan), 0.0
-    for i, j, radius in _discs(free, cell) or [_thin(patches, about, x, y)]:
+    for i, j, radius in _discs(free, cell) or [_thin(patches, x, y)]:
         if radius >= HOPEFUL * best:
             p = grown(_circle, _radius, np.array([x[i], y[j], 0.9 * radius]))
             held = np.abs(every - complex(p[0], p[1])) - p[2] < -POINT * size
@@ -138,9 +137,9 @@ def _discs(free: Flags, cell: Floats) -> list[tuple[int, int, float]]:
     return found
 
 
-def _thin(patches: Sequence[Patch], about: complex, x: Floats, y: Floats) -> tuple[int, int, float]:
+def _thin(patches: Sequence[Patch], x: Floats, y: Floats) -> tuple[int, int, float]:
     """The cell at the middle of the widest interval, where every cell is met by the boundary."""
-    z = max(patches, key=lambda patch: float(np.max(patch.outer - patch.inner))).middle(about)
+    z = max(patches, key=lambda patch: patch.width).middle
     return int(np.argmin(np.abs(x - z.real))), int(np.argmin(np.abs(y - z.imag))), float(x[1] - x[0])
 
 

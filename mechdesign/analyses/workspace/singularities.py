@@ -102,10 +102,10 @@ def singular_everywhere(field: Field) -> bool:
     return len(z) > 0 and bool((regular <= REGULAR).all())
 
 
-def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
+def inside(field: Field, patches: Sequence[Patch]) -> list[Locus]:
     """Forward singularities inside a region: on the lines of a grid of its patches to rounding, in order as curves."""
     names = forward_names(field.mechanism)
-    if field.same_assembly or not names or not patches or singular_everywhere(field):
+    if field.same_assembly or not names:
         return []
 
     def values(z: Complexes) -> Floats:
@@ -115,7 +115,7 @@ def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus
 
     curves: list[list[Complexes]] = [[] for _ in names]
     for patch in patches:
-        place = _places(patch, about)
+        place = _places(patch)
         row, column = np.meshgrid(*(np.arange(0, n - 1 + STEP, STEP) for n in (len(patch.theta), GRID)), indexing="ij")
         for k, at_nodes in enumerate(values(place(row, column))):
 
@@ -136,7 +136,7 @@ def inside(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus
     ]
 
 
-def _places(patch: Patch, about: complex) -> Callable[[Floats, Floats], Complexes]:
+def _places(patch: Patch) -> Callable[[Floats, Floats], Complexes]:
     """Points of the plane at fractional rows and columns of a patch's grid."""
     from scipy.interpolate import CubicSpline
 
@@ -146,7 +146,7 @@ def _places(patch: Patch, about: complex) -> Callable[[Floats, Floats], Complexe
     def place(row: Floats, column: Floats) -> Complexes:
         theta, inner, outer = rays(row)
         fraction = np.clip(0.5 * (1 - np.cos(np.pi * column / (GRID - 1))), INSET, 1 - INSET)
-        return np.asarray(about + (inner + fraction * (outer - inner)) * np.exp(1j * theta))
+        return np.asarray(patch.about + (inner + fraction * (outer - inner)) * np.exp(1j * theta))
 
     return place
 
@@ -234,17 +234,13 @@ def _end(
     return complex(met) if good else None
 
 
-def around(field: Field, about: complex, patches: Sequence[Patch]) -> list[Locus]:
-    """Singularities that bound a region, as curves."""
-    told = causes(field)
-    pieces: list[tuple[str, str, Complexes]] = []
-    for patch in patches:
-        for radius, margin in ((patch.inner, patch.enters), (patch.outer, patch.leaves)):
-            if margin >= 0 and told[margin][0] != "limit":
-                pieces.append((*told[margin], about + radius * np.exp(1j * patch.theta)))
-    pieces.sort(key=lambda piece: piece[:2])
-    size = max((float(np.max(patch.outer)) for patch in patches), default=1.0)
-    found = []
-    for (kind, cause), group in groupby(pieces, key=lambda piece: piece[:2]):
-        found += [Locus(kind, cause, curve) for curve in joined([piece[2] for piece in group], END_DISTANCE * size)]
-    return found
+def around(told: Sequence[tuple[str, str]], patches: Sequence[Patch]) -> list[Locus]:
+    """Singularities that bound a region, as curves; `told` are the `causes` of its field."""
+    edges = [(*told[edge.margin], edge.places) for patch in patches for edge in patch.edges]
+    edges = sorted((edge for edge in edges if edge[0] != "limit"), key=lambda edge: edge[:2])
+    size = max(float(np.max(patch.outer)) for patch in patches)
+    return [
+        Locus(kind, cause, curve)
+        for (kind, cause), group in groupby(edges, key=lambda edge: edge[:2])
+        for curve in joined([places for *_, places in group], END_DISTANCE * size)
+    ]
