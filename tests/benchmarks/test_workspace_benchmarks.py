@@ -17,7 +17,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.analyses.region.rays import BATCH, Designs
 from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.question import questions
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Result

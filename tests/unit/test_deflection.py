@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 import mechdesign
 from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.results import Result
 

@@ -308,7 +308,8 @@ def test_what_cannot_be_meant_is_refused(changes: list[str], message: str) -> No
 def test_the_point_of_a_workspace_may_be_an_end() -> None:
     """The map says of every node what the question says there."""
     from mechdesign.analyses.poses import study_poses
-    from mechdesign.analyses.workspace.index import Local, prepare
+    from mechdesign.analyses.workspace.index import prepare
+    from mechdesign.analyses.workspace.local import Local
     from mechdesign.analyses.workspace.question import questions
 
     text = (

@@ -13,7 +13,8 @@ import mechdesign
 from mechdesign.analyses.poses import study_poses
 from mechdesign.analyses.region.rays import BATCH
 from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.index import Local, prepare
+from mechdesign.analyses.workspace.index import prepare
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.pieces import Pieces, counted
-from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, Intervals, ray_through
+from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, ray_through
 from mechdesign.analyses.region.regions import RAYS, Region, regions
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, evenly
@@ -115,7 +115,7 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
             first, last = (high - low) * np.array(BESIDE)[steps]
             angles = np.clip(theta, low + first, high - last)
             traced = panels.trace(np.zeros(number, dtype=np.intp), angles, SLACK)
-            ray, inner, outer, enters, leaves = whole(traced, SAME_ROOT * float(panels.reach[0]))
+            ray, inner, outer, enters, leaves = traced.whole(SAME_ROOT * float(panels.reach[0]))
             counts = np.bincount(ray, minlength=number)
             usual = _most(counts)
             lost = counts[[0, -1]] != usual
@@ -140,17 +140,6 @@ def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
         share = round(rays * float(np.sum(panels.high - panels.low)) / total)
         all_patches += [replace(patch, piece=number) for patch in patches(panels, share)]
     return all_patches
-
-
-def whole(traced: Intervals, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
-    """Ray, radii and margins of intervals, those joined that only a point divides (such as where a leg has no length).
-
-    Intervals of a ray are joined where the gap between them is at most `near`.
-    """
-    ray = traced.ray
-    meets = (ray[1:] == ray[:-1]) & (traced.inner[1:] - traced.outer[:-1] <= near)
-    begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
-    return ray[begins], traced.inner[begins], traced.outer[ends], traced.enters[begins], traced.leaves[ends]
 
 
 def _most(values: Ints) -> int:

@@ -14,7 +14,7 @@ from mechdesign.mechanism.algebra import Value, norm2
 from mechdesign.mechanism.atlas import Atlas
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import determinants
+from mechdesign.mechanism.derivatives import determinants, regularity
 from mechdesign.mechanism.margins import LIMIT, SINGULARITY, Cause, causes
 from mechdesign.mechanism.mechanism import Variant, drawn
 from mechdesign.mechanism.plan import Plan
@@ -26,6 +26,8 @@ Places = Mapping[str, Value]
 HELD, LENGTH = "held:", "length:"
 # Determinants below this fraction of the largest one around the point's place in the sketch are rounding.
 ROUNDING = 1e-12
+# Poses no more regular than this (0 at a singularity, at most 1) are singular but for rounding.
+REGULAR = 1e-10
 # Distances from that place at which determinants are compared, as fractions of the mechanism's size.
 SHARES = (0.03, 0.1, 0.3, 1.0)
 
@@ -201,6 +203,16 @@ class Field:
         sketch = self.mechanism.sketch_configuration
         at = complex(*(float(sketch.value(c)) for c in self.outputs[:2]))
         return np.append(at, at + self.mechanism.size * (turn * share).ravel())
+
+    @property
+    def singular_everywhere(self) -> bool:
+        """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
+        margins = self.margins(self.surroundings, {}, assembly=False)
+        closures = [kind != LIMIT for kind, _ in self.labels[: len(margins)]]
+        z = self.surroundings[(margins[closures] > 0).all(axis=0)]
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            regular = np.asarray(regularity(self.mechanism.linearize(self.configuration(z, {}))))
+        return len(z) > 0 and bool((regular <= REGULAR).all())
 
     @cached_property
     def rounding(self) -> Floats:

@@ -201,6 +201,16 @@ class Intervals:
         table[:, self.slot, self.ray] = values
         return table
 
+    def whole(self, near: Floats | float) -> tuple[Ints, Floats, Floats, Ints, Ints]:
+        """Ray, radii and margins of the intervals, one where only a point divides two (a leg has no length there).
+
+        Intervals of a ray are joined where the gap between them is at most `near`.
+        """
+        ray = self.ray
+        meets = (ray[1:] == ray[:-1]) & (self.inner[1:] - self.outer[:-1] <= near)
+        begins, ends = np.append(True, ~meets)[: len(ray)], np.append(~meets, True)[: len(ray)]
+        return ray[begins], self.inner[begins], self.outer[ends], self.enters[begins], self.leaves[ends]
+
     def kept(self, keep: Flags) -> Intervals:
         """The intervals that `keep` marks, on the same rays."""
         if keep.all():

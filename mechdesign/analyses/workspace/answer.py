@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mechdesign.analyses.region.field import Places
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.pieces import Pieces, counted
-from mechdesign.analyses.region.rays import Effort
+from mechdesign.analyses.region.rays import BATCH, Effort
 from mechdesign.analyses.workspace.box import bounding_box
-from mechdesign.analyses.workspace.peaks import Peaks, find_peaks
+from mechdesign.analyses.workspace.peaks import find_peaks
 from mechdesign.analyses.workspace.quadrature import integrate, simple_means
 from mechdesign.analyses.workspace.question import Question
 from mechdesign.analyses.workspace.strips import Integrand
-from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.errors import AssemblyError
+from mechdesign.numerics.arrays import Floats
 from mechdesign.work.threads import keep_freed_memory
 
 # The area that the rules of comparison divide is integrated to this relative tolerance.
 AREA_TOLERANCE = 1e-6
+# Relative accuracy of the area that lies in the other assembly.
+LOOSE = 1e-3
 # Relative accuracy of the smallest and largest values of an index.
 PEAK_TOLERANCE = 1e-5
 
@@ -56,8 +59,10 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
         return Evaluation(nothing, errors, panels, pieces)
     gauss = question.rule == "gauss"
     tolerance = question.tolerance if gauss else AREA_TOLERANCE
-    integrands, peaks = _integrands(question), _peaks(question, panels)
-    endless = _endless(question, integrands, peaks, count)
+    integrands = question.integrands
+    squares = any(integrand.power == 2 for integrand in integrands)
+    peaks = find_peaks(panels, question.indices, PEAK_TOLERANCE, question.extremes, squares=squares)
+    endless = peaks.endless(integrands)
     means, doubts = np.full(endless.shape, np.inf), np.zeros(endless.shape)
     means[:, ~panels.closes] = np.nan
     # What is infinite for every design need not be looked at.
@@ -82,56 +87,58 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
                 "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
             }
     for column, (name, kind) in question.statistics.items():
-        found[column] = _statistic(name, kind, question, integrands, means, doubts, peaks)
+        if kind in ("min", "max"):
+            found[column] = peaks.of(name, kind)
+        else:
+            found[column] = (_mean if kind == "mean" else _spread)(integrands, means, doubts, name)
     values, errors = ({name: found[name][k] for name in question.wanted} for k in (0, 1))
     return Evaluation(values, errors, panels, pieces)
 
 
-def _integrands(question: Question) -> tuple[Integrand, ...]:
-    """What the wanted means and standard deviations need: the indices, and their squares."""
-    return tuple(
-        Integrand(index, power)
-        for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
-        for index in question.indices
-        if any(question.asks(index.name, kind) for kind in kinds)
-    )
+def areas(question: Question, given: Evaluation) -> list[float]:
+    """Area of each piece of a single design's region."""
+    assert given.pieces is not None
+    whole = float(given.values["area"][0])
+    if given.pieces.number[0] == 1:
+        return [whole]
+    none = np.zeros((0, 1), dtype=bool)
+    return [
+        float(integrate(part, question.tolerance, question.scan, (), none, whole).area[0])
+        for part in given.pieces.all()
+    ]
 
 
-def _peaks(question: Question, panels: Panels) -> Peaks | None:
-    """Extremes, where they are wanted or an integral may be infinite."""
-    wanted = np.array([[question.asks(index.name, kind) for index in question.indices] for kind in ("min", "max")])
-    squares = any(kind == "std" for _, kind in question.statistics.values())
-    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in question.indices):
-        return None
-    return find_peaks(panels, question.indices, PEAK_TOLERANCE, wanted)
+def area_beyond(question: Question, areas: Sequence[float]) -> float:
+    """Area that a region has in the other assembly, beside its pieces in the sketch's; 0 where it has no end there.
+
+    It is looked for as loosely as of a design of many.
+    """
+    if not any(name.startswith("assembly ") for _, name in question.field.labels):
+        return 0.0
+    both = replace(question.field, same_assembly=False)
+    every = replace(question, field=both, indices=(), wanted=("area",), rule="gauss", tolerance=LOOSE)
+    try:
+        return float(answer(every, {}, 1, BATCH).values["area"][0]) - sum(areas)
+    except AssemblyError:
+        return 0.0
 
 
-def _endless(question: Question, integrands: Sequence[Integrand], peaks: Peaks | None, count: int) -> Flags:
-    """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve."""
-    if peaks is None:
-        return np.zeros((len(integrands), count), dtype=bool)
-    order = dict(zip((index.name for index in question.indices), peaks.order, strict=True))
-    grows = [integrand.power * order[integrand.index.name] >= 1 for integrand in integrands]
-    return np.array(grows, dtype=bool).reshape(-1, count)
-
-
-def _statistic(
-    name: str, kind: str, question: Question, integrands: Sequence[Integrand], means: Floats, doubts: Floats,
-    peaks: Peaks | None,
+def _spread(
+    integrands: Sequence[Integrand], means: Floats, doubts: Floats, name: str
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """Values and errors of one statistic of one index."""
-    if kind in ("min", "max"):
-        assert peaks is not None
-        at = (("min", "max").index(kind), [index.name for index in question.indices].index(name))
-        return peaks.value[at], peaks.error[at]
-    row = {(integrand.index.name, integrand.power): k for k, integrand in enumerate(integrands)}
-    mean, doubt = means[row[name, 1]], doubts[row[name, 1]]
-    if kind == "mean":
-        return mean, doubt
-    square, square_doubt = means[row[name, 2]], doubts[row[name, 2]]
+    """Standard deviation of an index over each region, and its error, by the means of the index and its square."""
+    (mean, doubt), (square, square_doubt) = (_mean(integrands, means, doubts, name, power) for power in (1, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
         spread = np.where(np.isinf(square), np.inf, np.sqrt(np.maximum(square - mean * mean, 0.0)))
         total = square_doubt + 2 * np.abs(mean) * doubt
         # Of a deviation that is nothing but its error the square is in doubt, not the root's slope.
         error = np.where(np.isinf(spread), 0.0, np.minimum(total / (2 * spread), np.sqrt(total)))
     return spread, error
+
+
+def _mean(
+    integrands: Sequence[Integrand], means: Floats, doubts: Floats, name: str, power: int = 1
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Mean of a power of an index over each region, and its error."""
+    row = [(integrand.index.name, integrand.power) for integrand in integrands].index((name, power))
+    return means[row], doubts[row]

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import whole
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import SAME_ROOT, Designs, is_turn, trace
 from mechdesign.analyses.region.rules import cubic, spread
@@ -260,7 +259,7 @@ class _View:
             return np.zeros(0)
         reach = self._reach[lane]
         traced = trace(self._designs, lane, theta, reach)
-        ray, inner, outer, _, _ = whole(traced, SAME_ROOT * reach[traced.ray[1:]])
+        ray, inner, outer, _, _ = traced.whole(SAME_ROOT * reach[traced.ray[1:]])
         first = np.searchsorted(ray, np.arange(len(lane)))
         meets = np.append(ray, -1)[first] == np.arange(len(lane))
         inner, outer = (np.append(ends, np.inf)[np.where(meets, first, -1)] for ends in (inner, outer))
@@ -328,7 +327,7 @@ def _beginnings(shape: Shape, panels: Panels, some: Ints) -> tuple[Ints, Complex
     part = (np.arange(len(panel)) - np.repeat(np.cumsum(number) - number, number) + 0.5) / number[panel]
     theta, design = spread(panels.low[panel], panels.high[panel], part, cubic)[0], panels.design[panel]
     traced = panels.trace(design, theta)
-    ray, inner, outer, enters, _ = whole(traced, SAME_ROOT * panels.reach[design[traced.ray[1:]]])
+    ray, inner, outer, enters, _ = traced.whole(SAME_ROOT * panels.reach[design[traced.ray[1:]]])
     way, owner = np.exp(1j * theta[ray]), design[ray]
     ends = about + np.stack([np.where(enters >= 0, inner, outer), outer]) * way
     within = about + (inner + FRACTIONS[:, None] * (outer - inner)) * way

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.field import Field
-from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.numerics.arrays import Complexes, Floats
 
 # Places wanted, at least; lattices are tried from coarse to fine, by how many places they have in the box around.

@@ -11,42 +11,18 @@ import numpy as np
 
 from mechdesign import indices
 from mechdesign.analyses.columns import power_of_length
-from mechdesign.analyses.region.field import LENGTH, Field, Places
-from mechdesign.analyses.region.rays import Designs
+from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.errors import StudyError
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
-from mechdesign.mechanism.derivatives import Jacobian
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Floats
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
 
 # Configurations that an index is computed from at once.
 BLOCK = 4096
-
-
-@dataclass(frozen=True, eq=False)
-class Local(Jacobian):
-    """The Jacobian of a field's outputs at a batch of points; `found` holds values of indices computed already."""
-
-    configuration: Configuration
-    found: dict[str, Value] = dataclasses.field(default_factory=dict)
-
-    @staticmethod
-    def at(field: Field, z: Complexes, places: Places) -> Local:
-        """What local indices at points `z` are computed from."""
-        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            configuration = field.configuration(z, places)
-            jacobian = Jacobian.of(
-                field.mechanism.linearize(configuration), field.outputs, places.get(LENGTH, field.length)
-            )
-            return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
-
-    @staticmethod
-    def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:
-        """The same at places of rays, each of a design."""
-        return Local.at(designs.field, designs.about + radius * np.exp(1j * theta), designs.of(design))
 
 
 Evaluate = Callable[[Local], Value]
@@ -94,9 +70,9 @@ class Prepared:
     @quiet
     def values(self, local: Local) -> Value:
         """Values at points, computed once."""
-        if self.name not in local.found:
-            local.found[self.name] = self.evaluate(local)
-        return local.found[self.name]
+        if self.name not in local.known:
+            local.known[self.name] = self.evaluate(local)
+        return local.known[self.name]
 
 
 def prepare(study: Study, names: Sequence[str]) -> tuple[Prepared, ...]:

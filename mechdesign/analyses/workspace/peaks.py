@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rules import cosine, cubic, spread
-from mechdesign.analyses.workspace.index import Local, Prepared
+from mechdesign.analyses.workspace.index import Prepared
+from mechdesign.analyses.workspace.local import Local
+from mechdesign.analyses.workspace.strips import Integrand
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Places in the maps stay this far from the ends: rounding leaves nothing nearer to corners, or to the boundary.
@@ -43,15 +45,31 @@ class Peaks:
 
     Parameters
     ----------
+    names : sequence of str
+        Names of the indices.
     value, error : ndarray, shape (2, indices, designs)
         Infimum and supremum of each index, and their estimated errors; nan where the region is empty.
     order : ndarray, shape (indices, designs)
         n where the index grows as distance^-n towards a singularity, else 0.
     """
 
+    names: Sequence[str]
     value: Floats
     error: Floats
     order: Floats
+
+    def endless(self, integrands: Sequence[Integrand]) -> Flags:
+        """Integrals that are infinite: the integrand grows at least as 1/distance towards a curve.
+
+        Of shape (integrands, designs).
+        """
+        grows = [each.power * self.order[self.names.index(each.index.name)] >= 1 for each in integrands]
+        return np.array(grows, dtype=bool).reshape(-1, self.order.shape[1])
+
+    def of(self, name: str, kind: str) -> tuple[Floats, Floats]:
+        """Infimum (``min``) or supremum (``max``) of an index, and its error, both of shape (designs,)."""
+        at = ("min", "max").index(kind), self.names.index(name)
+        return self.value[at], self.error[at]
 
 
 # Places of regions: design, panel, interval of the ray, and shares u of the panel's map and v of the interval's.
@@ -59,7 +77,9 @@ PLACE = np.dtype([("design", np.intp), ("panel", np.intp), ("slot", np.intp), ("
 Places = NDArray[Any]
 
 
-def find_peaks(panels: Panels, indices: Sequence[Prepared], tolerance: float, wanted: Flags) -> Peaks:
+def find_peaks(
+    panels: Panels, indices: Sequence[Prepared], tolerance: float, wanted: Flags, *, squares: bool
+) -> Peaks:  # fmt: skip
     """Extremes of indices over the regions.
 
     Parameters
@@ -68,10 +88,15 @@ def find_peaks(panels: Panels, indices: Sequence[Prepared], tolerance: float, wa
         Relative accuracy at which the search ends.
     wanted : ndarray of bool, shape (2, indices)
         Whether the infimum, and the supremum of each index is searched for; else only its order is found.
+    squares : bool
+        Whether squares of indices are integrated. Without these an integral may be infinite only where an index grows
+        without bound at a crossing: else, and where no extreme is wanted, nothing is looked for.
     """
-    count = len(panels.closes)
+    count, names = len(panels.closes), [index.name for index in indices]
     shape = (len(indices), count)
     value, order = np.stack([np.full(shape, np.inf), np.full(shape, -np.inf)]), np.zeros(shape)
+    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in indices):
+        return Peaks(names, value, np.zeros(value.shape), order)
     _at_ends(panels, indices, value, order)
     places, local = _grid(panels)
     _at_crossings(indices, places["design"], local, value, order)
@@ -89,7 +114,7 @@ def find_peaks(panels: Panels, indices: Sequence[Prepared], tolerance: float, wa
         value[sense, k, design] = sign * np.fmax(sign * value[sense, k, design], sign * peak)
         error[sense, k, design] = doubt
     value[:, :, ~panels.closes] = error[:, :, ~panels.closes] = np.nan
-    return Peaks(value, error, order)
+    return Peaks(names, value, error, order)
 
 
 def _at_ends(panels: Panels, indices: Sequence[Prepared], value: Floats, order: Floats) -> None:

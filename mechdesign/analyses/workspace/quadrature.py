@@ -23,7 +23,7 @@ import numpy as np
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import Intervals
 from mechdesign.analyses.region.rules import Rule, cubic, spread
-from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.strips import (
     BLOCK,
     RADII,

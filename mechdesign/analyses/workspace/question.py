@@ -13,8 +13,10 @@ from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.regions import Region, problem, regions
 from mechdesign.analyses.workspace.index import Prepared, prepare
 from mechdesign.analyses.workspace.ranged import Every, Ranged, Some, SomeDesigns
+from mechdesign.analyses.workspace.strips import Integrand
 from mechdesign.errors import Problem, StudyError
 from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
+from mechdesign.numerics.arrays import Flags
 from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
 from mechdesign.study.text.fields import parts_of
@@ -66,9 +68,22 @@ class Question(Region):
         held = ", ".join(f"{name} = {value:g}" for name, value in self.held.items())
         return f" at {held}" if held else ""
 
-    def asks(self, name: str, kind: str) -> bool:
-        """Whether a statistic of a local index is wanted."""
-        return (name, kind) in self.statistics.values()
+    @property
+    def integrands(self) -> list[Integrand]:
+        """What the wanted means and standard deviations need: the indices, and their squares."""
+        wanted = self.statistics.values()
+        return [
+            Integrand(index, power)
+            for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
+            for index in self.indices
+            if any((index.name, kind) in wanted for kind in kinds)
+        ]
+
+    @property
+    def extremes(self) -> Flags:
+        """Whether the infimum, and the supremum of each index is wanted, shape (2, indices)."""
+        wanted = self.statistics.values()
+        return np.array([[(index.name, kind) in wanted for index in self.indices] for kind in ("min", "max")])
 
 
 def columns(names: Iterable[str]) -> tuple[str, ...]:

@@ -14,8 +14,9 @@ import numpy as np
 
 from mechdesign.analyses.region.curves import GRID, Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.workspace.ranged import Ranged
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.derivatives import determinants, regularity
+from mechdesign.mechanism.derivatives import determinants
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.numerics.zero_curves import joined, zero_curves
@@ -23,8 +24,6 @@ from mechdesign.numerics.zero_curves import joined, zero_curves
 FORWARD, INVERSE = "forward", "inverse"
 # How the links of a group lie where its determinant vanishes.
 FORMS = {"two angles": "in line", "angle and fixed slide": "at right angles", "two slides": "parallel"}
-# Poses no more regular than this (0 at a singularity, at most 1) are singular but for rounding.
-REGULAR = 1e-10
 # Spacing of the grid on which curves are looked for, in rows and columns of a patch's grid; and the part of a ray's
 # interval that it leaves out at both ends.
 STEP = 0.25
@@ -61,6 +60,10 @@ class Locus:
 
 def causes(field: Field) -> list[tuple[str, str]]:
     """What ends the region where each margin of a field is zero: ``limit``, ``forward`` or ``inverse``, and which."""
+    if isinstance(field, Ranged):
+        # Those inside the range, at its low end and at its high end; then pairs that leave no value between them.
+        single = causes(field.sliced)
+        return [*single * 3, *((kind, f"{one} and {other}") for kind, one in single for _, other in single)]
     names = forward_names(field.mechanism)
     stated = {bound.label: bound.coordinate.name for bound in field.mechanism.bounds}
     found = []
@@ -92,20 +95,26 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
     return f"{named} {FORMS.get(group.form, 'not held')}"
 
 
-def singular_everywhere(field: Field) -> bool:
-    """Whether every pose is a forward singularity, so that determinants are nothing but rounding."""
-    margins = field.margins(field.surroundings, {}, assembly=False)
-    closures = [kind != "limit" for kind, _ in field.labels[: len(margins)]]
-    z = field.surroundings[(margins[closures] > 0).all(axis=0)]
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        regular = np.asarray(regularity(field.mechanism.linearize(field.configuration(z, {}))))
-    return len(z) > 0 and bool((regular <= REGULAR).all())
+def loci(
+    field: Field, told: Sequence[tuple[str, str]], patches: Sequence[Patch], *, singular: bool
+) -> list[Locus]:  # fmt: skip
+    """Singularities inside a region, unless it is `singular` everywhere, then those that bound it, as curves.
+
+    `told` are the `causes` of its field.
+    """
+    edges = [(*told[edge.margin], edge.places) for patch in patches for edge in patch.edges]
+    edges = sorted((edge for edge in edges if edge[0] != "limit"), key=lambda edge: edge[:2])
+    groups = [(*key, [places for *_, places in group]) for key, group in groupby(edges, key=lambda edge: edge[:2])]
+    if not field.same_assembly and not singular:
+        groups = [*_inside(field, patches), *groups]
+    near = END_DISTANCE * max(float(np.max(patch.outer)) for patch in patches)
+    return [Locus(kind, cause, curve) for kind, cause, own in groups for curve in joined(own, near)]
 
 
-def inside(field: Field, patches: Sequence[Patch]) -> list[Locus]:
-    """Forward singularities inside a region: on the lines of a grid of its patches to rounding, in order as curves."""
+def _inside(field: Field, patches: Sequence[Patch]) -> list[tuple[str, str, list[Complexes]]]:
+    """Forward singularities inside a region, on the lines of a grid of its patches to rounding: kind, cause, curves."""
     names = forward_names(field.mechanism)
-    if field.same_assembly or not names:
+    if not names:
         return []
 
     def values(z: Complexes) -> Floats:
@@ -128,12 +137,7 @@ def inside(field: Field, patches: Sequence[Patch]) -> list[Locus]:
             for line in zero_curves(_without_rounding(at_nodes), on_grid):
                 line = _thinned(STEP * line)
                 curves[k].append(_to_boundary(field, determinant, patch, place(*line), line))
-    size = max(float(np.max(patch.outer)) for patch in patches)
-    return [
-        Locus(FORWARD, name, curve)
-        for name, own in zip(names, curves, strict=True)
-        for curve in joined(own, END_DISTANCE * size)
-    ]
+    return [(FORWARD, name, own) for name, own in zip(names, curves, strict=True)]
 
 
 def _places(patch: Patch) -> Callable[[Floats, Floats], Complexes]:
@@ -232,15 +236,3 @@ def _end(
         (met,), _ = on_boundary(foot + (2 * now[0] - now[1]) * tangent)
     good = (np.abs(change) <= ACCURACY * reach).all() and abs(met - near) <= reach
     return complex(met) if good else None
-
-
-def around(told: Sequence[tuple[str, str]], patches: Sequence[Patch]) -> list[Locus]:
-    """Singularities that bound a region, as curves; `told` are the `causes` of its field."""
-    edges = [(*told[edge.margin], edge.places) for patch in patches for edge in patch.edges]
-    edges = sorted((edge for edge in edges if edge[0] != "limit"), key=lambda edge: edge[:2])
-    size = max(float(np.max(patch.outer)) for patch in patches)
-    return [
-        Locus(kind, cause, curve)
-        for (kind, cause), group in groupby(edges, key=lambda edge: edge[:2])
-        for curve in joined([places for *_, places in group], END_DISTANCE * size)
-    ]

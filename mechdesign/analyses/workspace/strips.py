@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from mechdesign.analyses.region.rays import Designs
 from mechdesign.analyses.region.rules import Rule, cosine, spread
-from mechdesign.analyses.workspace.index import Local, Prepared
+from mechdesign.analyses.workspace.index import Prepared
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 RADII = Rule.of(11, 2, 2.0)

@@ -23,8 +23,9 @@ from mechdesign.analyses.workspace.columns import (
 )
 from mechdesign.analyses.workspace.index import determinant_power
 from mechdesign.analyses.workspace.inscribed import INSCRIBED
+from mechdesign.analyses.workspace.nodes import Nodes
 from mechdesign.analyses.workspace.question import COLUMNS, OF_RANGE, Question, split
-from mechdesign.analyses.workspace.reached import Nodes, Reached
+from mechdesign.analyses.workspace.reached import Reached
 from mechdesign.indices import index
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.results import Column, Table

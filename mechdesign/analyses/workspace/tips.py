@@ -11,7 +11,7 @@ import numpy as np
 
 from mechdesign.analyses.region.panels import Panels
 from mechdesign.analyses.region.rays import ray_through
-from mechdesign.analyses.workspace.index import Local
+from mechdesign.analyses.workspace.local import Local
 from mechdesign.analyses.workspace.strips import Parts, Strips
 from mechdesign.mechanism.algebra import cross
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
