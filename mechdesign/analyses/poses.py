@@ -286,22 +286,6 @@ def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:
     return ", ".join(parts)
 
 
-def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
-    """Outputs as coordinates, a point as its x and y.
-
-    Raises
-    ------
-    MechanismError
-        For a name that is neither.
-    """
-    mechanism = study.mechanism
-    found = []
-    for name in names:
-        parts = [f"{name}.x", f"{name}.y"] if mechanism.graph.is_point(name) else [name]
-        found += [mechanism.coordinate(part) for part in parts]
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class Shown:
     """Poses of a study's kinematics in their order: those that give the same coordinates as the first.

@@ -11,16 +11,16 @@ import numpy as np
 from mechdesign.analyses.columns import GIVEN
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.columns import OVER
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, rates_of_advantage
+from mechdesign.analyses.kinematics.motion import Motion, rates_of_advantage
+from mechdesign.analyses.kinematics.question import MotionQuestion
+from mechdesign.analyses.kinematics.rates import unitless
 from mechdesign.analyses.poses import SolvedPoses
 from mechdesign.curve.ends import End, Ends
 from mechdesign.curve.functions import Functions
 from mechdesign.curve.motion import Curve
 from mechdesign.curve.parts import within
 from mechdesign.mechanism.algebra import Value, quiet
-from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import angles_of
-from mechdesign.mechanism.derivatives import Jacobian, Linearization
 from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -62,10 +62,9 @@ class Along:
     ) -> None:  # fmt: skip
         self.question, self.curve, self.ends = question, curve, Ends(curve)
         self._loops, self._toggles = loops, toggles
-        study, mechanism = question.study, question.study.mechanism
-        kinds = {"length": mechanism.size, "angle": 2 * np.pi / study.units.angle_factor}
-        columns = {output.name: kinds.get(output.quantity, 0.0) for output in question.outputs}
-        columns |= {name: kinds.get(quantity, 0.0) for name, quantity in targets.followed(study, question.poses)}
+        mechanism, sizes = question.study.mechanism, question.sizes
+        columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
+        columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
         columns |= {static.name: 0.0 for static in question.statics}
         self._asked, self._within = asked, dict[Part, Along]()
         whole = [each for each in asked if not each.part]
@@ -75,7 +74,7 @@ class Along:
         self._others = [name for name in wanted if name not in columns]
         columns = {name: size for name, size in columns.items() if name in wanted}
         columns |= dict.fromkeys(self._others, 0.0) | {
-            name: kinds.get(quantity, 0.0) * question.tempo**order
+            name: sizes.get(quantity, 0.0) * question.tempo**order
             for name, (quantity, order) in question.orders.items()
             if name in wanted
         }
@@ -166,7 +165,11 @@ class Along:
         for chain, groups in self._chains.items():
             arrays[chain] = np.prod(np.broadcast_arrays(np.ones(len(s)), *(signed[k] for k in groups)), axis=0)
         if INVERSE in self._names:
-            arrays[INVERSE] = self._inverse(linear, configuration) * forward
+            # Determinant of the derivatives of what the poses give by the drives.
+            mechanism = self.question.study.mechanism
+            outputs = [mechanism.coordinate(name) for name in whole.groups[0].names]
+            matrix = unitless(mechanism, linear, outputs)[1]
+            arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
         for name, (output, given) in self._advantages.items():
             arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, given)[0] * forward
         for k, loop in enumerate(self._loops):
@@ -178,16 +181,6 @@ class Along:
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
         return table, motion.arrays["conditioning"]
-
-    def _inverse(self, linear: Linearization, configuration: Configuration) -> Value:
-        """Determinant of the derivatives of what the poses give by the drives, without units."""
-        mechanism = self.question.study.mechanism
-        given = [mechanism.coordinate(name) for name in self.question.poses.groups[0].names]
-        size = mechanism.size
-        rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
-        columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
-        matrix = Jacobian.of(linear, given).matrix * rows[:, None] * columns
-        return np.asarray(np.linalg.det(np.nan_to_num(matrix)))
 
     @cached_property
     def present(self) -> Floats:
@@ -339,6 +332,17 @@ class Along:
             joint = joints[number]
             found.append((line, place, Cause(SINGULARITY, joint, joint, self._groups[number], "passed")))
         return sorted(found, key=lambda passage: passage[:2])
+
+
+def along_of(
+    question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
+    also: Collection[str] = (), asked: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
+) -> Along | None:  # fmt: skip
+    """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
+    curve = question.curve
+    if curve is None or curve.spent.all():
+        return None
+    return Along(question, curve, names, loops, also=also, asked=asked, toggles=toggles, passages=passages)
 
 
 def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:

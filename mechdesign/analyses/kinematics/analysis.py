@@ -10,11 +10,12 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.answers import answers_of
 from mechdesign.analyses.kinematics.columns import MODES
-from mechdesign.analyses.kinematics.motion import Motion, motion_question
+from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.passage import Passage, pass_over
+from mechdesign.analyses.kinematics.question import motion_question
 from mechdesign.analyses.kinematics.remarks import marks_of
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE
-from mechdesign.analyses.poses import Shown
+from mechdesign.analyses.poses import Shown, study_poses
 from mechdesign.analyses.together import Answers
 from mechdesign.cautions import Caution
 from mechdesign.errors import Problem, StudyError
@@ -34,12 +35,12 @@ def kinematics(
     study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL, all_modes: bool = False
 ) -> Result:
     """Solve every pose of the study's kinematics; see `mechdesign.kinematics`."""
-    question = motion_question(study)
-    poses = question.poses
+    poses = study_poses(study, "kinematics")
     if all_modes and len(poses.groups) > 1:
         message = "the poses give different coordinates, and each set has modes of its own; list one set for all modes"
         raise StudyError((Problem(message, "kinematics.poses", str(study.path or "")),))
     progress.start(poses.count, "poses")
+    question = motion_question(study, poses)
     passage = pass_over(question, marks_of, progress, jobs)
     (group,) = answers_of(passage)
     result = group.of(0)
@@ -82,7 +83,7 @@ def _modes(
     for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
         passage = drawn
         if not assembly.drawn:
-            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism))
+            other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism), poses)
             passage = pass_over(other, marks_of, NULL, jobs)
         if passage.shown.configuration.valid.any() and len(pictured) < MAX_DRAWN_MODES:
             pictured[f"{assembly.label} (as drawn)" if assembly.drawn else assembly.label] = passage.shown

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Protocol, TypeVar
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.along import Along
+from mechdesign.analyses.kinematics.along import Along, along_of
 from mechdesign.analyses.kinematics.courses import Followed, course_of
 from mechdesign.analyses.kinematics.extremes import extremes, targets_table
 from mechdesign.analyses.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.analyses.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
-from mechdesign.analyses.kinematics.motion import MotionQuestion
 from mechdesign.analyses.kinematics.passage import Passage, pass_over
+from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.kinematics.remarks import marks_of, remarks, unfollowed, without_centre
 from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE, pose_tables
@@ -51,17 +51,6 @@ class _Found:
     changes: Sequence[Sequence[Change]]
 
 
-def along_of(
-    question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
-    also: Collection[str] = (), asked: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
-) -> Along | None:  # fmt: skip
-    """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
-    curve = question.curve
-    if curve is None or curve.spent.all():
-        return None
-    return Along(question, curve, names, loops, also=also, asked=asked, toggles=toggles, passages=passages)
-
-
 def answers_of(passage: Passage) -> list[Group]:
     """The answers of all designs, in groups of those of one kind; an error where no pose is valid.
 
@@ -87,7 +76,7 @@ def answers_of(passage: Passage) -> list[Group]:
         if along is not None:
             tables["toggles"] = toggles_table(toggles, along)
     if motion.errors:
-        tables["targets"] = targets_table(motion, along, passage.sums)
+        tables["targets"] = targets_table(motion, along)
     found = _Found(along, _by_line(limits, designs), _by_line(changes, designs))
     ends = [_end(passage, found, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()

@@ -9,7 +9,6 @@ import numpy as np
 from mechdesign.analyses.kinematics.along import Along, of_swept, over
 from mechdesign.analyses.kinematics.columns import EXTREMES, TARGETS
 from mechdesign.analyses.kinematics.motion import Motion
-from mechdesign.analyses.kinematics.targets import totals
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Table
 
@@ -29,14 +28,14 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     """
     question = motion.question
     study, poses, mechanism = question.study, question.poses, question.study.mechanism
-    turn = 2 * np.pi / study.units.angle_factor
-    kinds, label = {"length": mechanism.size, "angle": turn}, study.units.label
+    sizes, label = question.sizes, study.units.label
+    turn = sizes["angle"]
     # By name what rounding is judged by, and the unit.
-    curves = {output.name: (kinds.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
-    curves |= {error.name: (kinds.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
+    curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
+    curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
     curves |= {static.name: (0.0, static.unit) for static in question.statics}
     for name, (quantity, order) in question.orders.items():
-        curves[name] = kinds.get(quantity, 0.0) * question.tempo**order, question.rates[name]
+        curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]
     if names is not None:
         curves = {name: curve for name, curve in curves.items() if name in names}
     arrays = motion.arrays | {error.name: error.values for error in motion.errors}
@@ -96,14 +95,12 @@ def _between(
         ends[:, part, rows] = np.where(found, new, ends[:, part, rows])
 
 
-def targets_table(motion: Motion, along: Along | None, sums: Floats | None = None) -> Table:
+def targets_table(motion: Motion, along: Along | None) -> Table:
     """Mean and largest errors of each design over the motion, or over the valid poses that have a target.
 
-    `along` is the motion between the poses, None of listed poses and grids; `sums` are the `targets.totals` of all
-    poses, where the motion has only some of them.
+    `along` is the motion between the poses, None of listed poses and grids.
     """
     study, poses, errors, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
-    sums = totals(errors, poses.designs, valid) if sums is None else sums
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
     at = poses.values[swept] if swept is not None else poses.numbers
     numbers = np.full((4, poses.designs, len(errors)), np.nan)
@@ -112,7 +109,7 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
         some = counted.any(axis=1)
         values = np.where(counted, error.values.reshape(shape), 0.0)[some]
         worst = np.where(counted[some], np.abs(values), -1.0).argmax(axis=1)
-        lane, (count, total, squares) = np.arange(len(worst)), sums[:, some, k]
+        lane, (count, total, squares) = np.arange(len(worst)), motion.sums[:, some, k]
         numbers[:, some, k] = (
             np.sqrt(squares / count),
             total / count,
@@ -120,8 +117,7 @@ def targets_table(motion: Motion, along: Along | None, sums: Floats | None = Non
             at.reshape(shape)[some][lane, worst],
         )
         if along is not None and error.name in along.columns:
-            size = {"length": study.mechanism.size, "angle": 2 * np.pi / study.units.angle_factor}
-            still = STILL * size.get(error.quantity, 1.0)
+            still = STILL * motion.question.sizes.get(error.quantity, 1.0)
             value, place = along.worst(error.name, 1, absolute=True, still=still)
             between = np.stack([
                 np.sqrt(along.mean(error.name, 2)), along.mean(error.name), value,

@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.along import Along, of_swept, over
 from mechdesign.analyses.kinematics.columns import LOOPS, TOGGLES
-from mechdesign.analyses.kinematics.motion import MotionQuestion
+from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.poses import SolvedPoses, solve_poses
 from mechdesign.curve.functions import Zeros
 from mechdesign.mechanism import Mechanism

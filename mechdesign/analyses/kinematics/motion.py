@@ -5,44 +5,27 @@ At a change point that the motion follows, values are interpolated from poses on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.columns import DRIVE, VALID, power_of_length
 from mechdesign.analyses.kinematics.columns import MOTION
-from mechdesign.analyses.kinematics.instant_centres import Centre
-from mechdesign.analyses.kinematics.rates import drive_rates, of_given
-from mechdesign.analyses.kinematics.targets import Error, errors, needed
-from mechdesign.analyses.poses import (
-    SolvedPoses,
-    expand_outputs,
-    followed_angles,
-    in_study_units,
-    pose_columns,
-    radians,
-    solve_poses,
-    study_poses,
-)
-from mechdesign.curve.motion import Curve
-from mechdesign.errors import counted
-from mechdesign.mechanism import Mechanism, Reason
+from mechdesign.analyses.kinematics.question import MotionQuestion, characteristic_length
+from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.kinematics.targets import Error, errors, totals
+from mechdesign.analyses.poses import SolvedPoses, in_study_units, pose_columns, radians, solve_poses
+from mechdesign.mechanism import Reason
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
-from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Quantity
 from mechdesign.mechanism.outputs import Rates, first, second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Column
-from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.checker import ORDERS
-from mechdesign.study.schema.poses import KinematicsSection
 
 # Poses with a conditioning below this have lost digits.
 NEAR_SINGULAR = 1e-3
@@ -55,217 +38,19 @@ STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
 STANDS_STILL = 1e-12
 
 
-def default_outputs(mechanism: Mechanism) -> tuple[str, ...]:
-    """Every moving point, link and slide."""
-    graph = mechanism.graph
-    still = {point for body, point in graph.points if body == GROUND}
-    points = [point for point in mechanism.points if point not in still]
-    moving = [name for name in mechanism.description.links if name != GROUND and graph.bodies[name][0] != 0]
-    slides = [f"{name}.{'length' if k in graph.telescopic else 'slide'}" for k, name in enumerate(graph.slides)]
-    return (*points, *(f"{link}.angle" for link in moving), *slides)
-
-
-def characteristic_length(study: Study) -> float | None:
-    """Length that turns angles into lengths, from the section of kinematics or workspace."""
-    for section in (study.kinematics, study.workspace):
-        if section is not None and section.characteristic_length is not None:
-            return section.characteristic_length
-    return None
-
-
-@dataclass(frozen=True)
-class Static:
-    """A drive's effort or a mechanical advantage: the name of its column, its unit, and how it is declared."""
-
-    name: str
-    unit: str
-    kind: str
-    words: Mapping[str, str]  # at the places of the kind
-
-
-@dataclass(frozen=True, eq=False)
-class MotionQuestion:
-    """What a study asks of every pose.
-
-    Parameters
-    ----------
-    outputs : list of Coordinate
-        Outputs in the tables: those that the study names, then others that have a target.
-    listed : list of Coordinate
-        Rows of the Jacobian, which is wanted where it is `square`: where the study names as many of them (or of the
-        outputs) as drives.
-    watched : list of Coordinate
-        All coordinates whose values are needed: drives, outputs, those that targets depend on, and the angles in
-        expressions of these and of limits.
-    of_given : bool
-        Whether rates and accelerations are those of the given coordinates rather than of the drives.
-    """
-
-    study: Study
-    section: KinematicsSection
-    poses: Poses
-    outputs: list[Coordinate]
-    listed: list[Coordinate]
-    square: bool
-    watched: list[Coordinate]
-    of_given: bool
-
-    @property
-    def drives(self) -> list[Coordinate]:
-        """The mechanism's drives."""
-        return [self.study.mechanism.coordinate(name) for name in self.study.mechanism.drives]
-
-    @property
-    def centres(self) -> list[Centre]:
-        """Pairs of links whose instant centres are asked."""
-        return [Centre(*pair) for pair in self.section.instant_centres]
-
-    @property
-    def statics(self) -> list[Static]:
-        """Efforts of the drives, where there are loads, and mechanical advantages."""
-        label, found = self.study.units.label, []
-        for drive in self.drives if self.section.loads else ():
-            unit = label("moment" if drive.quantity == "angle" else "force")
-            found.append(Static(f"{drive.name}_effort", unit, "<drive>_effort", {"drive": drive.name}))
-        for name, given in self.section.mechanical_advantage.items():
-            units = {"length": label("length"), "angle": ""}
-            above, below = (units[self.study.mechanism.quantity(each)] for each in (given, name))
-            unit = "" if above == below else above or f"1/{below}"
-            words = {"output": name, "input": given}
-            found.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
-        return found
-
-    @property
-    def orders(self) -> dict[str, tuple[Quantity, int]]:
-        """Columns of velocities and accelerations, where the study gives rates: of what quantity, and which order."""
-        asked = self.section.rates or self.section.accelerations or self.section.speed
-        moving = {output.name: output for output in [*(self.drives if self.of_given else []), *self.outputs]}
-        return {
-            f"{output.name}_{word}": (output.quantity, order)
-            for output in (moving.values() if asked else ())
-            for order, word in ((1, "velocity"), (2, "acceleration"))
-        }
-
-    @property
-    def rates(self) -> dict[str, str]:
-        """Units of the columns of velocities and accelerations."""
-        label = self.study.units.label
-        return {
-            name: label(ORDERS[quantity][order]) if quantity in ORDERS else ""
-            for name, (quantity, order) in self.orders.items()
-        }
-
-    @property
-    def tempo(self) -> float:
-        """About how fast the mechanism moves: radians, or sizes of it, in a unit of time."""
-        section, mechanism, size = self.section, self.study.mechanism, self.study.mechanism.size or 1.0
-        units = {"angle": self.study.units.angle_factor, "length": 1 / size}
-        found = [(section.speed or 0.0) / size]
-        for rates, order in ((section.rates, 1), (section.accelerations, 2)):
-            found += [
-                abs(rate * units.get(mechanism.quantity(name), 1.0)) ** (1 / order) for name, rate in rates.items()
-            ]
-        return max(found)
-
-    @cached_property
-    def curve(self) -> Curve | None:
-        """The motion that the poses are, with its angles; None of listed poses and grids."""
-        if not self.poses.followed:
-            return None
-        mechanism = self.study.mechanism
-        plan = mechanism.plan(self.poses.groups[0].names)
-        return Curve(self.study, self.poses, followed_angles(mechanism, plan, self.watched))
-
-    def lean(self, names: Collection[str]) -> MotionQuestion:
-        """The question with nothing but what some columns, and the targets of errors among them, need."""
-        section, unasked = self.section, dict[str, object]()
-        centres = [
-            pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
-        ]
-        rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        if not rates:
-            unasked |= {"rates": {}, "accelerations": {}, "speed": None}
-        if not any(static.name in names for static in self.statics):
-            unasked |= {"loads": (), "mechanical_advantage": {}}
-        square = self.square and any(name in ("det_J", "inverse_condition") or "_by_" in name for name in names)
-        errors = any(name.endswith("_error") for name in names)
-        values = {*names, *(needed(self.study, self.poses) if errors else ())}
-        return replace(
-            self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
-            watched=[coordinate for coordinate in self.watched if coordinate.name in values],
-            of_given=self.of_given and rates,
-        )  # fmt: skip
-
-    @property
-    def mixed(self) -> bool:
-        """Whether the Jacobian mixes lengths and angles, and the study gives no length that makes them comparable."""
-        return self.square and mixes(self.listed, self.drives) and characteristic_length(self.study) is None
-
-    @property
-    def absent(self) -> Mapping[str, str]:
-        """Columns and tables of the Jacobian that have no values: why, and what to write for them."""
-        if self.square:
-            words = "J mixes lengths and angles; give kinematics.characteristic_length"
-            return {"inverse_condition": words} if self.mixed else {}
-        study, drives = self.study, self.study.mechanism.drives
-        # One point, then angles; of outputs that are left out the last, as the end of a chain.
-        named, others = self.section.outputs or (), default_outputs(study.mechanism)[::-1]
-        known = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
-        node = next((c.node for c in known.values() if c.kind in ("x", "y")), -1)
-        picked = sorted(known, key=lambda name: (known[name].node != node, known[name].kind != "angle"))[: len(drives)]
-        points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
-        rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
-        given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
-        words = f"{given} for {counted(len(drives), 'drive')}; name as many"
-        if not named:
-            words = f"no outputs are named; name as many as there are drives, {len(drives)},"
-        words += f" by kinematics.jacobian: [{', '.join(rows)}]"
-        return dict.fromkeys(("det_J", "inverse_condition", "jacobian"), words)
-
-
-def motion_question(study: Study, poses: Poses | None = None) -> MotionQuestion:
-    """Read a study's questions about its motion, at its own poses or at some others.
-
-    Raises
-    ------
-    MechanismError
-        If an output does not exist.
-    StudyError
-        If no poses are given and none can be assumed.
-    """
-    section = study.kinematics or KinematicsSection()
-    mechanism, poses = study.mechanism, study_poses(study, "kinematics") if poses is None else poses
-    outputs = expand_outputs(study, section.outputs or default_outputs(mechanism))
-    listed = outputs if section.jacobian is None else expand_outputs(study, section.jacobian)
-    shown = {output.name: output for output in outputs}
-    for target in study.targets.values():
-        shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
-    names = dict.fromkeys([*mechanism.drives, *shown, *needed(study, poses)])
-    watched = {name: mechanism.coordinate(name) for name in names}
-    return MotionQuestion(
-        study,
-        section,
-        poses,
-        list(shown.values()),
-        listed,
-        (section.outputs or section.jacobian) is not None and len(listed) == len(mechanism.drives),
-        list((watched | angles_of([*watched.values(), *mechanism.counting])).values()),
-        of_given(study, section),
-    )
-
-
 @dataclass
 class Motion:
     """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
 
-    `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets; `smooth` are poses at a change
-    point whose values are those of the motion that goes through it.
+    `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets and `sums` their `totals`; `smooth`
+    are poses at a change point whose values are those of the motion that goes through it.
     """
 
     question: MotionQuestion
     arrays: dict[str, Floats] = field(default_factory=dict)
     reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     errors: list[Error] = field(default_factory=list)
+    sums: Floats = field(default_factory=lambda: np.zeros(()))
     smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
@@ -352,6 +137,7 @@ class Motion:
         """What is known only when all poses are there: change points, and errors; `rows` are their rows of `poses`."""
         _through_change_points(self)
         self.errors = list(errors(self.question.study, poses, self.arrays, rows))
+        self.sums = totals(self.errors, poses.designs, self.valid)
 
     def columns(self) -> list[Column]:
         """The columns of the motion table, `valid` last."""

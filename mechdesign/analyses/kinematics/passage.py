@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics import targets
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion, move, pieces
+from mechdesign.analyses.kinematics.motion import Motion, move, pieces
+from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.kinematics.targets import Error
 from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown, SolvedPoses
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Flags, Ints
 from mechdesign.progress import Progress
 from mechdesign.results import LongTable, Scope, Table
 
@@ -44,8 +44,6 @@ class Passage:
         Of all poses; see `mechdesign.mechanism.Reason`.
     marks : list of mapping of str to Mark
         By design, what is to be said of how many of all poses.
-    sums : ndarray
-        `mechdesign.analyses.kinematics.targets.totals` of all poses.
     solved : list of SolvedPoses
         The poses themselves, of designs with dimensions of their own; else empty.
     """
@@ -55,7 +53,6 @@ class Passage:
     shown: Shown
     reason: NDArray[np.int8]
     marks: Sequence[Mapping[str, Mark]]
-    sums: Floats
     solved: Sequence[SolvedPoses]
 
     @property
@@ -92,25 +89,23 @@ def pass_over(question: MotionQuestion, marks: Marks, progress: Progress, jobs: 
 
         motion = move(question, progress, jobs, also=keep)
         flags = {name: where.reshape(poses.designs, -1) for name, where in marks(motion).items()}
-        told = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
-        sums = targets.totals(motion.errors, poses.designs, motion.valid)
-        return Passage(question, motion, keeper.shown, motion.reason, told, sums, solved)
+        counts = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
+        return Passage(question, motion, keeper.shown, motion.reason, counts, solved)
     picked = _Picked(question, keeper.rows)
-    reason, known, sums = np.empty(poses.count, dtype=np.int8), dict[str, Mark](), np.zeros(())
+    reason, known = np.empty(poses.count, dtype=np.int8), dict[str, Mark]()
     for part, motion in pieces(question, jobs):
         reason[part.rows] = motion.reason
         begin = int(part.rows[0])
         for name, where in marks(motion).items():
             new, old = _mark(where, begin), known.get(name, Mark(0, -1))
             known[name] = Mark(old.number + new.number, old.first if old.number else new.first)
-        sums = sums + targets.totals(motion.errors, 1, motion.valid)
         picked.add(begin, motion)
         keeper.keep(part)
         progress.update(len(part.rows))
     motion, shown = picked.motion(), keeper.shown
     assert motion.question.poses.rows is not None
     rows = np.searchsorted(motion.question.poses.rows, shown.rows)
-    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, [known], sums, [])
+    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, [known], [])
 
 
 def _is_long(question: MotionQuestion) -> bool:
@@ -152,7 +147,8 @@ class _Picked:
         errors = [Error(error.output, error.quantity, error.values[kept]) for error in motion.errors]
         arrays = {name: values[kept] for name, values in motion.arrays.items()}
         self._rows.append(rows[kept])
-        self._motions.append(Motion(self.question, arrays, motion.reason[kept], errors, motion.smooth[kept]))
+        part = Motion(self.question, arrays, motion.reason[kept], errors, motion.sums, motion.smooth[kept])
+        self._motions.append(part)
 
     def motion(self) -> Motion:
         """The motion of all poses that were kept."""
@@ -166,5 +162,6 @@ class _Picked:
                 replace(error, values=np.concatenate([part.errors[k].values for part in parts]))
                 for k, error in enumerate(parts[0].errors)
             ],
+            sum((part.sums for part in parts), np.zeros(())),
             np.concatenate([part.smooth for part in parts]),
         )

@@ -106,13 +106,20 @@ def _inverted(mechanism: Mechanism, linear: Linearization, given: Sequence[Coord
 
     It is so by its determinant over the lengths of its rows (at least 1), all without units.
     """
-    matrix, size = Jacobian.of(linear, given).matrix, mechanism.size
-    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
-    columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
-    pure = matrix * rows[:, None] * columns
+    matrix, pure = unitless(mechanism, linear, given)
     lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
         return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
+
+
+def unitless(
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Jacobian of some coordinates by the drives, and the same with lengths in sizes of the mechanism."""
+    matrix, size = Jacobian.of(linear, given).matrix, mechanism.size
+    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
+    columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
+    return matrix, matrix * rows[:, None] * columns
 
 
 def _solve(matrix: Floats, good: Flags, right: Sequence[Value]) -> list[Floats]:

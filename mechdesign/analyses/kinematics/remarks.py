@@ -8,8 +8,9 @@ import numpy as np
 
 from mechdesign.analyses.kinematics import targets
 from mechdesign.analyses.kinematics.instant_centres import REST, TRANSLATION
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
+from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.passage import Mark
+from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.poses import POSES_AT_ONCE, pose_in_words
 from mechdesign.cautions import Caution
 from mechdesign.errors import counted

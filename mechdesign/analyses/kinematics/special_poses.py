@@ -13,7 +13,8 @@ from mechdesign.analyses.kinematics.along import Along
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.limits import Limit
 from mechdesign.analyses.kinematics.loops import Toggle
-from mechdesign.analyses.kinematics.motion import Motion, MotionQuestion
+from mechdesign.analyses.kinematics.motion import Motion
+from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.kinematics.rates import drive_rates
 from mechdesign.analyses.poses import Shown, SolvedPoses, pose_in_words
 from mechdesign.mechanism import Configuration

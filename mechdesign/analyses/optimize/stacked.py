@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.kinematics.along import Along
-from mechdesign.analyses.kinematics.answers import along_of
+from mechdesign.analyses.kinematics.along import Along, along_of
 from mechdesign.analyses.kinematics.courses import course_of
 from mechdesign.analyses.kinematics.extremes import extremes, targets_table
 from mechdesign.analyses.kinematics.loops import loops_table, measured
-from mechdesign.analyses.kinematics.motion import motion_question, move
+from mechdesign.analyses.kinematics.motion import move
+from mechdesign.analyses.kinematics.question import motion_question
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE, pose_tables
-from mechdesign.analyses.kinematics.targets import followed
 from mechdesign.analyses.poses import SolvedPoses, alike, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
@@ -128,7 +127,7 @@ def tables(
         motion = move(motion_question(study, poses), also=solved.append)
         question, absent = motion.question, motion.question.absent
         loops = four_bars(study.mechanism) if "loops" in wanted else ()
-        errors = [name for name, _ in followed(study, poses)] if "targets" in wanted else []
+        errors = question.errors if "targets" in wanted else ()
         along = along_of(question, outputs, loops, also=errors, asked=asked)
         scope = Scope(course=partial(course_of, along)) if along is not None else None
         found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}

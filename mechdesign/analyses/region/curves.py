@@ -1,151 +1,24 @@
-"""The region of one design as patches between two boundary curves, grids of nodes in them, and the poses there."""
+"""Poses at the nodes of a grid that follows the boundary of a workspace."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple
-
 import numpy as np
 
-from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.pieces import Pieces, counted
-from mechdesign.analyses.region.rays import SAME_ROOT, SINGLE, Designs, ray_through
-from mechdesign.analyses.region.regions import RAYS, Region, regions
+from mechdesign.analyses.region.patches import GRID, patches
+from mechdesign.analyses.region.pieces import counted
+from mechdesign.analyses.region.rays import SINGLE, Designs
+from mechdesign.analyses.region.regions import RAYS, regions
 from mechdesign.errors import AssemblyError
-from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints, evenly
+from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses, Sector, Sectors
 
-# An interval is kept whose ends rounding has exchanged by up to this fraction of the reach.
-SLACK = 1e-9
-# Least number of rays of a panel.
-FEWEST = 25
-# Distances of a panel's first and last ray from its ends (fractions of the panel), tried one after the other while
-# these rays meet other intervals than the rest.
-BESIDE = (0.0, 1e-9, 1e-7, 1e-5)
-# Nodes of a map along each ray, from boundary to boundary.
-GRID = 33
-# Distance of the outermost nodes from the boundary, where an index may be infinite (fraction of the interval).
-INSET = 1e-6
-# Places of a ray's nodes between the two curves.
-FRACTIONS = np.clip(0.5 * (1 - np.cos(np.linspace(0, np.pi, GRID))), INSET, 1 - INSET)
 # Number of poses of all regions together, about: a question may be costly at each of them.
 MAX_POSES = 2000
 # Least number of rays of a patch.
 MIN_RAYS = 3
 # Least number of rays of a region: with fewer a map does not show its levels.
 ENOUGH_RAYS = 36
-
-
-class Edge(NamedTuple):
-    """A curve of a region's boundary: radii and places of shape (rays,), and the margin that is zero on it."""
-
-    side: str  # of the patch: ``inner`` or ``outer``
-    margin: int
-    radius: Floats
-    places: Complexes
-
-
-@dataclass(frozen=True, eq=False)
-class Patch:
-    """The part of the region between one inner and one outer curve, over one panel.
-
-    Parameters
-    ----------
-    about : complex
-        Centre of the rays.
-    theta, inner, outer : ndarray, shape (rays,)
-        Angles of the rays, and the radii of both curves there.
-    enters, leaves : int
-        Margins that are zero on them; -1 where the patch begins at the centre of the scan.
-    piece : int
-        Number of the piece of the region to which the patch belongs, from 1.
-    """
-
-    about: complex
-    theta: Floats
-    inner: Floats
-    outer: Floats
-    enters: int
-    leaves: int
-    piece: int = 1
-
-    @property
-    def edges(self) -> list[Edge]:
-        """Its curves that bound the region: not the centre of the rays, nor the ends of the scan."""
-        turn = np.exp(1j * self.theta)
-        both = (("inner", self.enters, self.inner), ("outer", self.leaves, self.outer))
-        return [Edge(side, margin, radius, self.about + radius * turn) for side, margin, radius in both if margin >= 0]
-
-    @property
-    def grid(self) -> Complexes:
-        """Nodes, shape (rays, GRID), denser towards both curves."""
-        radius = self.inner[:, None] + FRACTIONS * (self.outer - self.inner)[:, None]
-        return np.asarray(self.about + radius * np.exp(1j * self.theta)[:, None])
-
-    @property
-    def width(self) -> float:
-        """Length of the widest interval."""
-        return float(np.max(self.outer - self.inner))
-
-    @property
-    def middle(self) -> complex:
-        """The middle of the widest interval, a place inside the patch."""
-        k = int(np.argmax(self.outer - self.inner))
-        return complex(self.about + 0.5 * (self.inner[k] + self.outer[k]) * np.exp(1j * self.theta[k]))
-
-    def holds(self, z: Complexes) -> Flags:
-        """Which places lie in the patch, its curves being interpolated between the rays."""
-        radius, theta = np.abs(z - self.about), ray_through(z - self.about, self.theta[0])
-        inner, outer = np.interp(theta, self.theta, self.inner), np.interp(theta, self.theta, self.outer)
-        return np.asarray((theta <= self.theta[-1]) & (inner <= radius) & (radius <= outer))
-
-
-def patches(panels: Panels, rays: int) -> Iterator[Patch]:
-    """Patches of a single design, with about `rays` rays over all panels, among them the ends of each panel."""
-    total = float(np.sum(panels.high - panels.low))
-    for low, high in zip(panels.low, panels.high, strict=True):
-        number = max(FEWEST, round(rays * (high - low) / total) + 1)
-        # Denser towards the ends, where cusps are thin and corners sharp.
-        theta = 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.linspace(0, np.pi, number))
-        steps = np.zeros(2, dtype=np.intp)
-        for attempt in range(len(BESIDE)):
-            # At its very ends a panel may meet the intervals of its neighbour, or lack one that vanishes.
-            first, last = (high - low) * np.array(BESIDE)[steps]
-            angles = np.clip(theta, low + first, high - last)
-            traced = panels.trace(np.zeros(number, dtype=np.intp), angles, SLACK)
-            ray, inner, outer, enters, leaves = traced.whole(SAME_ROOT * float(panels.reach[0]))
-            counts = np.bincount(ray, minlength=number)
-            usual = _most(counts)
-            lost = counts[[0, -1]] != usual
-            if attempt == 0:
-                lost |= (traced.counts[[0, -1]] != traced.counts[number // 2]).any()
-            if not lost.any():
-                break
-            steps = np.minimum(steps + lost, len(BESIDE) - 1)
-        kept = np.flatnonzero(counts == usual)
-        begins = np.searchsorted(ray, kept)
-        for slot in range(usual):
-            row: Ints = begins + slot
-            ends = _most(enters[row]), _most(leaves[row])
-            yield Patch(panels.designs.about, angles[kept], inner[row], outer[row], *ends)
-
-
-def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
-    """Patches of a single design, piece by piece, with about `rays` rays over all panels."""
-    total = float(np.sum(pieces.panels.high - pieces.panels.low))
-    all_patches = []
-    for number, panels in enumerate(pieces.all(), start=1):
-        share = round(rays * float(np.sum(panels.high - panels.low)) / total)
-        all_patches += [replace(patch, piece=number) for patch in patches(panels, share)]
-    return all_patches
-
-
-def _most(values: Ints) -> int:
-    """The most frequent of values, one for each ray: a ray through a corner may meet another margin than the rest."""
-    names, counts = np.unique(values, return_counts=True)
-    return int(names[np.argmax(counts)])
 
 
 def workspace_nodes(study: Study) -> Poses:
@@ -164,18 +37,28 @@ def workspace_nodes(study: Study) -> Poses:
         If nothing is reachable.
     """
     all_regions = regions(study)
-    rays = max(ENOUGH_RAYS, MAX_POSES // GRID // len(all_regions))
+    most = max(ENOUGH_RAYS, MAX_POSES // GRID // len(all_regions))
     grids: list[Complexes] = []
-    sectors: list[Sectors] = []
+    all_sectors: list[Sectors] = []
     held: dict[str, list[Floats]] = {name: [] for name in all_regions[0].held}
     for region in all_regions:
         panels, _ = counted(Designs(region.field, {}, 1, region.about, region.scan, SINGLE))
         if not panels.closes[0]:
             continue
-        begin = len(grids)
-        sectors.append(_sectors(region, panels, rays, grids))
-        for name, value in region.held.items():
-            held[name].append(np.full(sum(grid.size for grid in grids[begin:]), value))
+        rays = region.rays or RAYS
+        coarse, finer = list(patches(panels, min(rays, most))), list(patches(panels, rays))
+        # A panel has `FEWEST` rays or more: where these are too many, some but the first and the last are left out.
+        total = sum(float(np.ptp(patch.theta)) for patch in coarse)
+        sectors = []
+        for patch, fine in zip(coarse, finer if len(finer) == len(coarse) else coarse, strict=True):
+            kept = evenly(len(patch.theta), max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total)))
+            begin = sum(len(grid) for grid in grids)
+            grids.append(patch.grid[kept])
+            sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid))
+            for name, value in region.held.items():
+                held[name].append(np.full(grids[-1].size, value))
+        outline = tuple(edge.places for patch in finer for edge in patch.edges)
+        all_sectors.append(Sectors(tuple(sectors), outline))
     if not grids:
         raise AssemblyError("poses: workspace has no node: nothing is reachable")
     z = np.concatenate([grid.ravel() for grid in grids])
@@ -183,23 +66,4 @@ def workspace_nodes(study: Study) -> Poses:
     values = {f"{point}.x": z.real, f"{point}.y": z.imag}
     values |= {name: np.concatenate(parts) for name, parts in held.items()}
     group = PoseGroup(tuple(values), values, np.arange(len(z)))
-    return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(sectors))
-
-
-def _sectors(region: Region, panels: Panels, most: int, grids: list[Complexes]) -> Sectors:
-    """The patches of one region as sectors; their nodes, on about `most` rays, are appended to `grids`.
-
-    Each grid is of shape (rays, GRID).
-    """
-    coarse = list(patches(panels, min(region.rays or RAYS, most)))
-    finer = list(patches(panels, region.rays or RAYS))
-    # Every panel has at least `FEWEST` rays: where these are too many, some but the first and the last are left out.
-    total = sum(float(np.ptp(patch.theta)) for patch in coarse)
-    sectors = []
-    for patch, fine in zip(coarse, finer if len(finer) == len(coarse) else coarse, strict=True):
-        number = max(MIN_RAYS, round(most * float(np.ptp(patch.theta)) / total))
-        kept = evenly(len(patch.theta), number)
-        begin = sum(len(grid) for grid in grids)
-        grids.append(patch.grid[kept])
-        sectors.append(Sector(slice(begin, begin + len(kept)), region.about, fine.grid))
-    return Sectors(tuple(sectors), tuple(edge.places for patch in finer for edge in patch.edges))
+    return Poses((group,), len(z), False, (len(z) // GRID, GRID), regions=tuple(all_sectors))

@@ -35,8 +35,8 @@ class Region:
         First and last angle of the rays (radians).
     rays : int or None
         Number of rays over the scan that the study sets; None where it leaves the choice to the analysis.
-    followed : mapping of str to Amount
-        Held values and characteristic length that follow parameters, by their names `HELD` and `LENGTH` of the field.
+    factors : sequence of float
+        Take the held values from the study's units to radians (1 for lengths).
     """
 
     field: Field
@@ -44,11 +44,22 @@ class Region:
     about: complex
     scan: tuple[float, float]
     rays: int | None
-    followed: dict[str, Amount]
+    factors: Sequence[float]
 
     def places(self, numbers: Numbers) -> dict[str, Floats]:
-        """Dimensions and numbers of the field that differ between designs, each of shape (designs,)."""
-        varying = {name: numbers.of(amount) for name, amount in self.followed.items() if numbers.moves(amount)}
+        """Dimensions and numbers of the field that differ between designs, each of shape (designs,).
+
+        Held values and the characteristic length may follow parameters: by `HELD` and `LENGTH`, their names in a field.
+        """
+        amounts = {f"{HELD}{k}": Amount.by("value*factor", value=value, factor=factor)
+                   for k, (value, factor) in enumerate(zip(self.held.values(), self.factors, strict=True))}  # fmt: skip
+        if self.field.length is not None:
+            amounts[LENGTH] = Amount.of(self.field.length)
+        varying = {
+            name: numbers.of(amount)
+            for name, amount in amounts.items()
+            if amount.expression is not None and numbers.moves(amount)
+        }
         return {**numbers.places, **varying}
 
 
@@ -64,6 +75,7 @@ def regions(study: Study) -> list[Region]:
     if section is None or section.point is None:
         raise problem(study, "point", "the point whose workspace is asked for is needed, e.g. {point: C}")
     mechanism, unit = study.mechanism, study.units.angle_factor
+    scan = _scan(section, unit)
     outputs = (f"{section.point}.x", f"{section.point}.y")
     if mechanism.mobility < 2:
         raise problem(
@@ -98,23 +110,10 @@ def regions(study: Study) -> list[Region]:
     return [
         Region(
             replace(field, held=tuple(v * f for v, f in zip(values, factors, strict=True))),
-            dict(zip(section.at, values, strict=True)), about, _scan(section, unit), section.scan.rays,
-            _followed(values, factors, section.characteristic_length),
+            dict(zip(section.at, values, strict=True)), about, scan, section.scan.rays, factors,
         )
         for values in itertools.product(*held)
     ]  # fmt: skip
-
-
-def _followed(held: Sequence[float], factors: Sequence[float], length: float | None) -> dict[str, Amount]:
-    """Held values and the characteristic length, as amounts, as far as they follow parameters.
-
-    `factors` take the held values from the study's units to radians (1 for lengths).
-    """
-    amounts = {f"{HELD}{k}": Amount.by("value*factor", value=v, factor=f)
-             for k, (v, f) in enumerate(zip(held, factors, strict=True))}  # fmt: skip
-    if length is not None:
-        amounts[LENGTH] = Amount.of(length)
-    return {name: amount for name, amount in amounts.items() if amount.expression is not None}
 
 
 def _scan(section: WorkspaceSection, unit: float) -> tuple[float, float]:

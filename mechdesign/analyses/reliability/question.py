@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.motion import default_outputs
-from mechdesign.analyses.poses import expand_outputs, radians
+from mechdesign.analyses.outputs import default_outputs, expand_outputs
+from mechdesign.analyses.poses import radians
 from mechdesign.analyses.reliability.laws import taken
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError

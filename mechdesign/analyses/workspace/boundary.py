@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechdesign.analyses.poses import radians
-from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.patches import Patch
 from mechdesign.analyses.workspace.ranged import Ranged
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.coordinates import Coordinate

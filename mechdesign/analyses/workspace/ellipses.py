@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.patches import Patch
 from mechdesign.analyses.workspace.local import Local
 from mechdesign.numerics.arrays import Complexes, Floats
 

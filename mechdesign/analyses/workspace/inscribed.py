@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.patches import Patch
 from mechdesign.analyses.region.rays import is_turn
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import Patch, patches_of_pieces
+from mechdesign.analyses.region.patches import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.answer import Evaluation, answer, area_beyond, areas

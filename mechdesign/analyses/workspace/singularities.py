@@ -12,8 +12,8 @@ from itertools import groupby
 
 import numpy as np
 
-from mechdesign.analyses.region.curves import GRID, Patch
 from mechdesign.analyses.region.field import Field
+from mechdesign.analyses.region.patches import GRID, Patch
 from mechdesign.analyses.workspace.ranged import Ranged
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.derivatives import determinants

@@ -11,7 +11,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from mechdesign.analyses.kinematics.rates import drive_rates
-from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
+from mechdesign.analyses.outputs import expand_outputs
+from mechdesign.analyses.poses import Shown, SolvedPoses
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
