@@ -86,10 +86,6 @@ class Along:
             structure = mechanism.forward.structure
             self._groups = [k for k, group in enumerate(structure.groups) if group.form != "place"]
         self._errors = any(name.endswith("_error") for name in columns)
-        # Of the question only what the columns need is computed.
-        self._lean = question.lean({*columns, *(name for each in asked for name in each.columns)})
-        angles = {angle.name for angle in curve.angles}
-        self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
         self._advantages = {
             f"{output}_advantage": (output, given)
             for output, given in question.section.mechanical_advantage.items()
@@ -97,6 +93,10 @@ class Along:
         }
         self._chains: dict[str, tuple[int, ...]] = {}
         divisors = self._divisors()
+        # Of the question only what the columns need is computed.
+        self._lean = question.lean({*columns, *(name for each in asked for name in each.columns)})
+        angles = {angle.name for angle in curve.angles}
+        self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
         below = {name for powers in divisors.values() for name, _ in powers}
         integrals = {each.column for each in whole if each.integral}
         functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.analyses.kinematics.motion import Motion, move, pieces
+from mechdesign.analyses.kinematics.picked import Picked
 from mechdesign.analyses.kinematics.question import MotionQuestion
-from mechdesign.analyses.kinematics.targets import Error
 from mechdesign.analyses.poses import POSES_AT_ONCE, Keeper, Shown, SolvedPoses
-from mechdesign.numerics.arrays import Flags, Ints
+from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import Progress
 from mechdesign.results import LongTable, Scope, Table
 
@@ -91,7 +91,7 @@ def pass_over(question: MotionQuestion, marks: Marks, progress: Progress, jobs: 
         flags = {name: where.reshape(poses.designs, -1) for name, where in marks(motion).items()}
         counts = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
         return Passage(question, motion, keeper.shown, motion.reason, counts, solved)
-    picked = _Picked(question, keeper.rows)
+    picked = Picked(question, keeper.rows)
     reason, known = np.empty(poses.count, dtype=np.int8), dict[str, Mark]()
     for part, motion in pieces(question, jobs):
         reason[part.rows] = motion.reason
@@ -118,50 +118,3 @@ def _is_long(question: MotionQuestion) -> bool:
 
 def _mark(where: Flags, begin: int) -> Mark:
     return Mark(int(np.count_nonzero(where)), begin + int(where.argmax()))
-
-
-@dataclass
-class _Picked:
-    """Those poses of a long motion that stay in memory: the ones shown, and where something changes."""
-
-    question: MotionQuestion
-    shown: Ints
-    _rows: list[Ints] = field(default_factory=list)
-    _motions: list[Motion] = field(default_factory=list)
-
-    def add(self, begin: int, motion: Motion) -> None:
-        """Take over the poses of the next piece, which begins with the row `begin`."""
-        rows = begin + np.arange(len(motion.reason))
-        some = np.isin(rows, self.shown)
-        # Changes between two pieces lie between their ends.
-        some[[0, -1]] = True
-        changes = motion.valid[1:] != motion.valid[:-1]
-        some[1:] |= changes
-        some[:-1] |= changes
-        for values in [*motion.arrays.values(), *(error.values for error in motion.errors)]:
-            known = motion.valid & np.isfinite(values)
-            if known.any():
-                low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
-                some[[low.argmin(), high.argmax(), known.argmax()]] = True
-        kept = np.flatnonzero(some)
-        errors = [Error(error.output, error.quantity, error.values[kept]) for error in motion.errors]
-        arrays = {name: values[kept] for name, values in motion.arrays.items()}
-        self._rows.append(rows[kept])
-        part = Motion(self.question, arrays, motion.reason[kept], errors, motion.sums, motion.smooth[kept])
-        self._motions.append(part)
-
-    def motion(self) -> Motion:
-        """The motion of all poses that were kept."""
-        parts = self._motions
-        poses = self.question.poses.take(np.concatenate(self._rows))
-        return Motion(
-            replace(self.question, poses=poses),
-            {name: np.concatenate([part.arrays[name] for part in parts]) for name in parts[0].arrays},
-            np.concatenate([part.reason for part in parts]),
-            [
-                replace(error, values=np.concatenate([part.errors[k].values for part in parts]))
-                for k, error in enumerate(parts[0].errors)
-            ],
-            sum((part.sums for part in parts), np.zeros(())),
-            np.concatenate([part.smooth for part in parts]),
-        )

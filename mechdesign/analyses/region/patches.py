@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.analyses.region.panels import Panels
-from mechdesign.analyses.region.pieces import Pieces
 from mechdesign.analyses.region.rays import SAME_ROOT, ray_through
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
@@ -122,11 +121,11 @@ def patches(panels: Panels, rays: int) -> Iterator[Patch]:
             yield Patch(panels.designs.about, angles[kept], inner[row], outer[row], *ends)
 
 
-def patches_of_pieces(pieces: Pieces, rays: int) -> list[Patch]:
-    """Patches of a single design, piece by piece, with about `rays` rays over all panels."""
-    total = float(np.sum(pieces.panels.high - pieces.panels.low))
+def patches_of_pieces(whole: Panels, pieces: Iterable[Panels], rays: int) -> list[Patch]:
+    """Patches of a single design, by the panels of each piece, with about `rays` rays over the whole of them."""
+    total = float(np.sum(whole.high - whole.low))
     all_patches = []
-    for number, panels in enumerate(pieces.all(), start=1):
+    for number, panels in enumerate(pieces, start=1):
         share = round(rays * float(np.sum(panels.high - panels.low)) / total)
         all_patches += [replace(patch, piece=number) for patch in patches(panels, share)]
     return all_patches

@@ -95,21 +95,8 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     return Evaluation(values, errors, panels, pieces)
 
 
-def areas(question: Question, given: Evaluation) -> list[float]:
-    """Area of each piece of a single design's region."""
-    assert given.pieces is not None
-    whole = float(given.values["area"][0])
-    if given.pieces.number[0] == 1:
-        return [whole]
-    none = np.zeros((0, 1), dtype=bool)
-    return [
-        float(integrate(part, question.tolerance, question.scan, (), none, whole).area[0])
-        for part in given.pieces.all()
-    ]
-
-
-def area_beyond(question: Question, areas: Sequence[float]) -> float:
-    """Area that a region has in the other assembly, beside its pieces in the sketch's; 0 where it has no end there.
+def area_in_any_assembly(question: Question) -> float:
+    """Area of a region in both assemblies; 0 where it has no end there, and where no assembly bounds it.
 
     It is looked for as loosely as of a design of many.
     """
@@ -118,9 +105,18 @@ def area_beyond(question: Question, areas: Sequence[float]) -> float:
     both = replace(question.field, same_assembly=False)
     every = replace(question, field=both, indices=(), wanted=("area",), rule="gauss", tolerance=LOOSE)
     try:
-        return float(answer(every, {}, 1, BATCH).values["area"][0]) - sum(areas)
+        return float(answer(every, {}, 1, BATCH).values["area"][0])
     except AssemblyError:
         return 0.0
+
+
+def areas(question: Question, given: Evaluation, parts: Sequence[Panels]) -> list[float]:
+    """Area of each piece of a single design's region; `parts` are the panels of each."""
+    whole = float(given.values["area"][0])
+    if len(parts) == 1:
+        return [whole]
+    none = np.zeros((0, 1), dtype=bool)
+    return [float(integrate(part, question.tolerance, question.scan, (), none, whole).area[0]) for part in parts]
 
 
 def _spread(

@@ -134,21 +134,23 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     over = {} if section is None else {name: values for name, values in section.at.items() if isinstance(values, Over)}
     for name, values in over.items():
         return list(_over_range(study, name, values, tolerance, OF_RANGE if wanted is None else wanted))
+    if section is not None and wanted is None:
+        wanted = columns(USUAL if section.indices is None else section.indices)
     found = regions(study)
     assert section is not None
+    assert wanted is not None
     (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
         raise problem(study, "margin", "the margin leaves nothing of the scan; give a smaller one")
     integrate_by = section.integrate
     if "tolerance" in integrate_by.model_fields_set:
         tolerance = integrate_by.tolerance
-    wanted = columns(USUAL if section.indices is None else section.indices) if wanted is None else tuple(wanted)
     names = [name for name in dict.fromkeys(split(column)[0] for column in wanted) if name]
     ready = {index.name: index for index in prepare(study, list(dict.fromkeys([*MEANS.values(), *names])))}
     counted, indices = (start + margin, stop - margin), tuple(ready[name] for name in names)
     return [
         Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
-                 nodes=integrate_by.nodes, indices=indices, wanted=wanted, shown=tuple(ready.values()))
+                 nodes=integrate_by.nodes, indices=indices, wanted=tuple(wanted), shown=tuple(ready.values()))
         for region in found
     ]  # fmt: skip
 

@@ -10,7 +10,7 @@ import numpy as np
 from mechdesign.analyses.region.patches import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
-from mechdesign.analyses.workspace.answer import Evaluation, answer, area_beyond, areas
+from mechdesign.analyses.workspace.answer import Evaluation, answer, area_in_any_assembly, areas
 from mechdesign.analyses.workspace.boundary import Boundary, boundary_of
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
 from mechdesign.analyses.workspace.nodes import Nodes, nodes_of
@@ -33,8 +33,8 @@ class Reached:
         Whether every pose is a forward singularity; indices have no value then, and all assemblies count.
     areas : sequence of float
         Area of each piece.
-    beyond : float
-        Area that lies in the other assembly; 0 where that is not looked for, or has no end.
+    everywhere : float
+        Area in both assemblies; 0 where that is not looked for, or has no end.
     shapes : ndarray
         The largest circle and rectangle inside, as `INSCRIBED` names them; nan where they were not found.
     loci : sequence of Locus
@@ -46,11 +46,16 @@ class Reached:
     singular: bool = False
     patches: Sequence[Patch] = ()
     areas: Sequence[float] = ()
-    beyond: float = 0.0
+    everywhere: float = 0.0
     shapes: Floats = field(default_factory=lambda: np.full(len(INSCRIBED), np.nan))
     loci: Sequence[Locus] = ()
     boundary: Boundary | None = None
     nodes: Nodes | None = None
+
+    @property
+    def beyond(self) -> float:
+        """Area that lies in the other assembly, if any."""
+        return self.everywhere - sum(self.areas)
 
 
 def reach(question: Question) -> Reached:
@@ -73,13 +78,13 @@ def reach(question: Question) -> Reached:
         given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
     else:
         given = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)
-    full, field = bool(given.panels.closes[0]), question.field
-    pieces = areas(question, given) if full else []
-    beyond = 0.0 if ranged else area_beyond(question, pieces)
-    if not full or given.pieces is None:
-        return Reached(question, given, singular, beyond=beyond)
-    patches, told = patches_of_pieces(given.pieces, question.rays or RAYS), causes(field)
-    known = Reached(question, given, singular, patches, pieces, beyond, boundary=boundary_of(field, patches, told))
+    everywhere = 0.0 if ranged else area_in_any_assembly(question)
+    if not given.panels.closes[0] or given.pieces is None:
+        return Reached(question, given, singular, everywhere=everywhere)
+    field, parts = question.field, list(given.pieces.all())
+    pieces = areas(question, given, parts)
+    patches, told = patches_of_pieces(given.pieces.panels, parts, question.rays or RAYS), causes(field)
+    known = Reached(question, given, singular, patches, pieces, everywhere, boundary=boundary_of(field, patches, told))
     if ranged:
         return known
     counted = [patch for patch in patches if patch.piece == 1 or not field.same_assembly]

@@ -187,6 +187,10 @@ def evaluate(designs: Designs, integrands: Sequence[Integrand], segments: Parts)
         gap = np.minimum(NEAREST * outer, 0.5 * (outer - inner))
         r = np.clip(r, inner + gap, outer - gap)
         local = Local.on_rays(designs, part["design"], part["theta"], r)
+        if not designs.field.same_assembly:
+            crossing[at] = _sign_change(np.broadcast_to(v, r.shape), _inverse_determinant(local, r.shape))
+        if len(local.homogeneous) == 2:
+            uneven[at], place[at] = _evenest(r, _unevenness(local))
         # The strip of the block's first segment may have begun before.
         begin, end = np.searchsorted(first, k, side="right") - 1, np.searchsorted(first, k + len(part))
         begins = np.maximum(first[begin:end] - k, 0)
@@ -196,10 +200,6 @@ def evaluate(designs: Designs, integrands: Sequence[Integrand], segments: Parts)
             values = values * measure
             value[j, at], doubt[j, at] = RADII.apply(values)
             sums[j, :, begin:end] += np.add.reduceat(values * part["weight"], begins, axis=1)
-        if not designs.field.same_assembly:
-            crossing[at] = _sign_change(np.broadcast_to(v, r.shape), _inverse_determinant(local, r.shape))
-        if len(local.homogeneous) == 2:
-            uneven[at], place[at] = _evenest(r, _unevenness(local))
     error = np.array([RADII.apply(row)[1] for row in sums]).reshape(len(integrands), len(first))
     with np.errstate(divide="ignore", invalid="ignore"):
         # What an inverse square root has within `NEAREST` of the boundary.
