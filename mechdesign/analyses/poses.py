@@ -65,9 +65,9 @@ def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
 
             return workspace_nodes(study)
         if asked is not None:
-            found = expand(asked, study.folder, numbers)
-            if found is not None:
-                return found
+            poses = expand(asked, study.folder, numbers)
+            if poses is not None:
+                return poses
     return default(study.mechanism.description, numbers)
 
 
@@ -127,7 +127,6 @@ def _solve_group(
     angles = [] if poses.listed else followed_angles(mechanism, plan, wanted)
     if angles and curve is None:
         curve = Curve(study, poses, angles)
-    turns = _Turns(study, poses, angles, curve)
 
     def at(piece: slice) -> Configuration:
         """Poses of some rows, not yet judged by the limits."""
@@ -137,6 +136,7 @@ def _solve_group(
         start = starts(mechanism, poses, rows) if plan.iterative else None
         return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
 
+    turns = _Turns(study, poses, angles, curve)
     for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
         near = turns.near(group.rows[piece], configuration)
         configuration = replace(
@@ -150,8 +150,8 @@ def followed_angles(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinat
     """Angles whose turns only the motion gives: not those given, nor drives whose limits leave them one turn."""
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
-    found = angles_of([*wanted, *mechanism.counting])
-    return [angle for name, angle in found.items() if name not in plan.counted | settled]
+    angles = angles_of([*wanted, *mechanism.counting])
+    return [angle for name, angle in angles.items() if name not in plan.counted | settled]
 
 
 class _Turns:
@@ -160,34 +160,35 @@ class _Turns:
     def __init__(self, study: Study, poses: Poses, angles: Sequence[Coordinate], curve: Curve | None) -> None:
         self.study, self.poses, self.angles, self.curve = study, poses, angles, curve
         self._last = np.zeros(len(angles))
-        self._grid: Floats | None = None
-        if angles and curve is not None and len(poses.grid) > 1:
-            self._grid = self._across(curve)
 
     def near(self, rows: Ints, configuration: Configuration) -> dict[str, Floats]:
         if self.curve is None or not self.angles:
             return {}
-        if self._grid is not None:
-            return dict(zip((angle.name for angle in self.angles), self._grid[:, rows], strict=True))
-        line, s = np.divmod(rows, self.poses.line)
-        table = np.nan_to_num(self.curve.beside(line, s.astype(float)))
-        if self.curve.spent.any():
-            # Of what is not followed between the poses an angle goes the nearest way.
-            table = np.where(self.curve.spent[line], self._nearest(configuration), table)
+        if len(self.poses.grid) > 1:
+            table = self._grid[:, rows]
+        else:
+            line, s = np.divmod(rows, self.poses.line)
+            table = np.nan_to_num(self.curve.beside(line, s.astype(float)))
+            if self.curve.spent.any():
+                # Of a motion that is not followed between its poses an angle goes the nearest way.
+                table = np.where(self.curve.spent[line], self._nearest(configuration), table)
         return dict(zip((angle.name for angle in self.angles), table, strict=True))
 
     def _nearest(self, configuration: Configuration) -> Floats:
-        found = np.empty((len(self.angles), *configuration.shape))
+        """Angles of poses, each in the turn that is nearest to the pose before it."""
+        table = np.empty((len(self.angles), *configuration.shape))
         for k, angle in enumerate(self.angles):
             values = np.array(np.broadcast_to(configuration.value(angle), configuration.shape))
-            known = np.isfinite(values)
-            values[known] = np.unwrap(np.append(self._last[k], values[known]), period=angle.turn)[1:]
-            found[k], self._last[k] = values, values[known][-1] if known.any() else self._last[k]
-        return found
+            valid = np.isfinite(values)
+            values[valid] = np.unwrap(np.append(self._last[k], values[valid]), period=angle.turn)[1:]
+            table[k], self._last[k] = values, values[valid][-1] if valid.any() else self._last[k]
+        return table
 
-    def _across(self, curve: Curve) -> Floats:
+    @cached_property
+    def _grid(self) -> Floats:
         """Angles of a grid of rows, without whole turns between its lines; drives within their limits."""
-        mechanism, poses = self.study.mechanism, self.poses
+        mechanism, poses, curve = self.study.mechanism, self.poses, self.curve
+        assert curve is not None
         line, s = np.divmod(np.arange(poses.count), poses.line)
         table = curve.turned(line, s.astype(float))
         table[:, ~curve.holds(line, s.astype(float))] = np.nan

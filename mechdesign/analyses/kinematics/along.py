@@ -60,7 +60,7 @@ class Along:
         loops: Sequence[FourBar] = (), *, also: Collection[str] = (), asked: Collection[Asked] = (),
         toggles: bool = False, passages: bool = False,
     ) -> None:  # fmt: skip
-        self.question, self.curve, self.ends = question, curve, Ends(curve)
+        self.question, self.curve = question, curve
         self._loops, self._toggles = loops, toggles
         mechanism, sizes = question.study.mechanism, question.sizes
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
@@ -119,6 +119,11 @@ class Along:
         )  # fmt: skip
 
     @cached_property
+    def ends(self) -> Ends:
+        """Where the motions end."""
+        return Ends(self.curve)
+
+    @cached_property
     def functions(self) -> Functions:
         """The functions, followed where they matter."""
         return self._follow()
@@ -127,14 +132,14 @@ class Along:
         """What functions with poles are divided by, and how often."""
         question = self.question
         rates = INVERSE if question.of_given else FORWARD
-        found = {static.name: [(FORWARD, 1)] for static in question.statics}
-        found |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
+        divisors = {static.name: [(FORWARD, 1)] for static in question.statics}
+        divisors |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
         for name in self._others:
             output, _, order = name.rpartition("_")
             if order in (powers := {"velocity": 1, "acceleration": 3}):
-                found[name] = [(rates if question.of_given else self._chain(output), powers[order])]
-        found |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
-        return {name: divisor for name, divisor in found.items() if name in self.columns}
+                divisors[name] = [(rates if question.of_given else self._chain(output), powers[order])]
+        divisors |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
+        return {name: divisor for name, divisor in divisors.items() if name in self.columns}
 
     def _chain(self, output: str) -> str:
         """The product of the conditionings of the groups that an output follows from, by name: its rates end there."""
@@ -326,12 +331,12 @@ class Along:
         """Where motions pass a forward singularity, at which the drives hold the mechanism no longer: line, place."""
         structure, graph = self.question.study.mechanism.forward.structure, self.question.study.mechanism.graph
         zeros = self.functions.zeros([f"group {k}" for k in self._groups], AT_SINGULARITY)
-        found = []
+        passages = []
         joints = [" ".join(graph.joined(structure.groups[k].edges)) for k in self._groups]
         for number, line, place in zip(zeros.function.tolist(), zeros.line.tolist(), zeros.place.tolist(), strict=True):
             joint = joints[number]
-            found.append((line, place, Cause(SINGULARITY, joint, joint, self._groups[number], "passed")))
-        return sorted(found, key=lambda passage: passage[:2])
+            passages.append((line, place, Cause(SINGULARITY, joint, joint, self._groups[number], "passed")))
+        return sorted(passages, key=lambda passage: passage[:2])
 
 
 def along_of(

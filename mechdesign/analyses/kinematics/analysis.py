@@ -76,11 +76,11 @@ def _modes(
 ) -> tuple[Table, list[Caution], int, dict[str, Shown]]:  # fmt: skip
     """The motion of every assembly, the sketch's first; warnings, the number of assemblies, and some to draw."""
     study, poses = drawn.question.study, drawn.question.poses
-    found = assemblies(study.mechanism, poses.groups[0].names)
+    every = assemblies(study.mechanism, poses.groups[0].names)
     passages: dict[str, Passage] = {}
     warnings = []
     pictured: dict[str, Shown] = {}
-    for assembly in sorted(found, key=lambda assembly: not assembly.drawn):
+    for assembly in sorted(every, key=lambda assembly: not assembly.drawn):
         passage = drawn
         if not assembly.drawn:
             other = motion_question(dataclasses.replace(study, mechanism=assembly.mechanism), poses)

@@ -43,8 +43,8 @@ Own = TypeVar("Own", bound=_OnLine)
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
-    """Motions between their poses, if they can be followed there, and what lies along each, by design."""
+class _Events:
+    """Motions between their poses, if they can be followed there; by design their limits and change points."""
 
     along: Along | None
     limits: Sequence[Sequence[Limit]]
@@ -77,15 +77,15 @@ def answers_of(passage: Passage) -> list[Group]:
             tables["toggles"] = toggles_table(toggles, along)
     if motion.errors:
         tables["targets"] = targets_table(motion, along)
-    found = _Found(along, _by_line(limits, designs), _by_line(changes, designs))
-    ends = [_end(passage, found, k) for k in range(designs)]
+    events = _Events(along, _by_line(limits, designs), _by_line(changes, designs))
+    ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
     a_pose = replace(whole, course=cache(partial(_follow, question)))
     scoped = {
         name: replace(tables[name], scope=a_pose if name in A_ROW_A_POSE else whole) for name in ORDER if name in tables
     }
-    uneven = {"limits": [*map(len, found.limits)], "toggles": [*map(len, _by_line(toggles, designs))]}
+    uneven = {"limits": [*map(len, events.limits)], "toggles": [*map(len, _by_line(toggles, designs))]}
     result = Result("kinematics", scoped, absent=question.absent)
     if designs == 1:
         special = cache(partial(special_poses, motion, passage.shown, along, limits, toggles))
@@ -95,14 +95,14 @@ def answers_of(passage: Passage) -> list[Group]:
     return [Group(np.arange(designs), result, ends, uneven)]
 
 
-def _end(passage: Passage, found: _Found, k: int) -> End:
+def _end(passage: Passage, events: _Events, k: int) -> End:
     """How design `k` was answered."""
-    question, along, designs = passage.question, found.along, passage.question.poses.designs
+    question, along, designs = passage.question, events.along, passage.question.poses.designs
     reason = passage.reason.reshape(designs, -1)[k]
     counts = {"poses": len(reason), "invalid": int(np.count_nonzero(reason))}
     own = question if designs == 1 else replace(question, poses=question.poses.some(np.array([k])))
     try:
-        warnings, failed = _warnings(own, passage, found, k, reason == 0)
+        warnings, failed = _warnings(own, passage, events, k, reason == 0)
     except AssemblyError as error:
         return End(counts=counts, error=error)
     missing = [invalid_in_words(reason)]
@@ -118,7 +118,7 @@ def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
 
 
 def _warnings(
-    question: MotionQuestion, passage: Passage, found: _Found, k: int, valid: Flags
+    question: MotionQuestion, passage: Passage, events: _Events, k: int, valid: Flags
 ) -> tuple[list[Caution], str]:  # fmt: skip
     """Warnings of design `k`, the poses of which are those of its own question; and the error where poses fail.
 
@@ -127,15 +127,15 @@ def _warnings(
     AssemblyError
         If no pose is valid.
     """
-    along, marks = found.along, passage.marks[k]
+    along, marks = events.along, passage.marks[k]
     reason = passage.reason.reshape(-1, len(valid))[k]
     warnings, failed = judge_failures(question.study, question.poses, reason, table="motion")
     warnings += remarks(question, marks)
     if along is None:
         warnings += unfollowed(question.poses)
     else:
-        warnings += hidden(found.limits[k], along, valid) + passed(found.limits[k], along)
-        warnings += change_points(found.changes[k], along)
+        warnings += hidden(events.limits[k], along, valid) + passed(events.limits[k], along)
+        warnings += change_points(events.changes[k], along)
         if along.functions.unresolved.any():
             warnings.append(Caution(
                 "unconverged",
@@ -151,8 +151,8 @@ def _shapes(passage: Passage) -> Sequence[Sequence[FourBar]]:
     mechanism, poses = passage.question.study.mechanism, passage.question.poses
     if not poses.places:
         return [four_bars(mechanism)] * poses.designs
-    found, size = measured(mechanism, chains(mechanism), poses, passage.solved), mechanism.size
-    shapes = [[loop for loop in own if loop.whole(size)] for own in found]
+    lengths, size = measured(mechanism, chains(mechanism), poses, passage.solved), mechanism.size
+    shapes = [[loop for loop in own if loop.whole(size)] for own in lengths]
     # Of a design without a valid pose none is known, and its answer is an error.
     valid = (passage.reason == 0).reshape(poses.designs, -1).any(axis=1)
     return [own if good else shapes[int(valid.argmax())] for own, good in zip(shapes, valid, strict=True)]
@@ -169,16 +169,16 @@ def _kinds(shapes: Sequence[Sequence[FourBar]], along: Along | None) -> list[tup
 
 def _in_groups(question: MotionQuestion, kinds: Sequence[tuple[object, ...]]) -> list[Group]:
     """Answers of designs of several kinds, those of a kind together."""
-    found = []
+    groups = []
     for kind in dict.fromkeys(kinds):
         some = np.array([k for k, own in enumerate(kinds) if own == kind])
         part = replace(question, poses=question.poses.some(some))
-        found += [replace(each, rows=some[each.rows]) for each in answers_of(pass_over(part, marks_of, NULL, 1))]
-    return found
+        groups += [replace(each, rows=some[each.rows]) for each in answers_of(pass_over(part, marks_of, NULL, 1))]
+    return groups
 
 
-def _by_line(found: Sequence[Own], lines: int) -> list[list[Own]]:
+def _by_line(events: Sequence[Own], lines: int) -> list[list[Own]]:
     parts: list[list[Own]] = [[] for _ in range(lines)]
-    for one in found:
+    for one in events:
         parts[one.line].append(one)
     return parts

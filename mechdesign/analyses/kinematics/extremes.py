@@ -90,9 +90,9 @@ def _between(
         moves = peaks.value[1] - peaks.value[0] > still[rows]
     moving[rows] |= moves
     places = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
-    found = np.isfinite(peaks.place) & moves
+    valid = np.isfinite(peaks.place) & moves
     for part, new in enumerate((peaks.value, places)):
-        ends[:, part, rows] = np.where(found, new, ends[:, part, rows])
+        ends[:, part, rows] = np.where(valid, new, ends[:, part, rows])
 
 
 def targets_table(motion: Motion, along: Along | None) -> Table:

@@ -35,11 +35,11 @@ class Limit:
 
 def limits_of(along: Along) -> list[Limit]:
     """Limits and singularities of motions, one after the other, in the order of their places."""
-    found = [Limit(end.line, end.place, end.cause, end) for end in along.ends.ends]
-    found += [Limit(line, place, cause) for line, place, cause in along.passages()]
-    places = along.snapped(np.array([limit.place for limit in found])).tolist()
-    found = [replace(limit, place=place) for limit, place in zip(found, places, strict=True)]
-    return sorted(found, key=lambda limit: (limit.line, limit.place))
+    limits = [Limit(end.line, end.place, end.cause, end) for end in along.ends.ends]
+    limits += [Limit(line, place, cause) for line, place, cause in along.passages()]
+    places = along.snapped(np.array([limit.place for limit in limits])).tolist()
+    limits = [replace(limit, place=place) for limit, place in zip(limits, places, strict=True)]
+    return sorted(limits, key=lambda limit: (limit.line, limit.place))
 
 
 def limits_table(limits: Sequence[Limit], along: Along) -> Table:

@@ -38,7 +38,7 @@ def measured(
     """
     if not poses.places:
         return [loops] * poses.designs
-    found, missing = [loops] * poses.designs, np.ones(poses.designs, dtype=bool)
+    loops_of, missing = [loops] * poses.designs, np.ones(poses.designs, dtype=bool)
     for each in solved:
         valid = np.flatnonzero(each.configuration.valid)
         designs, first = np.unique(each.rows[valid] // (poses.count // poses.designs), return_index=True)
@@ -46,8 +46,8 @@ def measured(
         one = each.configuration.take(valid[first[new]])
         lengths = zip(*(loop.measured(one, mechanism.size) for loop in loops), strict=True)
         for design, own in zip(designs[new].tolist(), lengths, strict=False):
-            found[design], missing[design] = own, False
-    return found
+            loops_of[design], missing[design] = own, False
+    return loops_of
 
 
 def loops_table(
@@ -92,13 +92,13 @@ def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tupl
         for row, loop in zip(angle, loops, strict=True):
             row[solved.rows] = np.where(valid, loop.transmission(solved.configuration), np.nan)
     each = angle.reshape(len(loops), poses.designs, -1)
-    found = []
+    ends = []
     for sign in (1, -1):
         values = np.where(np.isnan(each), np.inf, sign * each)
         best = (values <= values.min(axis=2, keepdims=True) + SAME_ANGLE).argmax(axis=2)
         value = np.take_along_axis(each, best[..., None], axis=2)[..., 0]
-        found.append((value, np.where(np.isnan(value), np.nan, best)))
-    return found
+        ends.append((value, np.where(np.isnan(value), np.nan, best)))
+    return ends
 
 
 def _between(along: Along, count: int) -> list[tuple[Floats, Floats]]:
@@ -134,11 +134,11 @@ def toggles_of(loops: Sequence[FourBar], along: Along) -> list[Toggle]:
     configuration = along.curve.solve(zeros.line, along.curve.inside(zeros.line, zeros.place), judged=False)[1]
     together = _together(zeros.place, zeros.function % len(loops) + len(loops) * zeros.line)
     cosines = {end: [loop.squareness(configuration, end)[1] for loop in loops] for end in (0, 3)}
-    found, lanes = [], (zeros.function, zeros.line, along.snapped(zeros.place), together)
+    toggles, lanes = [], (zeros.function, zeros.line, along.snapped(zeros.place), together)
     for number, (function, line, place, both) in enumerate(zip(*(lane.tolist() for lane in lanes), strict=True)):
         k, end = which[function]
-        found.append(Toggle(line, place, *_words(loops[k], end, float(cosines[end][k][number]), both)))
-    return found
+        toggles.append(Toggle(line, place, *_words(loops[k], end, float(cosines[end][k][number]), both)))
+    return toggles
 
 
 def toggles_table(toggles: Sequence[Toggle], along: Along) -> Table:
@@ -163,9 +163,9 @@ def _together(position: Floats, loop: Ints) -> Flags:
     """Whether all three moving links of the loop are in line at a toggle."""
     order = np.lexsort((position, loop))
     apart = np.append(_apart(position[order], loop[order]), True)
-    found = np.empty(len(order), dtype=bool)
-    found[order] = ~(apart[:-1] & apart[1:])
-    return found
+    together = np.empty(len(order), dtype=bool)
+    together[order] = ~(apart[:-1] & apart[1:])
+    return together
 
 
 def _apart(position: Floats, kind: Ints) -> Flags:

@@ -105,8 +105,10 @@ class Motion:
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration
-        found = {o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]}
-        for output in found.values():
+        coordinates = {
+            o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]
+        }
+        for output in coordinates.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
@@ -196,14 +198,14 @@ def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict
                 work[f"{load.at}.{axis}"] = work.get(f"{load.at}.{axis}", 0.0) + force
         if load.link is not None and load.moment is not None:
             work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
-    found: dict[str, Value] = {}
+    columns: dict[str, Value] = {}
     if work:
         moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
         for k, drive in enumerate(drives):
-            found[f"{drive.name}_effort"] = -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
+            columns[f"{drive.name}_effort"] = -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
     for name, given in section.mechanical_advantage.items():
-        found[f"{name}_advantage"] = _advantage(question, linear, name, given)
-    return found
+        columns[f"{name}_advantage"] = _advantage(question, linear, name, given)
+    return columns
 
 
 @quiet

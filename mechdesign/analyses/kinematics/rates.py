@@ -91,16 +91,6 @@ def inverse_rates(
     return DriveRates(speeds, _solve(matrix, good, [a - b for a, b in zip(rates.accelerations, own, strict=True)]))
 
 
-def drive_velocities(
-    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], velocities: Sequence[Value]
-) -> Sequence[Value]:
-    """Velocities of the drives that give as many coordinates theirs; see `inverse_rates`."""
-    names = [coordinate.name for coordinate in given]
-    if set(names) == set(mechanism.drives):
-        return [velocities[names.index(name)] for name in mechanism.drives]
-    return _solve(*_inverted(mechanism, linear, given), velocities)
-
-
 def _inverted(mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]) -> tuple[Floats, Flags]:
     """J of the given coordinates, and where it is regular.
 
@@ -125,5 +115,5 @@ def unitless(
 def _solve(matrix: Floats, good: Flags, right: Sequence[Value]) -> list[Floats]:
     safe = np.where(good[..., None, None], matrix, np.eye(matrix.shape[-1]))
     sides = np.stack([np.broadcast_to(np.asarray(side, dtype=float), good.shape) for side in right], axis=-1)
-    found = np.linalg.solve(safe, sides[..., None])[..., 0]
-    return [np.where(good, found[..., k], np.nan) for k in range(len(right))]
+    solution = np.linalg.solve(safe, sides[..., None])[..., 0]
+    return [np.where(good, solution[..., k], np.nan) for k in range(len(right))]

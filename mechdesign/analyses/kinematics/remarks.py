@@ -40,8 +40,8 @@ TURNED, BEFORE_CORNER = 1e-6, 1e-9
 
 def remarks(question: MotionQuestion, marks: Mapping[str, Mark]) -> list[Caution]:
     """Warnings about the poses of one design, and about its rates."""
-    found = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
-    return found + _untargeted(question, marks)
+    cautions = _conditioning(question, marks) + _stalled(question, marks) + _astray(question) + _corners(question)
+    return cautions + _untargeted(question, marks)
 
 
 def unfollowed(poses: Poses) -> list[Caution]:
@@ -91,18 +91,18 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     question, valid, arrays = motion.question, motion.valid, motion.arrays
     steady = arrays["conditioning"] >= STALLED
     stalled = valid & ~motion.smooth & ~steady
-    found = {_STALLED: stalled}
+    marks = {_STALLED: stalled}
     if question.of_given:
-        found[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
+        marks[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
     if "inverse_condition" in arrays:
-        found[_REGULAR] = valid & steady
-        found[_NEAR] = valid & steady & _near(motion)
+        marks[_REGULAR] = valid & steady
+        marks[_NEAR] = valid & steady & _near(motion)
     for output, where in targets.untargeted(question.study, motion.errors, valid).items():
-        found[f"{output}{_WITHOUT_TARGET}"] = where
+        marks[f"{output}{_WITHOUT_TARGET}"] = where
     for centre in question.centres:
         for kind in _CENTRELESS:
-            found[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)
-    return found
+            marks[f"{centre.name} {kind}"] = valid & (arrays[f"{centre.name}.motion"].round() == kind)
+    return marks
 
 
 def _near(motion: Motion) -> Flags:

@@ -85,14 +85,14 @@ def special_poses(
     rates = bool(any(section.rates.values()) or any(section.accelerations.values()) or section.speed is not None)
     if not poses.motion and not poses.listed:
         return SpecialPoses((), 0, rates)
-    found, more = list[SpecialPose](), 0
+    special, more = list[SpecialPose](), 0
     if along is not None:
         events = _events(along, limits, toggles)
-        found, more = _distinct(motion, _at_events(along, events[:COMPARED])), len(events[COMPARED:])
+        special, more = _distinct(motion, _at_events(along, events[:COMPARED])), len(events[COMPARED:])
     valid = np.flatnonzero(kept.configuration.valid)
-    some, left_out = valid[:MOST], max(len(valid), len(found)) - MOST
+    some, left_out = valid[:MOST], max(len(valid), len(special)) - MOST
     if poses.motion:
-        some, left_out = _spread(motion, kept, [each.row for each in found]), len(found) + more - MOST
+        some, left_out = _spread(motion, kept, [each.row for each in special]), len(special) + more - MOST
     configuration = kept.configuration.take(some)
     swept = poses.numbers if poses.swept is None else poses.values[poses.swept]
     words = [
@@ -100,9 +100,9 @@ def special_poses(
         for k in kept.rows[some].tolist()
     ]
     solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)
-    found += _moving(motion.question, poses, solved, words)
-    found.sort(key=lambda each: each.row)
-    return SpecialPoses(found[:MOST], max(left_out, 0), rates)
+    special += _moving(motion.question, poses, solved, words)
+    special.sort(key=lambda each: each.row)
+    return SpecialPoses(special[:MOST], max(left_out, 0), rates)
 
 
 def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
@@ -130,21 +130,21 @@ def _spread(motion: Motion, kept: Shown, special: Sequence[float]) -> Ints:
 
 def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) -> list[Event]:
     """Limits, singularities and toggles in the order of the motion; those at one place are one."""
-    found = []
+    events = []
     for limit in limits:
         where = f" at {limit.cause.joint}" if limit.cause.joint else ""
         what = PASSED if limit.end is None else f"{LIMIT}: {limit.cause.kind}"
-        found.append(Event(limit.place, (f"{what}{where}",)))
+        events.append(Event(limit.place, (f"{what}{where}",)))
     for toggle in toggles:
         names = toggle.loop.split(" (")[0].split("-")
         pair = next(f"{one} and {two}" for one, two in pairwise(names) if f"{one} {two}" == toggle.links)
         state = toggle.state.replace("perpendicular", "perpendicular to the slide")
         whole = toggle.effect == "change point"
-        found.append(Event(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
-    found += [Event(place, (SINGULAR,)) for place in _singular(along)]
-    found.sort(key=lambda event: event.place)
+        events.append(Event(toggle.place, (CHANGE_POINT if whole else f"{pair} {state}: {toggle.effect}",)))
+    events += [Event(place, (SINGULAR,)) for place in _singular(along)]
+    events.sort(key=lambda event: event.place)
     merged: list[Event] = []
-    for event in found:
+    for event in events:
         if merged and abs(event.place - merged[-1].place) <= SAME * along.curve.poses.end:
             before = merged.pop()
             event = Event(before.place, tuple(dict.fromkeys(before.words + event.words)))
@@ -170,14 +170,14 @@ def _at_events(along: Along, events: Sequence[Event]) -> list[SpecialPose]:
         return []
     line, s = np.zeros(len(events), dtype=np.intp), np.array([event.place for event in events])
     poses, configuration = along.curve.solve(line, along.curve.inside(line, s), judged=False)
-    at, shown, found = along.curve.poses.along(line, s), along.shown(line, s), []
+    at, shown, special = along.curve.poses.along(line, s), along.shown(line, s), []
     for k in np.flatnonzero(configuration.reason == 0).tolist():
         # Of a pose at a limit the words have the limit.
         where = pose_in_words(along.question.study, at, k, DIGITS)
         words = [(events[k].place, float(shown[k]), where, "; ".join(events[k].words))]
         one = SolvedPoses(np.array([k]), along.question.poses.groups[0].names, configuration.take(np.array([k])))
-        found += _moving(along.question, poses, one, words)
-    return found
+        special += _moving(along.question, poses, one, words)
+    return special
 
 
 def _distinct(motion: Motion, found: Iterable[SpecialPose]) -> list[SpecialPose]:

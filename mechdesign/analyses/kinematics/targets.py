@@ -167,14 +167,14 @@ def nearest(points: Complexes, corners: Complexes) -> Complexes:
     lengths = norm2(spans)
     # A piece without length is its corner: any positive divisor gives part 0.
     lengths = np.where(lengths > 0, lengths, 1.0)
-    found = np.empty(len(points), dtype=complex)
+    nearest_feet = np.empty(len(points), dtype=complex)
     step = max(1, MAX_DISTANCES // len(spans))
     for first in range(0, len(points), step):
         some = points[first : first + step, None]
         feet = begins + np.clip(dot(spans, some - begins) / lengths, 0.0, 1.0) * spans
         best = np.argmin(norm2(some - feet), axis=1)
-        found[first : first + step] = feet[np.arange(len(feet)), best]
-    return found
+        nearest_feet[first : first + step] = feet[np.arange(len(feet)), best]
+    return nearest_feet
 
 
 def totals(found: Sequence[Error], designs: int, valid: Flags) -> Floats:

@@ -77,21 +77,21 @@ def answer(question: Question, places: Places, count: int, effort: Effort) -> Ev
     # Where all pieces count, the raster tells if one is missing.
     every = pieces is None or not question.field.same_assembly or pieces.number <= 1
     missing = np.where(every, panels.seen - integral.area, 0.0)
-    found = {"area": (integral.area, np.maximum(integral.area_error + panels.unseen, missing))}
+    results = {"area": (integral.area, np.maximum(integral.area_error + panels.unseen, missing))}
     if {"SUI", "box_area"} & set(question.wanted):
         box, doubt = bounding_box(panels, integral.boundary)
         with np.errstate(invalid="ignore", divide="ignore"):
             share = integral.area / box
-            found |= {
+            results |= {
                 "box_area": (box, doubt),
-                "SUI": (share, (found["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
+                "SUI": (share, (results["area"][1] + share * doubt) / np.maximum(box - doubt, 0.0)),
             }
     for column, (name, kind) in question.statistics.items():
         if kind in ("min", "max"):
-            found[column] = peaks.of(name, kind)
+            results[column] = peaks.of(name, kind)
         else:
-            found[column] = (_mean if kind == "mean" else _spread)(integrands, means, doubts, name)
-    values, errors = ({name: found[name][k] for name in question.wanted} for k in (0, 1))
+            results[column] = (_mean if kind == "mean" else _spread)(integrands, means, doubts, name)
+    values, errors = ({name: results[name][k] for name in question.wanted} for k in (0, 1))
     return Evaluation(values, errors, panels, pieces)
 
 

@@ -53,8 +53,8 @@ class Boundary:
     values: Sequence[tuple[Coordinate, Floats]]
 
 
-def boundary_of(field: Field, patches: Sequence[Patch], told: Sequence[tuple[str, str]]) -> Boundary:
-    """The boundary of a region; `told` are the causes of its field."""
+def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[str, str]]) -> Boundary:
+    """The boundary of a region; `reasons` are the `causes` of its field."""
     curves = [
         (patch, edge) for side in ("inner", "outer") for patch in patches for edge in patch.edges if edge.side == side
     ]
@@ -70,9 +70,9 @@ def boundary_of(field: Field, patches: Sequence[Patch], told: Sequence[tuple[str
         values = [_deciding(field, z, margin)]
     else:
         values = _drives(field, z, np.asarray(about + radius * (1 + BESIDE * inwards) * turn), inwards)
-    kinds = np.array([kind for kind, _ in field.labels])
+    kind, at = (np.array(words)[margin] for words in ([kind for kind, _ in field.labels], [at for _, at in reasons]))
     curve = np.repeat(np.arange(len(curves)), lengths)
-    return Boundary(z, theta, kinds[margin], np.array([words for _, words in told])[margin], side, curve, piece, values)
+    return Boundary(z, theta, kind, at, side, curve, piece, values)
 
 
 def _deciding(over: Ranged, z: Complexes, margin: Ints) -> tuple[Coordinate, Floats]:

@@ -88,8 +88,8 @@ def _climb(panels: Panels, side: Ints, design: Ints, theta: Floats, away: Floats
     """
 
     def depth(lane: Ints, angle: Floats) -> Floats:
-        found = _farthest(panels.designs, angle, panels.trace(design[lane], angle, SLACK))
-        return np.asarray(-found[side[lane], np.arange(len(lane))])
+        away_at = _farthest(panels.designs, angle, panels.trace(design[lane], angle, SLACK))
+        return np.asarray(-away_at[side[lane], np.arange(len(lane))])
 
     every = np.arange(len(side))
     place, low = dips(depth, theta, -away, np.full(len(side), -np.inf))

@@ -100,8 +100,8 @@ class Shape:
     def corners(self) -> Floats:
         """Directions of the corners from the centre (radians, in [0, 2 pi)), shape (..., corners)."""
         corner = np.arctan2(self.height, self.width)
-        found = [] if self.round else [corner, np.pi - corner, np.pi + corner, 2 * np.pi - corner]
-        return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.array([])
+        angles = [] if self.round else [corner, np.pi - corner, np.pi + corner, 2 * np.pi - corner]
+        return np.stack(np.broadcast_arrays(*angles), axis=-1) if angles else np.array([])
 
     def radius(self, theta: Floats) -> Floats:
         """Distance of the outline from the centre."""
@@ -138,21 +138,21 @@ def fitting_scale(shape: Shape, panels: Panels) -> tuple[Floats, Complexes]:
     notch that ends between two of those places.
     """
     some, count = np.flatnonzero(panels.closes), len(panels.closes)
-    found = np.full(count, np.nan)
+    scales = np.full(count, np.nan)
     centres = np.full(count, complex(np.nan, np.nan) if shape.centre is None else shape.centre)
     if not some.size:
-        return found, centres
+        return scales, centres
     if shape.centre is not None:
-        found[some] = _View(shape.of(some), panels, some, centres[some]).checked()
-        return found, centres
+        scales[some] = _View(shape.of(some), panels, some, centres[some]).checked()
+        return scales, centres
     lane, centre = _beginnings(shape, panels, some)
     centre, scale = _largest(shape, panels, lane, centre)
     # Of several values of one design the last assigned is the largest.
     order = np.argsort(scale, kind="stable")
     centres[lane[order]] = centre[order]
     some = np.unique(lane)
-    found[some] = _View(shape.of(some), panels, some, centres[some]).checked()
-    return found, centres
+    scales[some] = _View(shape.of(some), panels, some, centres[some]).checked()
+    return scales, centres
 
 
 class _View:
@@ -167,8 +167,8 @@ class _View:
         self._shape, self._centre = shape, centre
         self._designs: Designs = replace(every, places=every.of(design), count=len(design), centres=centre)
         self._reach = np.abs(centre - every.about) + panels.reach[design]
-        _, found, inside = panels.through(design, centre)
-        self._inside = np.bincount(found.ray[inside], minlength=len(design)) > 0
+        _, traced, inside = panels.through(design, centre)
+        self._inside = np.bincount(traced.ray[inside], minlength=len(design)) > 0
         around, beside = _valleys(*self._spread(RAYS))
         around, beside = self._with_overlooked(around, beside)
         contact, lane = np.nonzero(np.isfinite(beside[1]) & (beside[1] <= LOW * beside[1].min(axis=0)))
@@ -206,8 +206,8 @@ class _View:
         for step in PARABOLAS:
             # A parabola through the places around leads to the lowest: for squares of distances it is exact.
             around = part + step * AROUND[:, None, None]
-            found = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
-            here, right, left, up, down, across = found[margin, :, margin, lanes].transpose(2, 0, 1)
+            around_values = margins(around.reshape(-1, len(lanes))).reshape(len(values), *around.shape)
+            here, right, left, up, down, across = around_values[margin, :, margin, lanes].transpose(2, 0, 1)
             with np.errstate(invalid="ignore", divide="ignore"):
                 gx, gy = 0.5 * (right - left), 0.5 * (up - down)
                 xx, yy, xy = right + left - 2 * here, up + down - 2 * here, across + here - right - up
@@ -233,21 +233,21 @@ class _View:
         around, beside = _valleys(theta, scales)
         # Of a notch with a corner the lowest place is found by sections, not by parabolas.
         contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
-        found = lowest(lambda x: self.at(lane, x), around[0, contact, lane], around[2, contact, lane])[1]
-        np.minimum.at(scale, lane, np.minimum(found, beside[1, contact, lane]))
+        lowest_scale = lowest(lambda x: self.at(lane, x), around[0, contact, lane], around[2, contact, lane])[1]
+        np.minimum.at(scale, lane, np.minimum(lowest_scale, beside[1, contact, lane]))
         for _ in range(LOOKS):
             outline = (1 - TOUCHING) * scale * self._shape.radius(theta) * np.exp(1j * theta)
             place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
             if not lane.size:
                 break
-            found = self.at(lane, theta[place, lane])
+            lowest_scale = self.at(lane, theta[place, lane])
             # Where a ray leaves the region and comes back between two of its samples, places along it tell.
-            passed = np.flatnonzero(found >= scale[lane])
+            passed = np.flatnonzero(lowest_scale >= scale[lane])
             along = np.linspace(0, 1, CHECKED_ALONG)[:, None] * outline[place, lane][passed]
             first = self._designs.inside(self._centre[lane[passed]] + along, lane[passed]).argmin(axis=0)
-            found[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
+            lowest_scale[passed] = scale[lane[passed]] * np.maximum(first - 1, 0) / (CHECKED_ALONG - 1)
             # A smaller outline may pass through what the larger one had left behind.
-            np.minimum.at(scale, lane, found)
+            np.minimum.at(scale, lane, lowest_scale)
         return scale
 
     def at(self, lane: Ints, theta: Floats) -> Floats:
@@ -272,7 +272,7 @@ class _View:
 
     def slopes(self) -> Complexes:
         """Slopes of the contacts' scales by x and y of the centre, shape (contacts, lanes)."""
-        found = -self._shape.slope(self.theta)
+        slopes = -self._shape.slope(self.theta)
         away = np.abs(self.theta[..., None] - self._shape.corners) % (2 * np.pi)
         at_corner = (np.minimum(away, 2 * np.pi - away) < AT_CORNER).any(axis=-1)
         contact, lane = np.nonzero(at_corner & np.isfinite(self.scales))
@@ -282,8 +282,8 @@ class _View:
         size = np.abs(normal)
         known = np.isfinite(size) & (size > 0)
         slope = -self._shape.of(lane).slope_by(np.where(known, normal / np.where(known, size, 1.0), 1.0 + 0.0j))
-        found[contact[known], lane[known]] = slope[known]
-        return found
+        slopes[contact[known], lane[known]] = slope[known]
+        return slopes
 
 
 def _valleys(theta: Floats, scales: Floats) -> tuple[Floats, Floats]:

@@ -100,12 +100,12 @@ def of_configurations(evaluate: Callable[[Configuration], Floats]) -> Evaluate:
         finite = np.ones(configuration.shape, dtype=bool)
         for node in configuration.nodes:
             finite &= np.isfinite(node)
-        found = np.full(configuration.shape, np.nan)
+        values = np.full(configuration.shape, np.nan)
         rows = np.nonzero(finite)
         for k in range(0, len(rows[0]), BLOCK):
             block = tuple(row[k : k + BLOCK] for row in rows)
-            found[block] = evaluate(configuration.take(block))
-        return found
+            values[block] = evaluate(configuration.take(block))
+        return values
 
     return everywhere
 
@@ -135,8 +135,8 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     def evaluate(configuration: Configuration) -> Floats:
         soft = hold(asked, configuration)[0].compliance
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = value(soft)
-        return np.where(np.isnan(soft).any(axis=(1, 2)), free, found)
+            values = value(soft)
+        return np.where(np.isnan(soft).any(axis=(1, 2)), free, values)
 
     return of_configurations(evaluate)
 

@@ -87,8 +87,8 @@ def inscribed(field: Field, scan: tuple[float, float], patches: Sequence[Patch],
     borders[[*(margin for _, margin in ends), *range(len(field.labels), len(borders))]] = True
 
     def grown(border: Border, value: Size, start: Floats) -> Floats:
-        found = _grown(border, value, lambda z: margins(size * z)[borders] / size, start / size)
-        return np.full(len(start), np.nan) if found is None else size * found
+        shape = _grown(border, value, lambda z: margins(size * z)[borders] / size, start / size)
+        return np.full(len(start), np.nan) if shape is None else size * shape
 
     circle, best = np.full(3, np.nan), 0.0
     for i, j, radius in _discs(free, cell) or [_thin(patches, x, y)]:
@@ -129,12 +129,12 @@ def _discs(free: Flags, cell: Floats) -> list[tuple[int, int, float]]:
 
     far = distance_transform_edt(np.pad(free, 1), sampling=tuple(cell))[1:-1, 1:-1]
     column, row = np.arange(CELLS)[:, None] * cell[0], np.arange(CELLS) * cell[1]
-    found: list[tuple[int, int, float]] = []
-    while len(found) < TRIALS and far.any():
+    discs: list[tuple[int, int, float]] = []
+    while len(discs) < TRIALS and far.any():
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(far)), far.shape))
-        found.append((i, j, float(far[i, j])))
+        discs.append((i, j, float(far[i, j])))
         far = np.where(np.hypot(column - i * cell[0], row - j * cell[1]) < far[i, j], 0.0, far)
-    return found
+    return discs
 
 
 def _thin(patches: Sequence[Patch], x: Floats, y: Floats) -> tuple[int, int, float]:
@@ -148,16 +148,16 @@ def _boxes(free: Flags) -> list[tuple[int, int, int, int]]:
 
     For every first row the largest: first column, first row, last column, last row.
     """
-    place, found = np.arange(CELLS), []
+    place, boxes = np.arange(CELLS), []
     for row in range(CELLS):
         # Down to each last row: of each column how many up to it are free in all the rows.
         full = np.logical_and.accumulate(free[:, row:], axis=1)
         run = place[:, None] - np.maximum.accumulate(np.where(full, -1, place[:, None]), axis=0)
         last, wide = run.argmax(axis=0), run.max(axis=0)
         k = int((wide * (1 + place[: len(wide)])).argmax())
-        found.append((int(wide[k]) * (k + 1), int(last[k] - wide[k]) + 1, row, int(last[k]), row + k))
+        boxes.append((int(wide[k]) * (k + 1), int(last[k] - wide[k]) + 1, row, int(last[k]), row + k))
     kept: list[tuple[int, int, int, int]] = []
-    for area, i, j, m, n in sorted(found, reverse=True):
+    for area, i, j, m, n in sorted(boxes, reverse=True):
         middle = (i + m) / 2, (j + n) / 2
         if area and not any(a <= middle[0] <= c and b <= middle[1] <= d for a, b, c, d in kept):
             kept.append((i, j, m, n))
@@ -203,13 +203,13 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         along = border(places)
 
         def values(q: Floats) -> Floats:
-            found = margins(q @ along)[which] / steep
-            return np.where(np.isfinite(found), found, 1.0)
+            margin = margins(q @ along)[which] / steep
+            return np.where(np.isfinite(margin), margin, 1.0)
 
         def slopes(q: Floats) -> Floats:
             slope = with_slopes(q @ along)[1]
-            found = np.stack([(slope * np.conj(way)).real[which] / steep for way in along], axis=1)
-            return np.where(np.isfinite(found), found, 0.0)
+            slope_by = np.stack([(slope * np.conj(way)).real[which] / steep for way in along], axis=1)
+            return np.where(np.isfinite(slope_by), slope_by, 0.0)
 
         return {"type": "ineq", "fun": values, "jac": slopes}
 
@@ -227,14 +227,14 @@ def _grown(border: Border, size: Size, margins: Callable[[Complexes], Floats], p
         which = distance < 3 * LEAP
         # From inside, and in steps of some cells, since only what is near is looked at.
         start = p + max(-distance.min(), 0.0) * inwards
-        found = minimize(
+        larger = minimize(
             lambda q: -size(q)[0], start, jac=lambda q: -size(q)[1], method="SLSQP",
             bounds=[(v - LEAP, v + LEAP) for v in p], constraints=constraints(places, which, steep[which]),
             options={"ftol": 1e-14, "maxiter": 60},
         ).x  # fmt: skip
-        if not np.isfinite(found).all():
+        if not np.isfinite(larger).all():
             return None
-        gain, move, p = abs(size(found)[0] - size(p)[0]), float(np.abs(found - p).max()), found
+        gain, move, p = abs(size(larger)[0] - size(p)[0]), float(np.abs(larger - p).max()), larger
         low = (distance <= np.roll(distance, 1, axis=1)) & (distance < np.roll(distance, -1, axis=1))
         lowest = np.argsort(np.where(low, distance, np.inf).min(axis=0))[:CONTACTS]
         closer = places[lowest][:, None] + width * CLOSER

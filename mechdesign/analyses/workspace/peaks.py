@@ -175,11 +175,11 @@ def _grid(panels: Panels) -> tuple[Places, Local]:
 
 def _best(design: Ints, height: Floats, count: int) -> Ints:
     """The node of the largest value of each design; -1 where there is none."""
-    found = np.full(count, -1, dtype=np.intp)
+    best = np.full(count, -1, dtype=np.intp)
     good = np.flatnonzero(np.isfinite(height))
     order = good[np.argsort(height[good], kind="stable")]
-    found[design[order]] = order
-    return found
+    best[design[order]] = order
+    return best
 
 
 def _climb(
@@ -191,8 +191,8 @@ def _climb(
     best, doubt = np.full(len(u), -np.inf), np.full(len(u), np.inf)
 
     def look(lanes: Ints, us: Floats, vs: Floats) -> Floats:
-        found = sign[lanes] * _values(panels, indices, which[lanes], at[lanes], us, vs)
-        return np.where(np.isfinite(found), found, -np.inf).reshape(-1, len(lanes))
+        height_at = sign[lanes] * _values(panels, indices, which[lanes], at[lanes], us, vs)
+        return np.where(np.isfinite(height_at), height_at, -np.inf).reshape(-1, len(lanes))
 
     left = np.arange(len(u))
     for _ in range(MOST_ROUNDS):
@@ -236,7 +236,7 @@ def _values(panels: Panels, indices: Sequence[Prepared], which: Ints, at: Places
     inner, outer = (np.append(end, np.nan)[place].reshape(shape) for end in (traced.inner, traced.outer))
     radius = spread(inner, outer, vs, cosine)[0]
     local = Local.on_rays(panels.designs, at["design"], theta.reshape(shape), radius)
-    found = np.full(radius.shape, np.nan)
+    values_at = np.full(radius.shape, np.nan)
     for k in np.unique(which):
-        found = np.where(which == k, indices[k].values(local), found)
-    return found
+        values_at = np.where(which == k, indices[k].values(local), values_at)
+    return values_at

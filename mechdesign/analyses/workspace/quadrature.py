@@ -212,12 +212,12 @@ class Fan:
         place, density = spread(cells["low"], cells["high"], middle + half * ANGLES.nodes[:, None], cubic)
         theta, weight = place.ravel(), half * density
         design = np.tile(cells["design"], nodes)
-        found = panels.trace(design, theta)
-        ray, inner, outer = found.ray, found.inner, found.outer
+        traced = panels.trace(design, theta)
+        ray, inner, outer = traced.ray, traced.inner, traced.outer
         area = np.asarray(np.bincount(ray, 0.5 * (outer - inner) * (outer + inner), len(theta)), dtype=float)
         segments = np.zeros(len(ray) if integrands else 0, dtype=SEGMENT)
         if integrands:
-            cell, slot = ray % count, found.slot
+            cell, slot = ray % count, traced.slot
             by = (weight * ANGLES.weights[:, None] * cells["counted"]).ravel()[ray]
             for name, part in (("ray", ray), ("design", design[ray]), ("cell", cell), ("slot", slot),
                                ("strip", 2 * (cell * (int(slot.max(initial=0)) + 1) + slot)), ("theta", theta[ray]),
@@ -225,7 +225,7 @@ class Fan:
                 segments[name] = part
             segments = through_points(cells[cell], segments)
         strips = evaluate(panels.designs, integrands, segments)
-        return Fan(panels, cells, weight, area.reshape(shape), strips, (design, theta, found))
+        return Fan(panels, cells, weight, area.reshape(shape), strips, (design, theta, traced))
 
     def integrals(self, integrands: Sequence[Integrand], allowed: Floats, keep: Flags | None = None) -> Integrals:
         """Integrals over the cells, or some; their errors along rays are no more than is allowed a whole design."""

@@ -136,10 +136,10 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
         return list(_over_range(study, name, values, tolerance, OF_RANGE if wanted is None else wanted))
     if section is not None and wanted is None:
         wanted = columns(USUAL if section.indices is None else section.indices)
-    found = regions(study)
+    all_regions = regions(study)
     assert section is not None
     assert wanted is not None
-    (start, stop), margin = found[0].scan, section.margin * study.units.angle_factor
+    (start, stop), margin = all_regions[0].scan, section.margin * study.units.angle_factor
     if stop - start <= 2 * margin:
         raise problem(study, "margin", "the margin leaves nothing of the scan; give a smaller one")
     integrate_by = section.integrate
@@ -151,7 +151,7 @@ def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] 
     return [
         Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
                  nodes=integrate_by.nodes, indices=indices, wanted=tuple(wanted), shown=tuple(ready.values()))
-        for region in found
+        for region in all_regions
     ]  # fmt: skip
 
 

@@ -114,9 +114,11 @@ class Ranged(Field):
         extreme of each margin; else one.
         """
         blocks = np.array_split(z.ravel(), max(1, -(-z.size // BLOCK)))
-        found, value, pair = (np.concatenate(part, axis=-1) for part in zip(*map(self._extremes, blocks), strict=True))
-        shape = (len(found), *z.shape)
-        return found.reshape(shape), value.reshape(shape), pair.reshape(2, *shape)
+        extreme, value, pair = (
+            np.concatenate(part, axis=-1) for part in zip(*map(self._extremes, blocks), strict=True)
+        )
+        shape = (len(extreme), *z.shape)
+        return extreme.reshape(shape), value.reshape(shape), pair.reshape(2, *shape)
 
     def _stretches(self, z: Complexes) -> tuple[Ints, Floats, Floats, Flags]:
         """Place, both ends, and whether a leg is stretched or folded at either, of stretches of the range to sample.
@@ -131,20 +133,20 @@ class Ranged(Field):
         margins = self.at(np.broadcast_to(z, (SAMPLES, len(z))), samples.value(np.arange(SAMPLES)[:, None]))
         height = _known(-margins) if every else _smallest(margins)[None]
         node = height.argmax(axis=1)
-        found, value = height.max(axis=1), samples.value(node)
+        extreme, value = height.max(axis=1), samples.value(node)
         lowest = np.where(np.isnan(margins), np.inf, margins)[:, node[0], np.arange(len(z))].argmin(axis=0)
-        pair = np.array(np.broadcast_to(lowest, (2, *found.shape)))
+        pair = np.array(np.broadcast_to(lowest, (2, *extreme.shape)))
         row, which, top, at, names = self._refined(z, samples, margins, height)
-        better = np.flatnonzero(top > found[row, which])
+        better = np.flatnonzero(top > extreme[row, which])
         better = better[np.argsort(top[better], kind="stable")]
         # Of several extremes of one stretch the last assigned is the highest, and of several stretches the last.
         where = row[better], which[better]
-        found[where], value[where] = top[better], at[better]
+        extreme[where], value[where] = top[better], at[better]
         pair[:, where[0], where[1]] = names[:, better]
-        order = np.lexsort((found[0], lane))
+        order = np.lexsort((extreme[0], lane))
         best = order[np.searchsorted(lane[order], places, side="right") - 1]
-        found, value, pair = found[:, best], value[:, best], pair[..., best]
-        return np.where(np.isinf(found), np.nan, -found if every else found), value, pair
+        extreme, value, pair = extreme[:, best], value[:, best], pair[..., best]
+        return np.where(np.isinf(extreme), np.nan, -extreme if every else extreme), value, pair
 
     def _refined(
         self, z: Complexes, samples: _Samples, margins: Floats, height: Floats
@@ -241,15 +243,16 @@ class Some(Ranged):
         parts = np.tile(np.linspace(0.0, 1.0, OF_LEGS)[:, None], len(z))
         parts, values = with_dips(legs, parts, legs(every, parts), none)
         margin, lane, turn, part, start = sign_changes(legs, parts, values, np.full(len(z), ROUNDING))
-        found = intervals_between(margin, lane, turn, part, start, np.ones(len(z)), 0.0)
-        found = found.kept(found.outer - found.inner > NARROWEST)
-        if not len(found.ray):
+        reached = intervals_between(margin, lane, turn, part, start, np.ones(len(z)), 0.0)
+        reached = reached.kept(reached.outer - reached.inner > NARROWEST)
+        if not len(reached.ray):
             return whole
-        ended = np.stack([found.enters, found.leaves]) >= 0
-        low, high = np.stack([found.inner, found.outer]) + ended * AT_END * (found.outer - found.inner) * [[1], [-1]]
-        left = np.flatnonzero(found.counts == 0)
+        ended = np.stack([reached.enters, reached.leaves]) >= 0
+        inset = AT_END * (reached.outer - reached.inner)
+        low, high = np.stack([reached.inner, reached.outer]) + ended * inset * [[1], [-1]]
+        left = np.flatnonzero(reached.counts == 0)
         return (
-            np.append(found.ray, whole[0][left]),
+            np.append(reached.ray, whole[0][left]),
             np.append(np.where(ended[0], self.low + low * width, self.low), whole[1][left]),
             np.append(np.where(ended[1], self.low + high * width, self.high), whole[2][left]),
             np.concatenate([ended, whole[3][:, left]], axis=1),
@@ -348,8 +351,8 @@ class SomeDesigns(Designs):
         start, direction = self.starts(design), np.exp(1j * theta)
 
         def height(ray: Ints, radius: Floats) -> Floats:
-            found: Floats = over.deciding(start[ray] + radius * direction[ray])[0][0]
-            return found
+            height_at: Floats = over.deciding(start[ray] + radius * direction[ray])[0][0]
+            return height_at
 
         x = self._places(start, theta, reach)
         values = height(np.broadcast_to(rays, x.shape), x)
@@ -366,8 +369,9 @@ class SomeDesigns(Designs):
         one = np.where(over.sliced.singular[one], np.where(over.sliced.singular[other], one, other), one)
         end = (value[0] <= over.low) + 2 * (value[0] >= over.high)
         label = np.where(one == other, one + count * end, (3 + one) * count + other)
-        found = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
-        return found if slack else found.kept(found.outer - found.inner > NARROWEST * reach[found.ray])
+        intervals = intervals_between(label, ray, turn, radius, (~positive[0]).astype(np.intp), reach, slack)
+        wide = intervals.outer - intervals.inner > NARROWEST * reach[intervals.ray]
+        return intervals if slack else intervals.kept(wide)
 
     def _places(self, start: Complexes, theta: Floats, reach: Floats) -> Floats:
         """Radii of each ray, ascending, shape (places, rays), of which two neighbours hold at most one end."""
@@ -375,10 +379,10 @@ class SomeDesigns(Designs):
         lanes = np.arange(rays * SAMPLES)
         values = {VALUE: np.tile(over.values, rays)}
         slices = Designs(over.sliced, values, len(lanes), self.about, self.scan, self.effort, np.repeat(start, SAMPLES))
-        found = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES))
+        intervals = trace(slices, lanes, np.repeat(theta, SAMPLES), np.repeat(reach, SAMPLES))
         # Stretches that some sample of the range reaches, by how many do.
-        ray, radius = np.tile(found.ray // SAMPLES, 2), np.concatenate([found.inner, found.outer])
-        turn = np.repeat([1, -1], len(found.ray))
+        ray, radius = np.tile(intervals.ray // SAMPLES, 2), np.concatenate([intervals.inner, intervals.outer])
+        turn = np.repeat([1, -1], len(intervals.ray))
         order = np.lexsort((-turn, radius, ray))
         ray, radius, turn = ray[order], radius[order], turn[order]
         cover = np.cumsum(turn)

@@ -70,10 +70,7 @@ def reach(question: Question) -> Reached:
     singular = not ranged and question.field.singular_everywhere
     if singular:
         question = replace(question, field=replace(question.field, same_assembly=False))
-    given = answer(
-        replace(question, wanted=OF_RANGE) if singular else question, {}, 1, OVER_RANGE if ranged else SINGLE
-    )
-    if singular:
+        given = answer(replace(question, indices=(), wanted=OF_RANGE), {}, 1, SINGLE)
         nothing = {name: np.full(1, np.nan) for name in question.wanted}
         given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
     else:
@@ -83,13 +80,15 @@ def reach(question: Question) -> Reached:
         return Reached(question, given, singular, everywhere=everywhere)
     field, parts = question.field, list(given.pieces.all())
     pieces = areas(question, given, parts)
-    patches, told = patches_of_pieces(given.pieces.panels, parts, question.rays or RAYS), causes(field)
-    known = Reached(question, given, singular, patches, pieces, everywhere, boundary=boundary_of(field, patches, told))
+    patches = patches_of_pieces(given.pieces.panels, parts, question.rays or RAYS)
+    reasons = causes(field)
+    boundary = boundary_of(field, patches, reasons)
+    region = Reached(question, given, singular, patches, pieces, everywhere, boundary=boundary)
     if ranged:
-        return known
+        return region
     counted = [patch for patch in patches if patch.piece == 1 or not field.same_assembly]
     others = [patch for patch in patches if patch not in counted]
     return replace(
-        known, shapes=inscribed(field, question.scan, counted, others), nodes=nodes_of(field, question.shown, patches),
-        loci=loci(field, told, patches, singular=singular),
+        region, shapes=inscribed(field, question.scan, counted, others), nodes=nodes_of(field, question.shown, patches),
+        loci=loci(field, reasons, patches, singular=singular),
     )  # fmt: skip

@@ -66,19 +66,19 @@ def causes(field: Field) -> list[tuple[str, str]]:
         return [*single * 3, *((kind, f"{one} and {other}") for kind, one in single for _, other in single)]
     names = forward_names(field.mechanism)
     stated = {bound.label: bound.coordinate.name for bound in field.mechanism.bounds}
-    found = []
+    words = []
     for kind, label in field.labels:
         if kind == "limit":
             stem, _, side = label.rpartition(" ") if label not in stated else (label, "", "range")
-            found.append((kind, f"{stated[stem]} {side}"))
+            words.append((kind, f"{stated[stem]} {side}"))
         elif label.startswith("assembly "):
-            found.append((FORWARD, names[int(label.removeprefix("assembly "))]))
+            words.append((FORWARD, names[int(label.removeprefix("assembly "))]))
         elif label == "continuation":
-            found.append((INVERSE, "working mode ends"))
+            words.append((INVERSE, "working mode ends"))
         else:
             leg = label.removesuffix(" length")
-            found.append((INVERSE, label if leg == label else f"{leg} at zero length"))
-    return found
+            words.append((INVERSE, label if leg == label else f"{leg} at zero length"))
+    return words
 
 
 def forward_names(mechanism: Mechanism) -> list[str]:
@@ -96,13 +96,13 @@ def _in_words(mechanism: Mechanism, group: Group) -> str:
 
 
 def loci(
-    field: Field, told: Sequence[tuple[str, str]], patches: Sequence[Patch], *, singular: bool
+    field: Field, reasons: Sequence[tuple[str, str]], patches: Sequence[Patch], *, singular: bool
 ) -> list[Locus]:  # fmt: skip
     """Singularities inside a region, unless it is `singular` everywhere, then those that bound it, as curves.
 
-    `told` are the `causes` of its field.
+    `reasons` are the `causes` of its field.
     """
-    edges = [(*told[edge.margin], edge.places) for patch in patches for edge in patch.edges]
+    edges = [(*reasons[edge.margin], edge.places) for patch in patches for edge in patch.edges]
     edges = sorted((edge for edge in edges if edge[0] != "limit"), key=lambda edge: edge[:2])
     groups = [(*key, [places for *_, places in group]) for key, group in groupby(edges, key=lambda edge: edge[:2])]
     if not field.same_assembly and not singular:
@@ -119,8 +119,8 @@ def _inside(field: Field, patches: Sequence[Patch]) -> list[tuple[str, str, list
 
     def values(z: Complexes) -> Floats:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            found = determinants(field.mechanism.linearize(field.configuration(z, {})))
-        return np.stack([np.broadcast_to(np.asarray(d, dtype=float), z.shape) for d in found])
+            sizes = determinants(field.mechanism.linearize(field.configuration(z, {})))
+        return np.stack([np.broadcast_to(np.asarray(d, dtype=float), z.shape) for d in sizes])
 
     curves: list[list[Complexes]] = [[] for _ in names]
     for patch in patches:

@@ -54,10 +54,10 @@ class Integrand:
 
     def values(self, local: Local) -> Floats:
         """Values at points; 0 where there is none: on the boundary itself rounding leaves an interval of no width."""
-        found = np.broadcast_to(np.asarray(self.index.values(local), dtype=float), local.configuration.shape)
+        integrand = np.broadcast_to(np.asarray(self.index.values(local), dtype=float), local.configuration.shape)
         with np.errstate(over="ignore", invalid="ignore"):
-            found = found**self.power
-        return np.where(np.isfinite(found), found, 0.0)
+            integrand = integrand**self.power
+        return np.where(np.isfinite(integrand), integrand, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,13 +215,13 @@ def evaluate(designs: Designs, integrands: Sequence[Integrand], segments: Parts)
 
 def _beyond_nodes(segments: Parts, r: Floats, values: Floats) -> Floats:
     """What a kink between the end of a segment and its nearest node would change, of which no node tells."""
-    found = np.zeros(len(segments))
+    change_by = np.zeros(len(segments))
     for side, end, name, at, node in ((-1, "inner", "start", 0.0, 0), (1, "outer", "stop", 1.0, -1)):
         some = np.flatnonzero((segments["kink"] == side) & (segments[name] == at))
         near, far = r[[node, node - side], some[:, None]].T
         change, way = np.abs(values[node - side, some] - values[node, some]), np.abs(far - near)
-        found[some] = change / np.where(way > 0, way, np.inf) * (segments[end][some] - near) ** 2 * near
-    return found
+        change_by[some] = change / np.where(way > 0, way, np.inf) * (segments[end][some] - near) ** 2 * near
+    return change_by
 
 
 def _unevenness(local: Local) -> Floats:

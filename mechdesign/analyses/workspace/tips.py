@@ -44,9 +44,9 @@ def isotropic_points(panels: Panels, cells: Parts, strips: Strips, some: Flags) 
     after = np.append(np.where(same, uneven[1:], np.inf), np.inf)
     chosen = (uneven <= np.minimum(before, after)) | (np.arange(len(segments)) % EVERY == 0)
     seed = np.flatnonzero(chosen & (uneven < SEED) & some[segments["cell"]])
-    found = np.zeros(len(seed), dtype=TIP)
+    tips = np.zeros(len(seed), dtype=TIP)
     if not len(seed):
-        return found
+        return tips
     from_, about = segments[seed], panels.designs.about
     way: Complexes = np.exp(1j * from_["theta"])
     place, size = _solved(panels, from_["design"], about + strips.place[seed] * way)
@@ -62,12 +62,12 @@ def isotropic_points(panels: Panels, cells: Parts, strips: Strips, some: Flags) 
     part = np.full(len(seed), np.nan)
     ray, inner, outer = traced.ray[mine], traced.inner[mine], traced.outer[mine]
     part[ray] = (np.abs(place - about)[ray] - inner) / (outer - inner)
-    found["cell"], found["slot"], found["theta"], found["part"] = from_["cell"], from_["slot"], theta, part
-    found = found[good & (part > -BESIDE) & (part < 1 + BESIDE)]
-    found = found[np.lexsort((found["theta"], found["cell"]))]
-    near = np.diff(found["theta"]) < AT_END * (cells["high"] - cells["low"])[found["cell"][1:]]
-    first = np.append(True, (np.diff(found["cell"]) > 0) | ~near)[: len(found)]
-    return np.asarray(found[first])
+    tips["cell"], tips["slot"], tips["theta"], tips["part"] = from_["cell"], from_["slot"], theta, part
+    tips = tips[good & (part > -BESIDE) & (part < 1 + BESIDE)]
+    tips = tips[np.lexsort((tips["theta"], tips["cell"]))]
+    near = np.diff(tips["theta"]) < AT_END * (cells["high"] - cells["low"])[tips["cell"][1:]]
+    first = np.append(True, (np.diff(tips["cell"]) > 0) | ~near)[: len(tips)]
+    return np.asarray(tips[first])
 
 
 def _solved(panels: Panels, design: Ints, z: Complexes) -> tuple[Complexes, Floats]:
@@ -106,12 +106,12 @@ def ended_at(cells: Parts, tips: Parts) -> Parts:
     begins = np.diff(ends["cell"], prepend=-1) > 0
     ends = ends[begins | (np.diff(ends["theta"], prepend=-np.inf) > 0)]
     pair = np.flatnonzero(np.diff(ends["cell"]) == 0)
-    found = cells[ends["cell"][pair]]
+    divided_cells = cells[ends["cell"][pair]]
     for side, which in (("low", pair), ("high", pair + 1)):
         for key, field in ((side, "theta"), (f"{side}_slot", "slot"), (f"{side}_part", "part")):
-            found[key] = ends[field][which]
-    found["share"] /= np.bincount(ends["cell"][pair])[ends["cell"][pair]]
-    return np.asarray(found)
+            divided_cells[key] = ends[field][which]
+    divided_cells["share"] /= np.bincount(ends["cell"][pair])[ends["cell"][pair]]
+    return np.asarray(divided_cells)
 
 
 def through_points(cells: Parts, segments: Parts) -> Parts:
