@@ -15,11 +15,15 @@ from mechdesign.numerics.roots import dips
 SLACK = 1e-9
 # Rays beside the ends of panels, as parts of half a panel.
 BESIDE = np.array([0.0, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
-# Between rays a curve goes no farther than by this part of its fall to the next. The place of a tip is known to this
-# part of the way there from the last ray that meets it; beyond that ray the distance falls so much more than before it,
-# at so small a part of the angle that is left.
-RISE, TIP, SHARP, TOWARDS = 0.5, 2.0, 4.0, 0.5
+# Between two rays a curve rises above the farther one by this part of their difference at most.
+RISE = 0.5
+# Rises below this part of the reach are not climbed.
 FLAT = 0.1 * SAME_ROOT
+# A tip is recognised by a fall on its far side that is so many times the fall on the near side. Both are measured at
+# this part of the angle to the end of the panel.
+SHARP, TOWARDS = 4.0, 0.5
+# Largest error of a tip's place, in lengths of the way to it from the last ray that meets it.
+TIP = 2.0
 # Directions in which the rectangle around a region is measured: right, left, up, down.
 SIDES = np.array([1, -1, -1j, 1j])
 EVERY: Any = slice(None)

@@ -20,45 +20,48 @@ from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.numerics.roots import dips, lowest
 
-# Rays from a shape's centre to places spread along its outline, and the fewest to a side of a rectangle.
+# Rays from a shape's centre to places spread along its outline; a side of a rectangle has `SIDE_RAYS` or more.
 RAYS = 120
 SIDE_RAYS = 6
-# Places of the outline that are looked at in the end, and those along the way to one; and the part of its size by which
-# the outline is drawn inwards for that.
+# The final check of an outline: its places, and the places between the centre and one of them.
 CHECKED = 720
 CHECKED_ALONG = 101
+# The checked outline is smaller by this part, so that one that just touches the boundary passes.
 TOUCHING = 1e-7
-# Times that it is looked at, for it shrinks where it lies outside.
+# Rounds of the check: an outline that lies outside shrinks and is checked again.
 LOOKS = 4
-# Contacts: the lowest local minima of the scales that rays allow, so many at most; and steps to the place of those that
-# are no more than so many times the lowest.
+# Contacts are the lowest local minima of the scales that rays allow: so many at most.
 CONTACTS = 6
-STEPS = 8
+# Contacts within this factor of the lowest are found exactly, in so many steps.
 LOW = 1.3
-# Places, from the centre in half widths and heights, where margins are looked at for holes that no ray meets. Parabolas
-# through places so far beside the lowest lead to a hole; at most so many of these steps away.
+STEPS = 8
+# A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
+# parabolas lead from the place where a margin is lowest to the hole: their sampling distances, the samples around the
+# place, and the longest step, in sampling distances.
 LATTICE = (np.linspace(-1.2, 1.2, 11) + 1j * np.linspace(-1.2, 1.2, 11)[:, None]).ravel()
 PARABOLAS = (0.12, 0.006)
 AROUND = np.array([0, 1, -1, 1j, -1j, 1 + 1j])
 FARTHEST = 5.0
-# Margins below this part of the largest beside them are rounding's.
+# Margins below this part of the largest one are rounding.
 ROUNDING = 1e-12
-# Angles (radians): between the rays about a hole; to the direction of a corner, within which a contact is the corner's;
-# between the rays that give the direction of the boundary there.
+# Angle between the rays on either side of a hole (radians).
 ABOUT_HOLE = 1e-3
+# A contact is at a corner of the shape if its direction is this near to the corner's (radians).
 AT_CORNER = 1e-7
+# Angle between the two rays that show the direction of the boundary at a corner (radians).
 BESIDE = 1e-6
-# Rays about the scan's centre by which a free centre begins: so many in a turn, and in each panel at least; places on
-# each of their intervals; and how many of the best centres are moved.
+# A free centre starts at the best places on rays about the scan's centre: rays of a full turn, least rays of a panel.
 TURN_RAYS = 96
 PANEL_RAYS = 7
+# Places on each interval of these rays, as parts of it; and the number of places that centres start from.
 FRACTIONS = np.array([0.08, 0.25, 0.5, 0.75, 0.92])
 TRIALS = 2
-# Moves of a centre at most; the first in parts of the shape as it fits, the smallest in parts of it; and the gain of
-# the scale, as a part of it, that is not worth a move.
+# Most moves of a centre.
 MOVES = 24
+# Longest first move, as a part of the largest shape that fits; no move is shorter than `LAST_MOVE` of the shape.
 FIRST_MOVE = 0.3
 LAST_MOVE = 1e-6
+# A move is not made for a gain of the scale below this part of it.
 LEAST_GAIN = 1e-7
 
 

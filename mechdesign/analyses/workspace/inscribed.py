@@ -22,7 +22,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats
 INSCRIBED = (
     "circle_x", "circle_y", "circle_radius", "rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height"
 )  # fmt: skip
-# Cells of the raster along each side, and how many of its best places are tried.
+# Cells of the raster along each side, and the number of its best places that shapes grow from.
 CELLS, TRIALS = 96, 4
 # Places of a border that are judged in every round; a rectangle's corners are among them.
 PLACES = 64
@@ -36,10 +36,14 @@ LEAP = 0.06
 DEPTH = 1e-9
 # After the last round so much may lie outside; a border farther out counts as not found.
 LATE = 1e-7
-# A curve shorter than this part of the longest is a point; a trial not nearly as good as the best so far is left.
-POINT, HOPEFUL = 1e-6, 0.8
-# Step of differences, as a part of the size; a margin whose slope is less than this part of it is far from zero.
-STEP, FLAT = 1e-6, 1e-6
+# A curve shorter than this part of the region is a point.
+POINT = 1e-6
+# A place of the raster is tried if the shape there is at least this part of the best one so far.
+HOPEFUL = 0.8
+# Step of differences, as a part of the region's size.
+STEP = 1e-6
+# A margin whose slope is below this part of it is far from zero.
+FLAT = 1e-6
 
 # Borders, linear in their parameters: derivatives of points by each parameter at places u of the border in [0, 1).
 Border = Callable[[Floats], Complexes]

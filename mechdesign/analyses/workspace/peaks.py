@@ -32,6 +32,7 @@ NEAR = np.array([1e-8, 1.6e-7])
 POWER = 0.25
 # A determinant so small, as a part of a design's largest, has the sign that rounding gives it (in the tip of a cusp).
 ROUNDING = 1e-12
+# A search looks at this grid about its best place, smaller by `SHRINK` in every round.
 STENCIL = np.linspace(-1.0, 1.0, 5)
 SHRINK = 0.35
 MOST_ROUNDS = 40

@@ -42,16 +42,17 @@ ANGLES = Rule.of(20, 4, 6.0)
 MOST_PASSES = 24
 # Cells are not halved more often than this.
 MOST_HALVINGS = 12
-# Share of the tolerance for the errors along all rays, and by how much it shrinks from pass to pass.
+# Share of the tolerance that the errors along all rays may use up; it shrinks by `LESS` from pass to pass.
 ALONG, LESS = 0.6, 0.85
-# Cells are halved that exceed so many times their equal share of the tolerance.
+# A cell is halved if its error is so many times its equal share of the tolerance.
 FAR = 2.0
-# Share of the tolerance for the area, the divisor of every mean; and its relative tolerance at most.
+# The area divides every mean: it is wanted to this share of the tolerance, and to `FINEST_AREA` of itself at least.
 AREA = 0.1
 FINEST_AREA = 1e-6
-# A piece smaller than this part of the whole region is measured by the whole: its boundary may be rough all over.
+# Of a piece smaller than this part of the region the area is wanted as closely as of a piece of this size: its boundary
+# may be rough all over.
 SLIVER = 1e-3
-# Cells of one design at most; what is in doubt then stays so, and its error tells.
+# Cells of one design at most; with so many the error stays as it is.
 MOST_CELLS = 256
 # Rays, and nodes of each, of the rules of comparison unless the study says how many.
 RAYS, RADIAL_NODES = {"sector_mean": 101, "midpoint": 300}, {"sector_mean": 49, "midpoint": 200}

@@ -34,13 +34,14 @@ from mechdesign.numerics.roots import bracketed_roots
 
 # Samples of the range: with half as many a stretch was missed, 2e-4 of the area of a 3-RPR's.
 SAMPLES = 49
-# Samples of the whole range by which it is told where legs reach: distances are smooth in its values.
+# Samples of the whole range that show where legs reach: distances are smooth in its values.
 OF_LEGS = 17
 # First and last sample of a stretch that a leg ends, as a part of it.
 AT_END = 1e-9
-# Angle whose sine the samples are at the end of the range itself: nearly evenly.
+# Samples are even steps of an angle, their values go with its sine. At the end of the range itself, where no leg is
+# stretched, the angle is this (radians), so that the values are nearly even, too.
 GENTLE = 0.5
-# Places looked at at once, so that their samples fit into the processor's cache.
+# Places that are computed at once: their samples fit into the processor's cache.
 BLOCK = 1024
 # Distance of the values close to an extreme, as a part of the distance between samples.
 CLOSE = 0.03

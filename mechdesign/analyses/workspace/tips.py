@@ -16,13 +16,15 @@ from mechdesign.analyses.workspace.strips import Parts, Strips
 from mechdesign.mechanism.algebra import cross
 from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 
-# Squared unevenness of places from which points are looked for; unevenness below which they are such.
-SEED, ISOTROPIC = 0.1, 1e-6
-# Beside the most even rays, one of so many is begun from.
+# Newton's method starts from places whose squared unevenness is below this.
+SEED = 0.1
+# A place with a smaller unevenness is isotropic.
+ISOTROPIC = 1e-6
+# It starts from the most even rays, and from every second one of the others.
 EVERY = 2
-# Where the way to isotropy has so nearly one direction (the sine between two), there is a curve of such places.
+# Isotropic places form a curve where the two ways to them are parallel: the sine of their angle is below this.
 ALONG = 1e-2
-# Steps of Newton's method, the longest one and that of its differences, as parts of the reach.
+# Steps of Newton's method; the longest step and that of its differences, as parts of the reach.
 STEPS, LONGEST, DIFFERENCE = 6, 0.2, 1e-6
 # Part of a cell within which a point lies at its end.
 AT_END = 1e-6
