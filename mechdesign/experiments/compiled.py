@@ -14,7 +14,7 @@ from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import KeyPath, has
+from mechdesign.study.text.document import value_at
 from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, with_entries
 
@@ -81,7 +81,7 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
         while parameter in known:
             parameter += "_"
         own[name] = parameter
-        raw = _raw(study, keys)
+        raw = value_at(study.resolved, keys)
         added[parameter] = first[name] if raw is None else raw
         written.append((name, parameter))
     try:
@@ -90,14 +90,6 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
         return None
     moved = Designs(form.study, dict.fromkeys(own.values(), np.zeros(1)))
     return form if own and moved.alike else None
-
-
-def _raw(study: Study, keys: KeyPath) -> Any:
-    """What stands at a path of the data; None where nothing does."""
-    data: Any = study.resolved
-    for key in keys:
-        data = data[key] if has(data, key) else None
-    return data
 
 
 def is_number(value: Any) -> bool:

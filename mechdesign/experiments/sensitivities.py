@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -14,7 +13,7 @@ from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
-from mechdesign.experiments.cases import Case, answers, foresee, seeded
+from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
@@ -24,10 +23,10 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.sensitivities import Changed
 from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import dotted, has
+from mechdesign.study.text.document import dotted, value_at
 from mechdesign.study.text.fields import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
-from mechdesign.study.variants import entry_unit
+from mechdesign.study.variants import Changes, entry_unit
 from mechdesign.work.threads import one_thread
 
 # Largest change where the study names none, as a part of the value.
@@ -46,10 +45,10 @@ class Changing:
     step: float  # the largest
     unit: str
 
-    def cases(self) -> Iterator[Case]:
+    def cases(self) -> Iterator[Changes]:
         """Cases with the number reduced by each step, then with it increased by each step."""
         for sign in (-1, 1):
-            yield from (Case.of({self.name: self.value + sign * step}) for step in (self.step * STEPS).tolist())
+            yield from (((self.name, self.value + sign * step),) for step in (self.step * STEPS).tolist())
 
 
 def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
@@ -85,9 +84,7 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
 def _changing(study: Study, each: Changed) -> Changing:
     given = each.parameter
     path = entry(study.resolved, f"mechanism.parameters.{given}" if given in study.parameters.nominal else given)
-    raw: Any = study.resolved
-    for key in path:
-        raw = raw[key] if has(raw, key) else None
+    raw = value_at(study.resolved, path)
     if raw is None:
         raise StudyError(f"{given} is left to its default; give it a value in the study first")
     try:
@@ -115,7 +112,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
-    cases = [Case(()), *(case for number in numbers for case in number.cases())]
+    cases: list[Changes] = [(), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
     tally = Tally(cases, len(wanted), 0)
     for answered in answers(plain, cases, wanted, jobs=jobs):

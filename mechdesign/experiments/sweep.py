@@ -115,7 +115,7 @@ def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, An
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
     results = limits | {each.title: (None, None) for each in wanted}
-    entries = [name for name, _ in tally.cases[0].changes]
+    entries = [name for name, _ in tally.cases[0]]
     return {"cases": tally, "entries": entries, "results": results, "goals": _goals(study)}
 
 

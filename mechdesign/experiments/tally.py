@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Warned, Worst
-from mechdesign.experiments.cases import Case
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.cases import changes_in_words
 from mechdesign.report.requirements import Verdict, over_cases
+from mechdesign.study.variants import Changes
 from mechdesign.work.journal import Journal, digest
 
 # Cases after which, and seconds, a journal gets those that are finished.
@@ -27,13 +27,13 @@ class Tally:
 
     Parameters
     ----------
-    cases : sequence of Case
-        All of them.
+    cases : sequence of Changes
+        All cases.
     results, requirements : int
         Numbers that are wanted of each, and verdicts on it.
     """
 
-    def __init__(self, cases: Sequence[Case], results: int, requirements: int) -> None:
+    def __init__(self, cases: Sequence[Changes], results: int, requirements: int) -> None:
         self.cases = cases
         self._results, self._requirements = results, requirements
         self.width = 3 + results + 2 * requirements
@@ -100,7 +100,7 @@ class Tally:
 
     def named(self, k: int) -> str:
         """A case in words: its number, from 1, and its values."""
-        return f"case {k + 1} ({changes_in_words(self.cases[k].changes)})"
+        return f"case {k + 1} ({changes_in_words(self.cases[k])})"
 
     def note(self, journal: Journal, *, last: bool = False) -> None:
         """Let a journal have the cases that it has not, if they are many or it is time, or they are the last."""
