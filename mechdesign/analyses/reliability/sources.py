@@ -9,17 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.analyses.reliability.copula import Correlation
-from mechdesign.analyses.reliability.laws import (
-    PIN_LAWS,
-    SLIDE_LAWS,
-    Marginal,
-    Measured,
-    PinLaw,
-    SlideLaw,
-    fit_law,
-    marginal,
-    taken,
-)
+from mechdesign.analyses.reliability.laws import Marginal, Measured, fit_law, marginal, taken
+from mechdesign.analyses.reliability.pin_laws import PIN_LAWS, SLIDE_LAWS, PinLaw, SlideLaw
 from mechdesign.cautions import Caution
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
