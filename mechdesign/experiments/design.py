@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.schema.matrix import GRID, Values
 from mechdesign.study.text.document import in_yaml
@@ -66,7 +66,8 @@ class Grid(Design):
         return self.values[place]
 
     def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        return convert(self.values[place])[self._index(np.arange(count), place)]
+        index: Ints = self._index(np.arange(count), place)
+        return convert(self.values[place])[index]
 
     def _index(self, k: Any, place: int) -> Any:
         """Which of the entry's values case `k` has, a number or an array of them."""
