@@ -21,6 +21,7 @@ from mechdesign.analyses.kinematics.targets import followed
 from mechdesign.analyses.poses import SolvedPoses, alike, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
+from mechdesign.analyses.stiffness.body import ask
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
@@ -142,7 +143,7 @@ def tables(
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
-        body = stiffness.ask(study)
+        body = ask(study)
         held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
         found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent

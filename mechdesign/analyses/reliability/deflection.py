@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability.question import Channel
-from mechdesign.analyses.stiffness.analysis import Body
+from mechdesign.analyses.stiffness.body import Body, ask, by_forces
 from mechdesign.analyses.stiffness.elements import corners_of
 from mechdesign.cautions import Caution
 from mechdesign.mechanism import Configuration, Mechanism
@@ -122,8 +122,6 @@ class Elasticity:
 
     def _rates(self, configuration: Configuration, asked: Body) -> tuple[Rates, Flags]:
         """Displacements by unit loads, which are the leading axis, and whether poses hold them."""
-        from mechdesign.analyses.stiffness.analysis import by_forces
-
         loaded = by_forces(asked, configuration)
         moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
         origin = configuration.point(asked.given.at)
@@ -168,8 +166,6 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
-    from mechdesign.analyses.stiffness.analysis import ask
-
     asked, mechanism = ask(study), study.mechanism
     asked = asked if poses is None else asked.at(poses, np.arange(poses.count))
     network, graph, links = asked.network, mechanism.graph, mechanism.description.links
