@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -116,8 +116,8 @@ class Marginal(ABC):
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
-def taken(value: Number, rows: Sequence[int] | Ints) -> Number:
-    """A number at these poses; the number itself where it is the same at all poses."""
+def taken(value: Number, rows: Any) -> Number:
+    """A number at these poses (an index of the array of poses); the number itself where it is the same at all poses."""
     return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
 
 

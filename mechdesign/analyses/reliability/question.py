@@ -78,8 +78,7 @@ class ReliabilityQuestion:
 
     def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
         """The question at these poses, where limits are arrays of poses."""
-        bands = tuple(replace(band, low=taken(band.low, poses), high=taken(band.high, poses)) for band in self.bands)
-        discs = tuple(replace(disc, radius=taken(disc.radius, poses)) for disc in self.discs)
+        bands, discs = limits_at(self.bands, self.discs, poses)
         return replace(self, bands=bands, discs=discs)
 
     @property
@@ -152,6 +151,14 @@ class ReliabilityQuestion:
             with np.errstate(invalid="ignore", divide="ignore"):
                 gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
         return np.stack(gradients)
+
+
+def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
+    """The limits at one pose or some, by an index of the arrays of poses."""
+    return (
+        tuple(replace(band, low=taken(band.low, poses), high=taken(band.high, poses)) for band in bands),
+        tuple(replace(disc, radius=taken(disc.radius, poses)) for disc in discs),
+    )
 
 
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:

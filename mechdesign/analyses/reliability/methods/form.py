@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.engine.design_points import DesignPoints, descend, find, sizes
+from mechdesign.analyses.reliability.engine.descent import descend, sizes
+from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
