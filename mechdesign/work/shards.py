@@ -156,27 +156,15 @@ def found(directory: Path) -> list[Path]:
     return sorted(directory.glob(f"shard_*_of_*/{FILE}"))
 
 
-def command_of(path: Path) -> str:
-    """The command that was given where a shard was computed.
+def head_of(path: Path) -> Mapping[str, Any]:
+    """The head of a shard: the ``command`` that was given, and in ``origin`` the study, its changes and the seed.
 
     Raises
     ------
     StudyError
         If the file is damaged.
     """
-    return str(_read(path)[0]["command"])
-
-
-def origin_of(path: Path) -> Mapping[str, Any]:
-    """What decided the values of a shard: the study, the changes of it and the seed.
-
-    Raises
-    ------
-    StudyError
-        If the file is damaged.
-    """
-    origin: Mapping[str, Any] = _read(path)[0]["origin"]
-    return origin
+    return _read(path)[0]
 
 
 def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:

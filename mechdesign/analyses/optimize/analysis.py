@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from mechdesign.analyses.optimize.tables import (
     optimum_table,
     sensitivity_table,
 )
-from mechdesign.analyses.optimize.variables import Design, check_choices, grid, in_words, parted, snapped, study_of
+from mechdesign.analyses.optimize.variables import Design, check_choices, from_cube, grid, in_words, parted, study_of
 from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_columns, workspace
@@ -120,18 +119,19 @@ def _ask(
         judge.progress.start(len(next(iter(variables.values()))), "designs")
         judge.evaluate(variables)
         return ()
-    dimensions, smallest = len(section.variables), [each.smallest for each in judge.goals]
+    dimensions, signs = len(section.variables), np.array([goal.sign for goal in judge.goals])
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
     rough = bool(evaluator.questions)
-    explorer = Explorer(judge.known, dimensions, budget, judge.parts(), snap=partial(snapped, study), rough=rough)
+    explorer = Explorer(
+        judge.known, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=rough
+    )
     if section.method == "search":
         use_all = section.evaluations is not None
-        ending = searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all)
+        ending = searching.search(explorer, signs, weights.tolist(), seed, use_all=use_all)
         names = [[goal.name for goal, weight in zip(judge.goals, row, strict=True) if weight] for row in weights]
         objectives = [own[0] if len(own) == 1 else "a weighted sum" for own in names]
         return tuple(_doubts(ending, budget, objectives))
-    signs = np.where(smallest, 1.0, -1.0)
     pareto.search_front(explorer, signs, seed, use_all=section.evaluations is not None)
     return ()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -81,6 +81,13 @@ class Batch:
     def failed(self, rows: Ints, error: MechdesignError) -> None:
         """Say why designs make no study, or have no answer."""
         self.reasons[rows] = without_numbers(error)
+
+    def halves(self, rows: Ints, error: MechdesignError) -> Iterator[Ints]:
+        """Designs in halves, as the numbers of one of them give an error; a single design gets it as its reason."""
+        if len(rows) == 1:
+            self.failed(rows, error)
+        else:
+            yield from np.array_split(rows, 2)
 
     def note(self, rows: Ints | slice, wrong: Flags, reasons: NDArray[np.object_] | str) -> None:
         """Say what is wrong with some of the rows, where nothing has been said yet."""

@@ -270,11 +270,8 @@ class Evaluator:
         try:
             given = [answer(each, each.places(numbers) if own else {}, len(rows), BATCH) for each in asked]
         except AssemblyError as error:
-            # One design's workspace has no end; the others are asked in halves.
-            if len(rows) == 1:
-                batch.reasons[rows] = without_numbers(error)
-                return
-            for half in np.array_split(rows, 2):
+            # The workspace of one design has no end.
+            for half in batch.halves(rows, error):
                 self._regions(batch, half, asked)
             return
         for question, each in zip(asked, given, strict=True):
@@ -301,11 +298,7 @@ class Evaluator:
         try:
             stack = stacked.tables(study, command, wanted, poses, self._outputs, self._asked)
         except MechdesignError as error:
-            if len(rows) == 1:
-                batch.failed(rows, error)
-                return
-            # The numbers of one design cannot be asked; the others are, in halves.
-            for half in np.array_split(rows, 2):
+            for half in batch.halves(rows, error):
                 own = study_poses(study, command, batch.designs.take(half).numbers)
                 self._tables(batch, command, tables, half, study, own)
             return

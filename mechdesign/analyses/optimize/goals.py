@@ -64,6 +64,11 @@ class Goal:
     gate: bool = False
 
     @property
+    def sign(self) -> float:
+        """1 where less is better, or the largest row the worst one; else -1."""
+        return 1.0 if self.smallest else -1.0
+
+    @property
     def regional(self) -> bool:
         """Whether it is a number of the whole workspace."""
         found = self.outline is not None or self.column in COLUMNS or bool(split(self.column)[0])

@@ -251,7 +251,7 @@ class Judge:
         head, margins = self.layout.head, self.layout.margins
         places = {each: slice(at.start - head, at.stop - head) for each, at in self.layout.rows.items()}
         found = [
-            Part(column, 1.0 if goal.smallest else -1.0, goal.absolute, places[goal], goal.bound, goal in self._squares)
+            Part(column, goal.sign, goal.absolute, places[goal], goal.bound, goal in self._squares)
             for column, goal in enumerate((*self.goals, *self.conditions))
             if goal in places and (column < len(self.goals) or goal not in self._squares)
         ]
@@ -261,7 +261,7 @@ class Judge:
 
     def known(self, u: Floats) -> Known:
         """Evaluate points of the unit cube."""
-        designs, given = from_cube(self.study, u)
+        designs, given, _ = from_cube(self.study, u)
         found = np.full((len(u), self.layout.width), np.nan)
         if given.any():
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})

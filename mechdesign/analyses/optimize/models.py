@@ -161,11 +161,6 @@ class Models:
         lane = np.arange(len(chosen))[:, None]
         return Models(self.value[lane, chosen], self.slope[lane, chosen], self.bend[lane, chosen])
 
-    @classmethod
-    def joined(cls, parts: Sequence[Models]) -> Models:
-        """The columns of several."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])))
-
     def scaled(self, by: Floats) -> Models:
         """In parts of a number for each value."""
         return Models(self.value / by, self.slope / by[..., None], self.bend / by[..., None, None])

@@ -70,13 +70,16 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
     """
     budget, goals = explorer.left, np.eye(len(signs))
     explorer.left = budget // BEST_PART
-    search(explorer, (signs > 0).tolist(), goals.tolist(), seed, use_all=False)
+    search(explorer, signs, goals.tolist(), seed, use_all=False)
     explorer.left += budget - budget // BEST_PART
-    _end(explorer, signs, budget // END_PART)
+    # The ends of the front: the best of each goal; the others count as far as that leaves them free.
+    _descend(explorer, signs, goals + BESIDE, budget // END_PART)
     for k in count():
         before = explorer.evaluated
         _spread(explorer, signs, seed + k)
-        _descend_between(explorer, signs, budget // SUMS_PART, seed + k)
+        # Between the ends weighted sums of the goals find designs where the front is convex.
+        weights = np.random.default_rng(seed + k).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
+        _descend(explorer, signs, weights, budget // SUMS_PART)
         _fill(explorer, signs)
         if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before)):
             break
@@ -112,21 +115,10 @@ def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     explorer.reserve = 0
 
 
-def _end(explorer: Explorer, signs: Floats, most: int) -> None:
-    """Descend to the ends of the front, each goal's best; the others count as far as that one leaves them free."""
-    _descend(explorer, signs, np.eye(len(signs)) + BESIDE, most)
-
-
-def _descend_between(explorer: Explorer, signs: Floats, most: int, seed: int) -> None:
-    """Descend to designs between the ends by weighted sums of the goals, which find them where the front is convex."""
-    weights = np.random.default_rng(seed).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
-    _descend(explorer, signs, weights, most)
-
-
 def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> None:
-    """Descend from the front by sums of the normalised goals with weights, shape (sums, goals).
+    """Descend from the front by weighted sums of the normalised goals; at most `most` designs are evaluated.
 
-    At most so many designs are evaluated.
+    `weights` are of shape (sums, goals).
     """
     known = explorer.known
     rows = _front_rows(known, signs)
@@ -301,7 +293,7 @@ class Front:
 
 def signs_of(designs: Designs) -> Floats:
     """1 for each goal that is minimised, -1 for one that is maximised."""
-    return np.array([1.0 if goal.smallest else -1.0 for goal in designs.goals])
+    return np.array([goal.sign for goal in designs.goals])
 
 
 def front_of(designs: Designs) -> Front:

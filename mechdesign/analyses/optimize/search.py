@@ -92,14 +92,14 @@ def allowance(dimensions: int, rows: int, *, alone: bool = False) -> int:
 
 
 def search(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], seed: int, *, use_all: bool = True
+    explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], seed: int, *, use_all: bool = True
 ) -> Ending:
     """Fill an explorer's memory with what the goals' extremes and the best weighted sums need, while evaluations last.
 
     Parameters
     ----------
-    smallest : sequence of bool
-        Which goals are minimised.
+    signs : ndarray, shape (goals,)
+        1 where a goal is minimised, -1 where it is maximised.
     rows : sequence of sequence of float
         Rows of weights.
     use_all : bool
@@ -109,17 +109,17 @@ def search(
     budget, slope = explorer.left, 2 * explorer.dimensions + 1
     visits: list[Ints] = []
     explorer.reserve = min(budget // 4, CHECK_EVALUATIONS * slope * len(rows))
-    _starts(explorer, smallest, rows, rng, visits, use_all)
+    _starts(explorer, signs, rows, rng, visits, use_all)
     explorer.reserve = 0
     try:
-        checked = _confirmed(explorer, [_weighted(explorer.known, smallest, row) for row in rows], rng)
+        checked = _confirmed(explorer, [_weighted(explorer.known, signs, row) for row in rows], rng)
     except Spent:
         checked = False
     size = len(explorer.known.u)
     if use_all:
-        _starts(explorer, smallest, rows, rng, visits, use_all)
+        _starts(explorer, signs, rows, rng, visits, use_all)
     known = explorer.known
-    objectives = [_weighted(known, smallest, row) for row in rows]
+    objectives = [_weighted(known, signs, row) for row in rows]
     checked &= all(_reached(known, objective, visits) for objective in objectives)
     # What was evaluated after the last steps from the optima has not improved them.
     checked &= all(_best(known, objective) < size for objective in objectives)
@@ -130,7 +130,7 @@ def search(
 
 
 def _starts(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
+    explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], rng: np.random.Generator,
     visits: list[Ints], use_all: bool,
 ) -> None:  # fmt: skip
     """Start until each row's optimum is confirmed, or with `use_all` until evaluations, or designs, are used up.
@@ -143,7 +143,7 @@ def _starts(
         explorer.forget()
         left = explorer.left
         try:
-            _start(explorer, smallest, open_, own, first=not visits)
+            _start(explorer, signs, open_, own, first=not visits)
             visits.append(explorer.visited)
         except Spent:
             # Too few for anything but to look around; they are not of a start of their own.
@@ -154,11 +154,11 @@ def _starts(
             return
         if not use_all:
             known = explorer.known
-            open_ = [row for row in open_ if not _reached(known, _weighted(known, smallest, row), visits)]
+            open_ = [row for row in open_ if not _reached(known, _weighted(known, signs, row), visits)]
 
 
 def _start(
-    explorer: Explorer, smallest: Sequence[bool], rows: Sequence[Sequence[float]], rng: np.random.Generator,
+    explorer: Explorer, signs: Floats, rows: Sequence[Sequence[float]], rng: np.random.Generator,
     *, first: bool,
 ) -> None:  # fmt: skip
     """Search from points of its own; the first start looks for the ends of several goals, too."""
@@ -166,28 +166,28 @@ def _start(
     if allowed < SMALLEST_POPULATION:
         raise Spent
     begin = explorer(sample(n, rng, SAMPLE_POINTS * (n + 1), allowed // SAMPLE_SHARE))
-    if first and len(smallest) > 1 and allowed > 4 * len(smallest) * DESCENT_EVALUATIONS * (2 * n + 1):
-        _extremes(explorer, smallest, rng, allowed)
+    if first and len(signs) > 1 and allowed > 4 * len(signs) * DESCENT_EVALUATIONS * (2 * n + 1):
+        _extremes(explorer, signs, rng, allowed)
     for row in rows:
         most = min(EVOLUTION * (n + 1), int(EVOLUTION_PART * allowed) // len(rows))
-        evolve(explorer, _weighted(explorer.known, smallest, row), rng, most)
+        evolve(explorer, _weighted(explorer.known, signs, row), rng, most)
     room = (explorer.left - explorer.reserve) // (DESCENT_EVALUATIONS * (2 * n + 1) * len(rows))
     most = int(np.clip(room // 2, 1, ROUGH_MAX_DESCENTS if explorer.rough else MAX_DESCENTS))
     known, descents = explorer.known, []
     for row in rows:
-        objective = _weighted(known, smallest, row)
+        objective = _weighted(known, signs, row)
         apart = _apart(known, objective, explorer.visited, most, START_DISTANCE)
         apart += _apart(known, objective, np.setdiff1d(begin, apart), most, SAMPLE_DISTANCE)
         descents += [(objective, k) for k in apart]
     descend(explorer, descents)
 
 
-def _extremes(explorer: Explorer, smallest: Sequence[bool], rng: np.random.Generator, allowed: int) -> None:
+def _extremes(explorer: Explorer, signs: Floats, rng: np.random.Generator, allowed: int) -> None:
     """Both ends of every goal, to normalise by; they need not be known to the last digit."""
-    goals = len(smallest)
+    goals = len(signs)
     ends = [sign * line for line in np.eye(goals) for sign in (1.0, -1.0)]
-    for goal, down in enumerate(smallest):
-        evolve(explorer, ends[2 * goal + (not down)], rng, int(EVOLUTION_PART * allowed) // (4 * goals))
+    for end in np.diag(signs):
+        evolve(explorer, end, rng, int(EVOLUTION_PART * allowed) // (4 * goals))
     descend(explorer, [(end, k) for end in ends for k in [_best(explorer.known, end)]])
 
 
@@ -275,9 +275,8 @@ def sample(dimensions: int, rng: np.random.Generator, count: int, most: int) -> 
     return np.concatenate([vertices, u])
 
 
-def _weighted(known: Known, smallest: Sequence[bool], row: Sequence[float]) -> Floats:
+def _weighted(known: Known, signs: Floats, row: Sequence[float]) -> Floats:
     """The weighted sum of normalised goals [S1, eq. 28], turned round so that less is better; a goal alone as it is."""
-    signs = np.where(smallest, 1.0, -1.0)
     if np.count_nonzero(row) == 1:
         return np.asarray(signs * np.sign(row))
     values = known.values[known.feasible if known.feasible.any() else known.valid]

@@ -6,7 +6,7 @@ A design is a number of each variable; of a variable whose choices are no number
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,6 @@ def variables_of(study: Study) -> Mapping[str, Variable]:
 def ranges(study: Study) -> list[str]:
     """Variables that have a range rather than choices."""
     return [name for name, variable in variables_of(study).items() if variable.choices is None]
-
-
-def stepped(study: Study) -> Flags:
-    """Which variables have nothing between their values, shape (variables,): whole numbers and choices."""
-    return np.array([variable.stepped for variable in variables_of(study).values()])
 
 
 def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats]:
@@ -88,27 +83,30 @@ def _valued(variable: Variable, numbers: Floats) -> Floats:
     return np.array(variable.choices, dtype=float)[numbers.astype(np.intp)]
 
 
-def from_cube(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags]:
-    """Designs at points of the unit cube, and which of them have a value for every variable.
+class CubeDesigns(NamedTuple):
+    """Designs at points of the unit cube.
 
     Parameters
     ----------
+    designs : dict of str to ndarray
+        Value of each variable.
+    given : ndarray of bool, shape (designs,)
+        Which designs have a value for every variable.
     u : ndarray, shape (designs, variables)
-        Fractions of the way from each lower bound to the upper one; whole numbers and choices have equal shares of it.
+        The points, moved to the middle of the shares of whole numbers and choices: two points of one design are equal.
     """
-    return _placed(study, u)[:2]
+
+    designs: dict[str, Floats]
+    given: Flags
+    u: Floats
 
 
-def snapped(study: Study, u: Floats) -> Floats:
-    """Points of the unit cube, shape (designs, variables), in the middle of the shares of whole numbers and choices.
+def from_cube(study: Study, u: Floats) -> CubeDesigns:
+    """Designs at points of the unit cube, shape (designs, variables).
 
-    Points that are the same design are the same point then.
+    A point has fractions of the way from each lower bound to the upper one; whole numbers and choices have equal shares
+    of that way.
     """
-    return _placed(study, u)[2]
-
-
-def _placed(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags, Floats]:
-    """See `from_cube` and `snapped`."""
     designs: dict[str, Floats] = {}
     given, middle = np.ones(len(u), dtype=bool), u.copy()
     for k, (name, variable) in enumerate(variables_of(study).items()):
@@ -126,7 +124,7 @@ def _placed(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags, Floats]:
             # The upper bound itself, not what rounding makes of it.
             designs[name] = np.where(share == 1, high, low + share * (high - low))
         given &= well
-    return designs, given, middle
+    return CubeDesigns(designs, given, middle)
 
 
 def grid(study: Study) -> dict[str, Floats]:
