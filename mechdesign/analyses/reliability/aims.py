@@ -30,14 +30,14 @@ _LEAST_FAILURE = 1e-300
 _LEAST_DISTANCE = 1e-6
 # Expected failures among the study's samples from which on plain Monte Carlo confirms a reliability.
 _ENOUGH_FAILURES = 100
-# Probability of failure assumed at most where a simulation saw no failure, as a share of the target.
+# Largest probability of failure that is assumed where no sample failed, as a share of the target.
 _UNSEEN = 0.01
 # Bisection steps in the search of a standard deviation.
 _HALVINGS = 60
 
 
 class Simulated(NamedTuple):
-    """Simulated measures and the worse and better end of their 99.7 % intervals, shape (limits, poses).
+    """Simulated measures, and the worse and the better end of their 99.7 % intervals, shape (limits, poses).
 
     `unseen` marks poses without a failed sample; `evaluations` are the mechanisms solved at each pose.
     """
@@ -71,7 +71,7 @@ class Aim(ABC):
 
     @abstractmethod
     def in_words(self, measure: float) -> str:
-        """The same for a message."""
+        """The measure as messages have it."""
 
     @abstractmethod
     def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
@@ -87,13 +87,13 @@ class Aim(ABC):
 
     @abstractmethod
     def safe(self, simulated: Simulated) -> Floats:
-        """Measures on the safe side of the simulated ones, from which the model's target is corrected."""
+        """Measures no better than the simulated ones, from which the model's target is corrected."""
 
     @abstractmethod
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         """Largest standard deviation of an error of mean 0 that reaches `level` within [low, high]; 0 where none does.
 
-        Where several limits have to be kept together, each of them alone has to reach the level, too.
+        Limits that have to be kept together reach a level only if each of them alone does.
         """
 
 
@@ -137,7 +137,7 @@ class Reliable(Aim):
         return Simulated(value, high, low, value == 0, [e.evaluations for e in estimates])
 
     def safe(self, simulated: Simulated) -> Floats:
-        # Where few failures are seen, or none, the interval's end keeps the correction on the safe side.
+        # With few failures, or none, the end of the interval is used.
         few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.asked)
         seen = np.where(few, simulated.worst, simulated.value)
         return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.asked), seen)

@@ -27,14 +27,14 @@ from mechdesign.study.variants import rewritten
 
 # Most rounds of allocation and simulation.
 _MAX_ROUNDS = 14
-# Least share by which a correction shortens the bracket of the model's target.
+# Least share by which a correction narrows the bracket of the model's target.
 _BRACKET_PART = 0.1
 # Coefficient of variation to which `auto` confirms failures, where the study gives no precision.
 _PRECISION = 0.1
 # Distance between a pose's level and the model's target up to which its constraint is active.
 _ACTIVE = 1e-3
-# Largest step by which a round lowers the target level of grades: with the next choice the difference between
-# simulation and model may be smaller.
+# Largest step by which a round lowers the target level of grades, as the next choice may have a smaller difference
+# between simulation and model.
 _LEVEL_STEP = 0.1
 # Relative difference up to which costs are equal.
 _SAME = 1e-9

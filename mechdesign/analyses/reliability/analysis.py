@@ -35,7 +35,7 @@ from mechdesign.work.threads import keep_freed_memory, one_thread
 
 # Poses whose sensitivities are computed together.
 _POSES_TOGETHER = 2048
-# Listed poses that have a density.
+# Number of listed poses that have a density.
 _DENSITIES = 12
 # Poses that give the same coordinates, and the rates of their drives.
 _Groups = Sequence[tuple[SolvedPoses, DriveRates]]

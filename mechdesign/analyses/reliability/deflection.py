@@ -179,7 +179,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
         elif len(corners) == 2 and carried.keys() >= {*corners}:
             lines[link] = corners[0][1], corners[1][1]
         ends |= carried
-    # The ground's vertex where the ground has the point, else the first link's.
+    # A point named without its link is the ground's where the ground has it, else that of the first link.
     pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
     if stiffness.at == stiffness.point:
         pins[graph.node(stiffness.at)] = (network.asked,)
@@ -191,7 +191,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
 
 
 def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
-    """Warnings that name channels whose deflection is not known, and those that could be understood in two ways."""
+    """Warnings of channels whose deflection is not known, or whose name could mean two points or angles."""
     positions = [channel for channel in channels if channel.order == 0]
     warnings = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]

@@ -22,20 +22,21 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _LATTICE_POINTS = 8191
 # Random shifts of the lattice.
 _LATTICE_SHIFTS = 8
-# Sum of the limits' probabilities below which a lattice has too few failures, and points are drawn beyond the limits.
+# Sum of the limits' probabilities below which too few lattice points fail, and points are drawn beyond the limits
+# instead.
 _RARE = 0.05
-# Points that are drawn beyond the limits.
+# Number of points that are drawn beyond the limits.
 _RARE_POINTS = 20_000
-# Probability of not being assembled that is neglected, as a share of the probability of failure.
+# Probability of no assembly that is neglected, as a share of the probability of failure.
 _NO_PART = 1e-6
-# The same as a probability.
+# Probability of no assembly that is neglected in any case.
 _LEAST_PART = 1e-15
-# Sides of the polygon in a circle whose half-spaces points are drawn from.
+# Sides of the polygon inside a circle, beyond whose sides points are drawn.
 _POLYGON_SIDES = 64
-# Steps round a circle for each least standard deviation b in its radius or in _OVAL times the largest deviation a.
+# Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
 _STEPS = 9.0
 _OVAL = 4.0
-# Steps from which on the integral over the width of the circle is used instead.
+# Number of steps from which on the integral over the width of the circle is used instead.
 _MOST_STEPS = 4096
 
 

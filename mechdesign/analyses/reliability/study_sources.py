@@ -121,7 +121,7 @@ def _check_sizes(sources: Sources) -> None:
 
 
 def _twice(study: Study, place: str, varying: Collection[str]) -> list[Caution]:
-    """What is to be known of a place that varies by itself and with a parameter that sets it."""
+    """A warning for each varying parameter that also sets a place with a tolerance of its own."""
     both = [name for name in study.parameters.nominal
             if name in varying and study.parameters.derivatives(name).get(place)]  # fmt: skip
     return [

@@ -30,7 +30,7 @@ from mechdesign.results import Column, Table
 
 # Bins of a histogram.
 _BINS = 60
-# Largest distance of its errors from the mean, in standard deviations.
+# Largest distance of a histogram's errors from the mean, in standard deviations.
 _FARTHEST = 6.0
 # Standard deviation, as a share of the output's size, up to which it is rounding and the output constant.
 _CONSTANT = 1e-12
@@ -67,7 +67,7 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
-        {}, method=np.array([each.method for each in known])[method], **_channels(task, channel), nominal=nominal,
+        {}, method=np.array([result.method for result in known])[method], **_channels(task, channel), nominal=nominal,
         mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
         worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
         unit=task.labels[2][channel], valid=task.reason[pose] == 0,
@@ -154,7 +154,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
     return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
-        {}, method=np.array([each.method for each in known])[method], output=output[limit], order=order[limit],
+        {}, method=np.array([result.method for result in known])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
         mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
         sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),

@@ -13,19 +13,20 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Most steps of the iteration.
 _ITERATIONS = 30
-# Fractions of a step that are tried where the whole of it does not improve.
+# Fractions of a step that are tried where the whole step does not improve the merit.
 _FRACTIONS = np.array([0.5, 0.25, 0.0625])
-# A point is a design point where a step is shorter than this, or nothing improves, and the margin is this small.
+# The iteration ends where a step is shorter than this, or nothing improves. The point is on the limit if its margin,
+# over the margin at the mean, is this small.
 _SHORT_STEP = 5e-3
 _ZERO_MARGIN = 1e-2
 # A step that leaves more than this share of the merit gains little.
 _LITTLE_GAIN = 0.95
-# Directions farther from each other than this (distance on the circle) are two.
+# Two points differ where their directions are farther apart on the circle than this.
 _DIRECTIONS_APART = 0.5
 
 
 def sizes(problem: Problem) -> Floats:
-    """Margins at the mean as sizes by which others are large or small, shape (limits,); 1 where they are none."""
+    """Magnitudes of the margins at the mean, by which margins are scaled, shape (limits,); 1 where one is 0 or nan."""
     scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
     return np.asarray(np.where((scale > 0) & np.isfinite(scale), scale, 1.0))
 
@@ -40,18 +41,18 @@ def descend(
     limit, u : ndarray, shape (starts,) and (dimension, starts)
         Limits, and points to start from.
     scale : ndarray, shape (limits,)
-        Those of `sizes`.
+        See `sizes`.
     together : bool
         Whether starts that have come together go on as one.
 
     Returns
     -------
     u, normal, good
-        Points and unit vectors into the failure, shape (dimension, starts), and which came to their limit, once where
-        several came together.
+        Points, and unit vectors towards failure, shape (dimension, starts); which starts came to their limit, of those
+        that came together one.
     """
     u = u.copy()
-    straight = problem.straight[:, None]
+    is_normal = problem.is_normal[:, None]
     active = np.ones(len(limit), dtype=bool)
     good = np.zeros(len(limit), dtype=bool)
     normal = np.zeros_like(u)
@@ -61,9 +62,9 @@ def descend(
             break
         margins, gradients = problem.gradients(u[:, lanes])
         rows, k = limit[lanes], np.arange(len(lanes))
-        # Of a limit out of all proportion they are infinite, and its nearest point is not known.
+        # Squares may overflow; such a start is given up below.
         with np.errstate(over="ignore"):
-            g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
+            g, slope = margins[rows, k] / scale[rows], is_normal * gradients[rows, :, k].T / scale[rows]
             size = (slope**2).sum(axis=0)
         known = np.isfinite(g) & np.isfinite(size) & (size > 0)
         active[lanes[~known]] = False
@@ -71,14 +72,14 @@ def descend(
             continue
         lanes, g, slope, size = lanes[known], g[known], slope[:, known], size[known]
         at = u[:, lanes]
-        step = slope * (((slope * at).sum(axis=0) - g) / size) - straight * at
+        step = slope * (((slope * at).sum(axis=0) - g) / size) - is_normal * at
         normal[:, lanes] = -slope / np.sqrt(size)
         weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
         before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
         trial = at + step
         merit = _merit(problem, trial, limit[lanes], scale, weight)
         far = np.linalg.norm(step, axis=0) >= _SHORT_STEP * (1 + np.linalg.norm(at, axis=0))
-        # A whole step that gains little swings about the nearest point.
+        # A whole step that gains little would oscillate about the nearest point.
         worse = np.flatnonzero(~(merit < np.where(far, _LITTLE_GAIN, 1.0) * before))
         if worse.size:
             shorter = at[:, None, worse] + _FRACTIONS[:, None] * step[:, None, worse]
@@ -98,7 +99,7 @@ def descend(
             others = lanes[:i][active[lanes[:i]] | good[lanes[:i]]]
             if active[lane] and any(limit[lane] == limit[o] and alike(problem, u[:, lane], u[:, o]) for o in others):
                 active[lane] = False
-    # Those that came near in the time that they had are good enough to sample about.
+    # Starts that are not settled but close to the limit are good enough to sample about.
     lanes = np.flatnonzero(active)
     if lanes.size:
         margins = problem.margins(u[:, lanes])
@@ -107,16 +108,16 @@ def descend(
 
 
 def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
-    """What the iteration makes smaller, shape (n,); infinite where there are no margins."""
+    """The merit function that the iteration minimises, shape (n,); infinite where margins are nan."""
     value = problem.margins(u)[limit, np.arange(len(limit))] / scale[limit]
     merit = 0.5 * (u**2).sum(axis=0) + weight * np.abs(value)
     return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
 
 
 def alike(problem: Problem, one: Floats, other: Floats) -> bool:
-    """Whether two points are one."""
+    """Whether two points count as the same."""
     gap = one - other
     if (np.hypot(*gap[problem.circles.T]) > _DIRECTIONS_APART).any():
         return False
-    size, straight = float(np.linalg.norm(gap[problem.normals])), float(np.linalg.norm(one[problem.normals]))
-    return size < 0.3 or size < 0.2 * straight
+    size, length = float(np.linalg.norm(gap[problem.normals])), float(np.linalg.norm(one[problem.normals]))
+    return size < 0.3 or size < 0.2 * length
