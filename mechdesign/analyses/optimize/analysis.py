@@ -44,11 +44,11 @@ from mechdesign.work.chunks import workers
 from mechdesign.work.journal import Journal
 from mechdesign.work.threads import one_thread
 
-# Numbers that a search keeps of the rows behind its goals.
+# Most numbers of rows behind the goals that a search keeps.
 MAX_KEPT_ROWS = 30_000_000
 # Reasons of infeasible designs that are reported one by one.
 MAX_REASONS = 10
-# Designs tie in a goal where it differs by no more, in its unit or as a part of its size.
+# Largest difference of a goal, in its unit or as a part of its size, with which designs tie.
 TIE = 1e-12
 
 
@@ -111,7 +111,7 @@ def optimize(
 def _ask(
     study: Study, judge: Judge, evaluator: Evaluator, weights: Floats, budget: int, seed: int
 ) -> tuple[Caution, ...]:  # fmt: skip
-    """Evaluate the designs of the study's method; returns what is to be warned of."""
+    """Evaluate the designs of the study's method; returns warnings."""
     assert study.optimize is not None
     section = study.optimize
     if section.method == "grid":
@@ -137,7 +137,7 @@ def _ask(
 
 
 def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[Caution]:
-    """What speaks against the optima of a search; `objectives` are what each row of weights looks for."""
+    """Warnings about the optima of a search; `objectives` names the objective of each row of weights."""
     more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
     if not ending.checked:
         early = f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
@@ -178,7 +178,7 @@ def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
 
 
 def _nothing_feasible(study: Study, designs: Designs, nearest: int | None) -> AssemblyError:
-    """Why no design is feasible, and of the one that misses least by how much it misses each condition."""
+    """Why no design is feasible, and by how much the nearest one misses each condition."""
     told = _none_feasible(designs)
     if nearest is None:
         return AssemblyError(told)
@@ -271,7 +271,7 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
 
 
 def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
-    """Where a design's workspace holds shapes best."""
+    """Places at which a design's workspace holds shapes at the largest scale."""
     if not shapes:
         return []
     panels = answer(questions(study, wanted=("area",))[0], {}, 1, SINGLE).panels
@@ -279,7 +279,7 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
 
 
 def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
-    """Where the optima hold shapes that may lie anywhere, of a single region."""
+    """Places of shapes without a given centre in the workspaces of the optima; none where there are several regions."""
     free = [
         condition
         for condition in designs.conditions
@@ -296,19 +296,19 @@ def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
 
 
 def _shapes(judged: Iterable[Goal], study: Study, changed: Mapping[str, float]) -> list[Shape]:
-    """What a design's workspace is to hold."""
+    """The shapes that a design's workspace has to contain."""
     numbers = study_designs.Designs(study, {name: np.array([value]) for name, value in changed.items()}).numbers
     outlines = [each.outline for each in judged if each.outline is not None]
     return [shape_of(outline, lambda number: float(numbers.of(number)[0])) for outline in outlines]
 
 
 def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
-    """A design as a study, with what was judged of it: its workspace, or else its motion with the targets' errors."""
+    """The study of a design, and its workspace or else its motion with the errors from targets, as far as judged."""
     study, numbers = parted(designs.study, design)
     made = variant(study, numbers)
     judged = (*designs.goals, *designs.conditions)
     if made.workspace is not None and any(each.command == "workspace" for each in judged):
-        # The region is drawn, not its indices.
+        # Only the region is drawn.
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:

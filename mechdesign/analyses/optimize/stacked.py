@@ -50,11 +50,11 @@ class Stack(NamedTuple):
     reason : int8 array, shape (designs, poses)
         See `mechdesign.mechanism.Reason`.
     whole : bool array, shape (designs,)
-        Whether the motion has no gap between the poses, as far as they are those of one.
+        Whether the motion has no gap between the poses; True where poses are no motion.
     along : Along, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
-        The poses, where the command solves them as they are; else empty.
+        The solved poses of a motion; else empty.
     """
 
     result: Result
@@ -65,7 +65,7 @@ class Stack(NamedTuple):
 
 
 def complete(study: Study, command: str) -> bool:
-    """Whether these tables are all of a command's answer that costs much: not where methods sample."""
+    """Whether `TABLES` has all costly tables of a command's answer: not where methods sample."""
     return command != "reliability" or (
         study.reliability is not None and set(study.reliability.methods) == {"analytic"}
     )
@@ -74,7 +74,7 @@ def complete(study: Study, command: str) -> bool:
 def shared(study: Study, command: str, names: Collection[str]) -> bool:
     """Whether designs that differ in parameters or places share one mechanism and one set of sections.
 
-    They do not where what differs decides how the mechanism is put together: each is a study of its own then.
+    They do not where a parameter decides the structure of the mechanism; each design is then a study of its own.
     """
     if remeasured(study, names):
         return False
@@ -153,14 +153,14 @@ def tables(
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:
     """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
 
-    Squares of lengths and angles in radians, smooth in the dimensions; nan where what comes before does not assemble.
-    `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
+    They are squares of lengths, or angles in radians, smooth in the dimensions; nan where a group before does not
+    assemble. `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
     """
     return np.concatenate([_margins(study.mechanism, each).reshape(poses.designs, -1) for each in solved], axis=1)
 
 
 def shortfall(margins: Floats) -> Floats:
-    """By how much designs miss their margins together, shape (designs,): each counts from 0 to 1, nan as 1."""
+    """Sum of the missed margins of designs, shape (designs,): each counts from 0 to 1, nan as 1."""
     missed = np.maximum(-margins, 0.0)
     return np.asarray(np.where(np.isnan(missed), 1.0, missed / (1.0 + missed)).sum(axis=1))
 

@@ -1,6 +1,6 @@
 """Design variables, whose bounds may depend on each other: their grid, their map to the unit cube, and their studies.
 
-A design is a number of each variable; of a variable whose choices are no numbers that is the number of the choice.
+A design is a number for each variable; for a variable whose choices are words it is the number of the choice.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mechdesign.study.designs import variant
 from mechdesign.study.schema.variable import Variable, plainly
 from mechdesign.study.variants import entry_unit, faults, with_entries
 
-# A step that ends this little (as a fraction of it) beyond the bound is still taken, as in sweeps.
+# Fraction of a step by which the last step may end beyond the bound, as in sweeps.
 BOUND_ROUNDING = 1e-9
 MAX_DESIGNS = 50_000_000
 
@@ -40,9 +40,9 @@ def ranges(study: Study) -> list[str]:
 
 
 def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats]:
-    """Bounds of a range where the variables above it have these values; each of shape (count,).
+    """Bounds of a range, which may follow the variables above it in `designs`; each of shape (count,).
 
-    Those of whole numbers are the first and the last between the bounds given.
+    For a whole number they are the first and the last whole number within the given bounds.
     """
     variable = variables_of(study)[name]
     assert variable.from_ is not None
@@ -60,7 +60,7 @@ def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats,
 def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats, Floats]:
     """First value, step and number of values of a variable that has steps, each of shape (count,).
 
-    Of choices they number the choices. The number is 0 where no value lies between the bounds.
+    For choices they are the numbers of the choices. The number of values is 0 where none lies between the bounds.
     """
     variable = variables_of(study)[name]
     if variable.choices is not None:
@@ -77,7 +77,7 @@ def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats
 
 
 def _valued(variable: Variable, numbers: Floats) -> Floats:
-    """Values of a variable by what `_spaced` numbers them."""
+    """Values of a variable from the numbers of `_spaced`."""
     if variable.choices is None or not variable.numeric:
         return numbers
     return np.array(variable.choices, dtype=float)[numbers.astype(np.intp)]
@@ -121,7 +121,7 @@ def from_cube(study: Study, u: Floats) -> CubeDesigns:
             low, high = bounds(study, designs, name, len(u))
             well = np.isfinite(low) & np.isfinite(high) & (high >= low)
             low, high = np.where(well, low, 0.0), np.where(well, high, 0.0)
-            # The upper bound itself, not what rounding makes of it.
+            # At the upper bound exactly, without rounding error.
             designs[name] = np.where(share == 1, high, low + share * (high - low))
         given &= well
     return CubeDesigns(designs, given, middle)
@@ -152,7 +152,7 @@ def grid(study: Study) -> dict[str, Floats]:
 
 
 def steps(study: Study, at: Batch) -> dict[str, Floats]:
-    """A step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range there."""
+    """The step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range."""
     found = {}
     for name in ranges(study):
         variable = variables_of(study)[name]
@@ -177,9 +177,9 @@ def unit_of(study: Study, name: str) -> str:
 
 
 def entry_of(study: Study, name: str, value: float | str) -> tuple[str, Any]:
-    """The entry that a value of a variable changes, by the name that ``--set`` takes, and what stands there then.
+    """The entry that a variable changes, by the name that ``--set`` takes, and its value there.
 
-    The value is a number, or the word of a choice.
+    `value` is a number, or the word of a choice.
     """
     variable = variables_of(study)[name]
     own = f"mechanism.parameters.{name}" if name in study.parameters.nominal else name
