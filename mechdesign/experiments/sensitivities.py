@@ -31,7 +31,8 @@ from mechdesign.work.threads import one_thread
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
-# A derivative is told as uncertain from this relative error on, unless so little of the result hangs on it.
+# Relative error from which on a derivative is uncertain, unless the change over a step is less than this part of the
+# result.
 _UNCERTAIN, _NOTHING = 0.01, 1e-9
 
 
@@ -39,10 +40,10 @@ _UNCERTAIN, _NOTHING = 0.01, 1e-9
 class Changing:
     """A number of the study that changes."""
 
-    given: str  # as the study names it
-    name: str  # of the entry
+    given: str  # the name in the section
+    name: str  # the name of the entry
     value: float
-    step: float  # the largest
+    step: float  # the largest step
     unit: str
 
     def cases(self) -> Iterator[Changes]:
@@ -52,7 +53,7 @@ class Changing:
 
 
 def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
-    """The results and the numbers that change; nothing is computed but a look at the study.
+    """The wanted results and the numbers that change, checked by a short look at the study's results.
 
     Raises
     ------
@@ -145,7 +146,7 @@ class Row:
     error: float
     below: float
     above: float
-    doubt: str  # why it is not known, or not well
+    doubt: str  # why it is unknown or uncertain; empty if it is neither
 
     @property
     def elasticity(self) -> float:
@@ -170,7 +171,7 @@ def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -
             elif math.isnan(value):
                 doubt = f"is not known near {number.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
-                # Roughness wants longer steps, a curve that bends within them shorter ones.
+                # Noise needs longer steps, strong curvature shorter ones.
                 other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "

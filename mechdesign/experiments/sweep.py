@@ -34,12 +34,12 @@ _SECTION = "matrix"
 
 
 def prepared(study: Study) -> tuple[Design, list[Wanted]]:
-    """The cases of a study and what is wanted of each; nothing is computed but a look at the study itself.
+    """The cases of a study and the numbers wanted of each, checked by a short look at the study's results.
 
     Raises
     ------
     StudyError
-        If there is no matrix, nothing to be found of a case, or a name that is unknown.
+        If there is no matrix, no result or requirement, or an unknown name.
     """
     matrix = study.matrix
     if matrix is None:
@@ -53,7 +53,7 @@ def prepared(study: Study) -> tuple[Design, list[Wanted]]:
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
     foresee(study, wanted)
-    # What is required has its column.
+    # A number with a requirement has a column already.
     required = requirement_names(study)
     return cases, [each for each in wanted if each.title not in required]
 
@@ -88,7 +88,7 @@ def sweep(
 
 
 def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Result:
-    """The table of the cases that were answered."""
+    """The result with the table of the answered cases."""
     count, asked, failed = len(tally), len(cases), tally.failed
     counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
     told = ""
@@ -111,7 +111,7 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
 
 
 def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, Any]:
-    """What pictures show: the entries that vary, the results with what is required of them, and which are goals."""
+    """Data of the pictures: the entries that vary, the results with their limits, and the goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
     results = limits | {each.title: (None, None) for each in wanted}
@@ -120,7 +120,7 @@ def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, An
 
 
 def _goals(study: Study) -> dict[str, int]:
-    """Columns of the goals: 1 where one is to be small, -1 where it is to be large."""
+    """Goals by their columns: 1 for a minimised, -1 for a maximised one."""
     best = study.matrix.best if study.matrix is not None else None
     return {each.title: sign for each, sign in goals_of(best).items()}
 

@@ -1,4 +1,4 @@
-"""What becomes of many cases, kept as numbers: cases by the million are counted, not held."""
+"""Answers of many cases, kept as rows of numbers, so that millions of cases fit in memory."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from mechdesign.report.requirements import Verdict, over_cases
 from mechdesign.study.variants import Changes
 from mechdesign.work.journal import Journal, digest
 
-# Cases after which, and seconds, a journal gets those that are finished.
+# Number of cases, or seconds, after which finished cases are written to a journal.
 _BLOCK, _SECONDS = 1024, 5.0
 
 
 class Tally:
-    """What came of the first cases of a design; the texts that stand for all of them are of the first or the worst.
+    """Answers of the first cases of a design; only the first warning of a kind and the worst verdicts are texts.
 
     Parameters
     ----------
     cases : sequence of Changes
         All cases.
     results, requirements : int
-        Numbers that are wanted of each, and verdicts on it.
+        Number of wanted numbers of each case, and number of requirements.
     """
 
     def __init__(self, cases: Sequence[Changes], results: int, requirements: int) -> None:
@@ -49,7 +49,7 @@ class Tally:
         return len(self._rows) // self.width
 
     def add(self, answered: Answered) -> None:
-        """Take up the next cases."""
+        """Add the answers of the next cases."""
         begin, table = len(self), answered.table.copy()
         numbers = [self.reasons.setdefault(reason, len(self.reasons)) for reason in answered.reasons]
         table[:, 2] = np.array(numbers)[table[:, 2].astype(np.intp)]
@@ -84,7 +84,7 @@ class Tally:
 
     @property
     def failed(self) -> list[int]:
-        """Cases that have no answer."""
+        """Numbers of the cases without an answer."""
         return np.flatnonzero(self.table[:, 0] >= IMPOSSIBLE).tolist()
 
     def reason(self, k: int) -> str:
@@ -103,7 +103,7 @@ class Tally:
         return f"case {k + 1} ({changes_in_words(self.cases[k])})"
 
     def note(self, journal: Journal, *, last: bool = False) -> None:
-        """Let a journal have the cases that it has not, if they are many or it is time, or they are the last."""
+        """Write new cases to a journal, if they are many, some seconds have passed, or they are the last."""
         begin = sum(self._sizes)
         few = len(self) - begin < _BLOCK and time.monotonic() - self._noted < _SECONDS
         if begin == len(self) or (few and not last):
@@ -113,7 +113,7 @@ class Tally:
         self._noted = time.monotonic()
 
     def recall(self, journal: Journal) -> None:
-        """Take up what a journal has of these cases."""
+        """Read the first cases from a journal."""
         state = json.loads(journal.words[0]) if journal.words else {"sizes": []}
         blocks: dict[bytes, Floats] = {}
         begin = 0

@@ -125,7 +125,7 @@ class Evaluator:
             self.layout = Layout(self.goals, {}, {})
 
     def _misfits(self) -> Iterator[Problem]:
-        """Problems of bounds whose unit does not fit the number of the workspace, or the expression, that they bound."""
+        """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
         columns = index_columns(self.study, self.questions[0]) if self.questions else {}
         units = {each: columns[each.column].unit for each in self._regional if each.column in columns}
         units |= {goal: unit for goal in self.goals if goal.expression and (unit := unit_of(self.study, goal.column))}
@@ -327,7 +327,7 @@ class Evaluator:
         return replace(study, reliability=section)
 
     def _one(self, batch: Batch, k: int) -> str:
-        """Evaluate the goals of one design that no batch has; returns why the design is infeasible, empty if it is not."""
+        """Evaluate the other goals of one design; returns why it is infeasible, empty if it is not."""
         row = np.array([k])
         command = ""
         try:

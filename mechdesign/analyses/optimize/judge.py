@@ -107,7 +107,7 @@ class Designs:
         return np.asarray(self.reasons == "", dtype=bool)
 
     def counted(self) -> list[tuple[str, int, int]]:
-        """Reasons why designs are infeasible, the most frequent first: reason, number of designs, and the first design."""
+        """Reasons of infeasible designs, the most frequent first: reason, number of designs, and the first design."""
         found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
         return sorted(found, key=lambda each: (-each[1], each[0]))
 
@@ -129,7 +129,7 @@ class Designs:
 
     @cached_property
     def winners(self) -> Ints:
-        """Rows of the knee and the ends of a front, then of the best design for each row of weights, the first of equals."""
+        """Rows of a front's knee and ends, then of the best design (the first of equals) for each row of weights."""
         scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights[len(self.chosen) :]]
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
