@@ -117,9 +117,9 @@ class Sheet:
         """Read the numbers and verdicts of a group, design by design where they cannot be read together."""
         command, good = group.result.command, np.array([end.error is None for end in group.ends])
         try:
-            for k, each in enumerate(self._wanted if good.any() else ()):
-                if each.command == command:
-                    values, unit = each.find(group)
+            for k, number in enumerate(self._wanted if good.any() else ()):
+                if number.command == command:
+                    values, unit = number.find(group)
                     self._numbers[rows[good], k] = values[good]
                     self._units[k] = unit
             for k, requirement in enumerate(self._required):
@@ -138,7 +138,7 @@ class Sheet:
         """Judge designs by a requirement."""
         good = np.array([end.error is None for end in group.ends])
         if good.any():
-            follows = any(getattr(each, "expression", None) for each in (requirement.at_least, requirement.at_most))
+            follows = any(getattr(bound, "expression", None) for bound in (requirement.at_least, requirement.at_most))
             own = group.rows.tolist() if follows else group.rows[:1].tolist()
             found = judged(group, [designs.required(row)[k] for row in own])
             self._units[len(self._wanted) + k] = found.unit
@@ -179,8 +179,9 @@ class Sheet:
         known, verdict = self._verdicts.get(k, (-1, None))
         unmet = np.flatnonzero(~self._met[:, k])
         first = int(unmet[0]) if len(unmet) else 0
-        message = verdict if verdict is not None and known == row else _unanswered(self._required[k])
-        return Worst(row, message, len(unmet), first)
+        if verdict is None or known != row:
+            verdict = _unanswered(self._required[k])
+        return Worst(row, verdict, len(unmet), first)
 
 
 def _unanswered(requirement: Requirement) -> Verdict:

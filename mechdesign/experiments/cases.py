@@ -103,7 +103,7 @@ class Answer:
 
 def commands_of(study: Study, wanted: Iterable[Wanted]) -> tuple[str, ...]:
     """The commands that compute what a study requires and the wanted numbers."""
-    needed = {command_of(requirement) for requirement in study.requirements} | {each.command for each in wanted}
+    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in wanted}
     return tuple(command for command in COMMANDS if command in needed)
 
 
@@ -123,12 +123,12 @@ def foresee(study: Study, wanted: Iterable[Wanted]) -> None:
         except AssemblyError:
             # A case with other numbers may assemble.
             continue
-        for each in wanted:
-            if each.command == command:
+        for number in wanted:
+            if number.command == command:
                 try:
-                    each.find(Group.alone(result))
+                    number.find(Group.alone(result))
                 except UnknownColumnError as error:
-                    problems.append(study.problem(str(error), *each.keys))
+                    problems.append(study.problem(str(error), *number.keys))
         try:
             requirements.requirements(study, result, whole=command != "optimize")
         except StudyError as error:

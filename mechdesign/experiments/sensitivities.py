@@ -82,8 +82,8 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
     return wanted, found
 
 
-def _changing(study: Study, each: Changed) -> Changing:
-    given = each.parameter
+def _changing(study: Study, changed: Changed) -> Changing:
+    given = changed.parameter
     path = entry(study.resolved, f"mechanism.parameters.{given}" if given in study.parameters.nominal else given)
     raw = value_at(study.resolved, path)
     if raw is None:
@@ -94,12 +94,12 @@ def _changing(study: Study, each: Changed) -> Changing:
         raise StudyError(f"{given} is {shown(raw)}, and only a number can change a little") from None
     if number.expression is not None:
         raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
-    if each.step is None and not number:
+    if changed.step is None and not number:
         raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
     name = dotted(path)
     unit = entry_unit(study, name)
     try:
-        given_step = Amount.of(each.step or 0.0)
+        given_step = Amount.of(changed.step or 0.0)
         step = (given_step.within(unit) if unit else given_step) or _PART * abs(number)
     except QuantityError as error:
         raise StudyError(f"{given}: {error}") from None
@@ -123,15 +123,15 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     table = _table(rows, [tally.result(k)[1] for k in range(len(wanted))], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
     failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
-    told = [
+    warnings = [
         Caution("unconverged", f"{row.result} by {row.parameter}: {row.doubt}", table.name, k)
         for k, row in enumerate(rows)
         if row.doubt
     ]
     for kind, warned in tally.warned.items():
         words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first: {warned.message}"
-        told.append(Caution(kind, words))
-    return Result(SENSITIVITIES.name, {table.name: table}, told, counts, failed)
+        warnings.append(Caution(kind, words))
+    return Result(SENSITIVITIES.name, {table.name: table}, warnings, counts, failed)
 
 
 @dataclass(frozen=True)

@@ -46,8 +46,8 @@ def prepared(study: Study) -> tuple[Design, list[Wanted]]:
         raise StudyError(
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
-    goals = {each.title: each for each in goals_of(matrix.best)}
-    wanted = [*({each.title: each for each in wanted_in(_SECTION, matrix.results)} | goals).values()]
+    goals = {number.title: number for number in goals_of(matrix.best)}
+    wanted = [*({number.title: number for number in wanted_in(_SECTION, matrix.results)} | goals).values()]
     if not commands_of(study, wanted):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
@@ -55,7 +55,7 @@ def prepared(study: Study) -> tuple[Design, list[Wanted]]:
     foresee(study, wanted)
     # A number with a requirement has a column already.
     required = requirement_names(study)
-    return cases, [each for each in wanted if each.title not in required]
+    return cases, [number for number in wanted if number.title not in required]
 
 
 @one_thread()
@@ -91,10 +91,10 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
     """The result with the table of the answered cases."""
     count, asked, failed = len(tally), len(cases), tally.failed
     counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
-    told = ""
+    message = ""
     if failed:
         first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
-        told = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
+        message = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
     part = f"{count} of {asked} cases were answered; this is what they are" if count < asked else ""
     table = SWEEP.table(_columns(study, cases, tally, wanted))
     ranked = None
@@ -105,7 +105,7 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
         if study.matrix and study.matrix.best and study.matrix.best.sort:
             table = table.take(np.argsort(ranking.rank, kind="stable"))
     return Result(
-        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, told, interrupted=part,
+        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, message, interrupted=part,
         drawn=_drawn(study, tally, wanted),
     )  # fmt: skip
 
@@ -114,7 +114,7 @@ def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, An
     """Data of the pictures: the entries that vary, the results with their limits, and the goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
-    results = limits | {each.title: (None, None) for each in wanted}
+    results = limits | {number.title: (None, None) for number in wanted}
     entries = [name for name, _ in tally.cases[0]]
     return {"cases": tally, "entries": entries, "results": results, "goals": _goals(study)}
 
@@ -122,7 +122,7 @@ def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, An
 def _goals(study: Study) -> dict[str, int]:
     """Goals by their columns: 1 for a minimised, -1 for a maximised one."""
     best = study.matrix.best if study.matrix is not None else None
-    return {each.title: sign for each, sign in goals_of(best).items()}
+    return {number.title: sign for number, sign in goals_of(best).items()}
 
 
 def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
@@ -137,8 +137,8 @@ def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]
         limit = str(tally.worst[k].verdict.requirement)
         yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
         yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
-    for k, each in enumerate(wanted):
-        yield SWEEP["<result>"].column(*tally.result(k), result=each.title)
+    for k, number in enumerate(wanted):
+        yield SWEEP["<result>"].column(*tally.result(k), result=number.title)
     reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
     yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
 

@@ -58,12 +58,12 @@ class Tally:
         for kind, warned in answered.warned.items():
             before = self.warned.setdefault(kind, replace(warned, case=begin + warned.case, cases=0))
             before.cases += warned.cases
-        new = [replace(each, case=begin + each.case, first=begin + each.first) for each in answered.worst]
-        for worst, each in zip(self.worst, new, strict=bool(self.worst)):
-            if _margin(each.verdict) < _margin(worst.verdict):
-                worst.case, worst.verdict = each.case, each.verdict
-            worst.first = worst.first if worst.unmet else each.first
-            worst.unmet += each.unmet
+        new = [replace(other, case=begin + other.case, first=begin + other.first) for other in answered.worst]
+        for worst, other in zip(self.worst, new, strict=bool(self.worst)):
+            if _margin(other.verdict) < _margin(worst.verdict):
+                worst.case, worst.verdict = other.case, other.verdict
+            worst.first = worst.first if worst.unmet else other.first
+            worst.unmet += other.unmet
         self.worst = self.worst or new
 
     @property
@@ -95,7 +95,8 @@ class Tally:
     def verdicts(self) -> tuple[Verdict, ...]:
         """The worst verdict on each requirement over the cases, and how many do not meet it."""
         return tuple(
-            over_cases(each.verdict, self.named(each.case), each.unmet, len(self), each.first) for each in self.worst
+            over_cases(worst.verdict, self.named(worst.case), worst.unmet, len(self), worst.first)
+            for worst in self.worst
         )
 
     def named(self, k: int) -> str:
@@ -133,13 +134,13 @@ class Tally:
         self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
         self._units = state["units"]
         self.warned = {kind: Warned(**each) for kind, each in state["warned"].items()}
-        self.worst = [Worst(**each | {"verdict": Verdict(**each["verdict"])}) for each in state["worst"]]
+        self.worst = [Worst(**worst | {"verdict": Verdict(**worst["verdict"])}) for worst in state["worst"]]
 
     def _state(self) -> Mapping[str, Any]:
         return {
             "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units,
-            "warned": {kind: asdict(each) for kind, each in self.warned.items()},
-            "worst": [asdict(each) for each in self.worst],
+            "warned": {kind: asdict(warned) for kind, warned in self.warned.items()},
+            "worst": [asdict(worst) for worst in self.worst],
         }  # fmt: skip
 
     def _key(self, begin: int, end: int) -> bytes:

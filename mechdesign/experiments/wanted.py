@@ -100,12 +100,12 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
         See `Wanted.find`.
     """
     (one, *_), found = required, []
-    limits = zip(*(bounds_of(each) for each in required), strict=True)
+    limits = zip(*(bounds_of(requirement) for requirement in required), strict=True)
     for own in limits:
         goal = own[0]
         terms = _terms(group, goal.column, dict(goal.where))
         values = goal.judge(group.result, len(group.ends)).values
-        beyond = values - np.array([terms.bound(each.bound) for each in own])
+        beyond = values - np.array([terms.bound(goal.bound) for goal in own])
         found.append((values, -beyond if goal.smallest else beyond))
     values, margins = (np.stack(part) for part in zip(*found, strict=True))
     nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]

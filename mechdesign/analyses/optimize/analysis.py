@@ -179,41 +179,43 @@ def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
 
 def _nothing_feasible(study: Study, designs: Designs, nearest: int | None) -> AssemblyError:
     """Why no design is feasible, and by how much the nearest one misses each condition."""
-    told = _none_feasible(designs)
+    message = _none_feasible(designs)
     if nearest is None:
-        return AssemblyError(told)
+        return AssemblyError(message)
     table = nearest_table(designs, nearest)
     short = [
         f"{row['condition']} by {row['missing']:.6g} {row['unit']}".rstrip()
         + f" (it is {row['value']:.6g})" * bool(np.isfinite(row["value"]))
         for row in table if not row["missing"] <= 0
     ]  # fmt: skip
-    told += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
+    message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
     files, wrong = design_files(study, designs, {"nearest": (nearest, f"Nearest to a feasible design of {study.name}")})
     counts = {"designs": len(designs), "infeasible": len(designs)}
-    tables = {each.name: each for each in (table, designs_table(designs))}
-    return AssemblyError(told, Result("optimize", tables, tuple(wrong), counts, failed=told, files=files))
+    tables = {part.name: part for part in (table, designs_table(designs))}
+    return AssemblyError(message, Result("optimize", tables, tuple(wrong), counts, failed=message, files=files))
 
 
 def _none_feasible(designs: Designs) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
-    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
+    message = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     for condition in designs.conditions:
         index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
         values = designs.found[condition][np.isfinite(designs.found[condition])] if statistic == "min" else np.empty(0)
         if values.size and (np.abs(values) <= 0).all():
-            told += (f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
-                     f"bound {index}_mean, or keep the region off singularities by mechanism.limits")  # fmt: skip
-    return f"no design of {len(designs)} is feasible: {told}"
+            message += (
+                f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
+                f"bound {index}_mean, or keep the region off singularities by mechanism.limits"
+            )
+    return f"no design of {len(designs)} is feasible: {message}"
 
 
 def _finished_part(designs: Designs) -> Result:
     table = designs_table(designs)
-    told = f"interrupted after {len(designs)} designs; --resume goes on"
-    partly = Caution("incomplete", told, table.name)
-    return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=told)
+    message = f"interrupted after {len(designs)} designs; --resume goes on"
+    partly = Caution("incomplete", message, table.name)
+    return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=message)
 
 
 def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
@@ -233,20 +235,20 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
                 "magnitudes says abs: true",
                 "designs",
             )
-    for goal in [each for each in designs.goals if each.unassembled]:
+    for goal in filter(lambda goal: goal.unassembled, designs.goals):
         optimum = ask(study_of(evaluator.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
             words = f"{goal.name} of the optimum is that of a part of the motion: {part}"
             yield Caution("unassembled", words, "optimum")
     if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
-    for each, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[each]))
+    for goal, error in designs.errors.items():
+        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[goal]))
         if loose.any():
             yield Caution(
                 "unconverged",
-                f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
-                f"{each.name}_error",
+                f"{goal.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
+                f"{goal.name}_error",
                 "designs", int(loose.argmax()),
             )  # fmt: skip
 
@@ -261,8 +263,8 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
     for goal in evaluator.goals:
         if goal.outline is not None:
             shape = goal.column.removeprefix("scale of ")
-            told = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-            found[goal.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
+            meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
+            found[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
     if len(evaluator.questions) > 1:
         held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
                 for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
@@ -291,14 +293,14 @@ def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
     for k in designs.winners.tolist():
         study, numbers = parted(designs.study, designs.design(k))
         rows.append(_centres(variant(study, numbers), _shapes(free, study, numbers)))
-    names = (each.column.removeprefix("scale of ") for each in free)
+    names = (goal.column.removeprefix("scale of ") for goal in free)
     return dict(zip(names, np.array(rows, dtype=complex).T, strict=True))
 
 
 def _shapes(judged: Iterable[Goal], study: Study, changed: Mapping[str, float]) -> list[Shape]:
     """The shapes that a design's workspace has to contain."""
     numbers = study_designs.Designs(study, {name: np.array([value]) for name, value in changed.items()}).numbers
-    outlines = [each.outline for each in judged if each.outline is not None]
+    outlines = [goal.outline for goal in judged if goal.outline is not None]
     return [shape_of(outline, lambda number: float(numbers.of(number)[0])) for outline in outlines]
 
 
@@ -307,7 +309,7 @@ def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
     study, numbers = parted(designs.study, design)
     made = variant(study, numbers)
     judged = (*designs.goals, *designs.conditions)
-    if made.workspace is not None and any(each.command == "workspace" for each in judged):
+    if made.workspace is not None and any(goal.command == "workspace" for goal in judged):
         # Only the region is drawn.
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)

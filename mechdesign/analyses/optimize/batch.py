@@ -69,11 +69,11 @@ class Batch:
         """Rows of the designs that have no reason to be infeasible so far."""
         return np.flatnonzero(self.reasons == "")
 
-    def judge(self, each: Goal, result: Result, rows: Ints) -> Floats:
+    def judge(self, goal: Goal, result: Result, rows: Ints) -> Floats:
         """Read the values of a goal from a result of some designs; returns them."""
-        values, listed, _ = each.judge(result, len(rows))
-        self.table[rows, self._layout.column[each]] = values
-        place = self._layout.rows.get(each, slice(0))
+        values, listed, _ = goal.judge(result, len(rows))
+        self.table[rows, self._layout.column[goal]] = values
+        place = self._layout.rows.get(goal, slice(0))
         if listed is not None and listed.shape[1] == place.stop - (place.start or 0):
             self.table[rows, place] = listed
         return values

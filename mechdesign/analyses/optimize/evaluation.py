@@ -73,15 +73,15 @@ class Evaluator:
         # Goals with their bounds in the unit of their column.
         self._bounded: dict[Goal, Goal] = {}
         self._regional = [goal for goal in self.goals if goal.regional]
-        whole = [each for each in self._regional if each.outline is None]
-        self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
+        whole = [goal for goal in self._regional if goal.outline is None]
+        self._columns = tuple(dict.fromkeys(("area", *(goal.column for goal in whole))))
         # One question for each value of the held coordinates; the worst answer of a design counts.
         self.questions: list[Question] = []
         self._regions_together = True
         if self._regional:
             self.questions = questions(study, GRID_TOLERANCE, self._columns)
             together = shared(study, self.questions, moved) and not remeasured(study, study.optimize.variables)
-            self._regions_together = together and all(batched(each.column) for each in whole)
+            self._regions_together = together and all(batched(goal.column) for goal in whole)
         commands = dict.fromkeys(goal.command for goal in self.goals if not goal.regional and not goal.expression)
         problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
         if problems:
@@ -127,17 +127,17 @@ class Evaluator:
     def _misfits(self) -> Iterator[Problem]:
         """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
         columns = index_columns(self.study, self.questions[0]) if self.questions else {}
-        units = {each: columns[each.column].unit for each in self._regional if each.column in columns}
+        units = {goal: columns[goal.column].unit for goal in self._regional if goal.column in columns}
         units |= {goal: unit for goal in self.goals if goal.expression and (unit := unit_of(self.study, goal.column))}
-        for each, unit in units.items():
+        for goal, unit in units.items():
             try:
-                Amount.of(each.bound).within(unit)
+                Amount.of(goal.bound).within(unit)
             except QuantityError as error:
-                yield self.study.problem(str(error), *self._keys.get(each, ()))
+                yield self.study.problem(str(error), *self._keys.get(goal, ()))
 
     def _look(self, command: str) -> Iterator[Problem]:
         """Problems of a command's goals, whose tables are found by a look at the study's own design."""
-        goals = [each for each in self.goals if each.command == command and not each.regional]
+        goals = [goal for goal in self.goals if goal.command == command and not goal.regional]
         if command == "optimize":
             mistake = "an optimisation cannot judge itself; name a result of another command"
             yield self.study.problem(mistake, *self._keys.get(goals[0], ()))
@@ -148,20 +148,20 @@ class Evaluator:
             poses = study_poses(self.study, command)
             stack = stacked.tables(self.study, command, stacked.TABLES[command], poses)
             named: dict[Goal, Chosen | Sum] = {}
-            for each in goals:
+            for goal in goals:
                 with suppress(UnknownColumnError):
-                    named[each] = self._named(each, stack.result)
-            for each, terms in named.items():
+                    named[goal] = self._named(goal, stack.result)
+            for goal, terms in named.items():
                 for chosen in terms.parts:
                     if chosen.table.name == "extremes":
                         self._outputs.update(chosen.table["output"][chosen.counts].tolist())
-                    elif (asked := each.asked_of(chosen)) is not None:
+                    elif (asked := goal.asked_of(chosen)) is not None:
                         self._asked.add(asked)
             tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
             stack = stacked.tables(self.study, command, {"motion", *tables}, poses, self._outputs, self._asked)
-            for each, terms in named.items():
-                goal = self._count(each, terms, stack.result)
-                goals.remove(each)
+            for named_goal, terms in named.items():
+                goal = self._count(named_goal, terms, stack.result)
+                goals.remove(named_goal)
                 tables_of = self._together.setdefault(command, {})
                 wanted = [tables_of.setdefault(chosen.table.name, []) for chosen in terms.parts]
                 wanted[0].append(goal)
@@ -170,32 +170,32 @@ class Evaluator:
         # Other designs may have a result where the study's own design does not assemble.
         with suppress(AssemblyError):
             result = look(self.study, command)
-            for k, each in enumerate(goals):
+            for k, goal in enumerate(goals):
                 try:
-                    goals[k] = self._count(each, self._named(each, result), result)
+                    goals[k] = self._count(goal, self._named(goal, result), result)
                 except UnknownColumnError as error:
-                    yield self.study.problem(str(error), *self._keys.get(each, ()))
+                    yield self.study.problem(str(error), *self._keys.get(goal, ()))
         self._alone.setdefault(command, []).extend(goals)
 
-    def _named(self, each: Goal, result: Result) -> Chosen | Sum:
+    def _named(self, goal: Goal, result: Result) -> Chosen | Sum:
         """The rows, or the sum, that a goal names."""
-        terms = terms_of(result, each.column, dict(each.where))
+        terms = terms_of(result, goal.column, dict(goal.where))
         if terms.missing:
             raise UnknownColumnError(terms.missing)
-        terms.bound(each.bound)
+        terms.bound(goal.bound)
         if isinstance(terms, Sum):
             terms.numbers()
         return terms
 
-    def _count(self, each: Goal, terms: Chosen | Sum, result: Result) -> Goal:
+    def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
         """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
-        self._bounded[each] = each = replace(each, bound=terms.bound(each.bound))
-        judgement = each.judge(result)
+        self._bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
+        judgement = bounded.judge(result)
         if judgement.squares:
-            self.squares.add(each)
+            self.squares.add(bounded)
         if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
-            self._rows[each] = judgement.rows.size
-        return each
+            self._rows[bounded] = judgement.rows.size
+        return bounded
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -266,27 +266,28 @@ class Evaluator:
             return
         numbers, own = batch.designs.take(rows).numbers, asked is self.questions
         try:
-            given = [answer(each, each.places(numbers) if own else {}, len(rows), BATCH) for each in asked]
+            given = [answer(question, question.places(numbers) if own else {}, len(rows), BATCH) for question in asked]
         except AssemblyError as error:
             # The workspace of one design has no end.
             for half in batch.halves(rows, error):
                 self._regions(batch, half, asked)
             return
-        for question, each in zip(asked, given, strict=True):
+        for question, region in zip(asked, given, strict=True):
             there = where(question) if len(asked) > 1 else ""
-            batch.note(rows, ~(each.panels.closes & (each.values["area"] > 0)), NO_REGION + there)
+            batch.note(rows, ~(region.panels.closes & (region.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
         for goal in self._regional:
             column, outline = self.layout.column[goal], goal.outline
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
-                each.values[goal.column] if shape is None else fitting_scale(shape, each.panels)[0] for each in given
+                region.values[goal.column] if shape is None else fitting_scale(shape, region.panels)[0]
+                for region in given
             ])  # fmt: skip
             # A missing value counts as the worst.
             worst = np.where(np.isnan(values), np.inf, values if goal.smallest else -values).argmax(axis=0)
             batch.table[rows, column] = values[worst, lanes]
             if split(goal.column)[1] == "mean":
-                errors = np.stack([each.errors[goal.column] for each in given])
+                errors = np.stack([region.errors[goal.column] for region in given])
                 batch.table[rows, len(self.goals) + column] = errors[worst, lanes]
 
     def _tables(
@@ -311,8 +312,8 @@ class Evaluator:
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None and margins.shape[1] == clear.stop - clear.start:
                 batch.table[rows, clear] = margins
-        for each in [goal for goals in tables.values() for goal in goals]:
-            lost = np.isnan(batch.judge(each, stack.result, rows))
+        for goal in [goal for goals in tables.values() for goal in goals]:
+            lost = np.isnan(batch.judge(goal, stack.result, rows))
             batch.note(rows, lost & (failed != ""), failed)
 
     def _needed(self, study: Study) -> Study:
@@ -359,7 +360,7 @@ class Evaluator:
         solved = list(solve_poses(study, poses))
         if self._graded:
             batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
-        return str(FAILED[first_reason(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
+        return str(FAILED[first_reason(np.concatenate([part.configuration.reason for part in solved])[None])[0]])
 
 
 def missing(goal: Goal, result: Result) -> str:

@@ -48,7 +48,7 @@ def design_files(
             best = variant(form, numbers)
             doubts += [Caution("unassembled", f"{name}.yaml: {words}") for words in _parted(best, designs)]
             judged = [goal for goal in (*designs.goals, *designs.conditions) if not goal.expression]
-            commands = tuple(dict.fromkeys(each.command for each in judged))
+            commands = tuple(dict.fromkeys(goal.command for goal in judged))
             drawings, given = _drawings(best, commands), _given(best, commands)
             while not _assembles_alike(study, best.mechanism, data, given):
                 pose = next(drawings, None)

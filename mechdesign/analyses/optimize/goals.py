@@ -193,7 +193,7 @@ def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
 def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal, KeyPath]:
     """The conditions of a section with their places in the study; designs differ in the parameters `moved`."""
     given = enumerate(section.subject_to)
-    return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition, moved)}
+    return {goal: ("optimize", "subject_to", k) for k, condition in given for goal in bounds_of(condition, moved)}
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:

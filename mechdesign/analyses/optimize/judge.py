@@ -109,7 +109,7 @@ class Designs:
     def counted(self) -> list[tuple[str, int, int]]:
         """Reasons of infeasible designs, the most frequent first: reason, number of designs, and the first design."""
         found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
-        return sorted(found, key=lambda each: (-each[1], each[0]))
+        return sorted(found, key=lambda reason: (-reason[1], reason[0]))
 
     @cached_property
     def values(self) -> Floats:
@@ -193,9 +193,9 @@ class Designs:
                 kind, unit, meaning = self._kind(goal)
                 words = {"parameter": goal.name, "result": goal.name, "meaning of the result": meaning}
                 yield kind.column(self.found[goal][rows], unit, **words)
-        for each, error in self.errors.items() if errors else ():
-            if each in self.goals:
-                yield DESIGNS["<result>_error"].column(error[rows], self._kind(each)[1], result=each.name)
+        for goal, error in self.errors.items() if errors else ():
+            if goal in self.goals:
+                yield DESIGNS["<result>_error"].column(error[rows], self._kind(goal)[1], result=goal.name)
         for condition in self.conditions:
             if condition.outline is not None:
                 words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
@@ -249,7 +249,7 @@ class Judge:
     def parts(self) -> list[Part]:
         """The rows of a result that belong to each goal or condition; those of assembly come last."""
         head, margins = self.layout.head, self.layout.margins
-        places = {each: slice(at.start - head, at.stop - head) for each, at in self.layout.rows.items()}
+        places = {goal: slice(at.start - head, at.stop - head) for goal, at in self.layout.rows.items()}
         found = [
             Part(column, goal.sign, goal.absolute, places[goal], goal.bound, goal in self._squares)
             for column, goal in enumerate((*self.goals, *self.conditions))
@@ -321,7 +321,7 @@ class Judge:
         return Designs(
             self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
-            {each: column for each, column in errors if not np.isnan(column).all()},
+            {goal: column for goal, column in errors if not np.isnan(column).all()},
             found[:, self.layout.code].astype(np.int32), [*self._words], found[:, self.layout.shortfall], weights,
             meanings,
         )  # fmt: skip

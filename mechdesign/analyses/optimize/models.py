@@ -80,12 +80,12 @@ class Terms:
             factor = self._objective[part.column]
             pieces.append(self._or_worst(part.pieces(lines) * abs(factor), values[:, part.column] * factor, rows))
         self.owner = np.repeat(np.arange(len(pieces)), [own.shape[1] for own in pieces])
-        limits, told = [], set()
+        limits, with_rows = [], set()
         for part in self._held:
             own, goal = part.pieces(lines), part.column - len(self._objective)
-            told.add(goal)
+            with_rows.add(goal)
             limits.append(own if part.column == ASSEMBLY else self._or_worst(own, -margins[:, goal], rows))
-        limits += [-margins[:, [k]] for k in range(margins.shape[1]) if k not in told]
+        limits += [-margins[:, [k]] for k in range(margins.shape[1]) if k not in with_rows]
         return plain, shaped(pieces), shaped(limits)
 
     @staticmethod

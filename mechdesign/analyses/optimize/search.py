@@ -215,22 +215,22 @@ def _confirmed(explorer: Explorer, objectives: Sequence[Floats], rng: np.random.
     n, open_ = explorer.dimensions, list(objectives)
     for _ in range(MAX_CHECKS):
         known = explorer.known
-        starts = [_best(known, each) for each in open_]
+        starts = [_best(known, objective) for objective in open_]
         if not known.feasible[starts].all():
             return False
-        before = [known.merit(each)[start] for each, start in zip(open_, starts, strict=True)]
+        before = [known.merit(objective)[start] for objective, start in zip(open_, starts, strict=True)]
         descend(explorer, list(zip(open_, starts, strict=True)), width=CHECK_WIDTH)
-        bests = [_best(explorer.known, each) for each in open_]
+        bests = [_best(explorer.known, objective) for objective in open_]
         steps = [np.concatenate([np.eye(n), -np.eye(n), rng.uniform(-1, 1, (4 * n, n))]) for _ in open_]
         points = [explorer.known.u[best] + CHECK_STEP * around for best, around in zip(bests, steps, strict=True)]
         explorer(np.concatenate(points))
         moving = []
-        for each, best, begun in zip(open_, bests, before, strict=True):
-            merit = explorer.known.merit(each)
+        for objective, best, begun in zip(open_, bests, before, strict=True):
+            merit = explorer.known.merit(objective)
             little = _rounding(explorer.known, merit, merit[best], NOISE if explorer.rough else ROUNDING)
             still = begun - merit[best] > max(ENDED_GAIN * abs(merit[best]), little)
             if still or merit[best] - merit.min() > little:
-                moving.append(each)
+                moving.append(objective)
         if not moving:
             return True
         open_ = moving

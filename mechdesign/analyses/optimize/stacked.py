@@ -79,8 +79,8 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
     if remeasured(study, names):
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
-    asked = [each for each in (getattr(study, command), study.kinematics) if each is not None]
-    return not any(each.at_nodes for each in asked) and not any(
+    asked = [section for section in (getattr(study, command), study.kinematics) if section is not None]
+    return not any(section.at_nodes for section in asked) and not any(
         study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     )
 
@@ -156,7 +156,7 @@ def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) 
     They are squares of lengths, or angles in radians, smooth in the dimensions; nan where a group before does not
     assemble. `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
     """
-    return np.concatenate([_margins(study.mechanism, each).reshape(poses.designs, -1) for each in solved], axis=1)
+    return np.concatenate([_margins(study.mechanism, part).reshape(poses.designs, -1) for part in solved], axis=1)
 
 
 def shortfall(margins: Floats) -> Floats:
@@ -180,5 +180,5 @@ def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
             for bound in mechanism.bounds
             for _, margin in bound.margins(configuration, places)
         ]
-    columns = [np.broadcast_to(np.asarray(each, dtype=float), configuration.shape) for each in found]
+    columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in found]
     return np.stack(columns, axis=1) if columns else np.empty((*configuration.shape, 0))

@@ -39,7 +39,7 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
     centre_of, parameter = OPTIMUM["x of <shape>"], OPTIMUM["<parameter>"]
     return OPTIMUM.table([
         *OPTIMUM.columns({}, **marks),
-        *(OPTIMUM["w_<goal>"].column(column, goal=each.name) for each, column in weights),
+        *(OPTIMUM["w_<goal>"].column(column, goal=goal.name) for goal, column in weights),
         *designs.columns(rows),
         *(centre_of.column(_settled(study, part(centre)), length, f"{axis} of <shape>", shape=name)
           for name, centre in places.items() for axis, part in (("x", np.real), ("y", np.imag))),

@@ -80,10 +80,12 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
     length = task.poses.count // task.poses.designs
     for design in range(task.poses.designs):
         first = design * length
-        entries += [(pose, each, each.estimates.get(pose, _UNKNOWN), each.used.get(pose, each.method), False)
-                    for pose in range(first, first + length) for each in results]  # fmt: skip
-        cycles = [(each, each.cycles[design]) for each in results if each.cycles]
-        entries += [(first, each, cycle, "monte_carlo" if cycle.samples else "bounds", True) for each, cycle in cycles]
+        entries += [(pose, result, result.estimates.get(pose, _UNKNOWN), result.used.get(pose, result.method), False)
+                    for pose in range(first, first + length) for result in results]  # fmt: skip
+        cycles = [(result, result.cycles[design]) for result in results if result.cycles]
+        entries += [
+            (first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True) for result, cycle in cycles
+        ]
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
     failure, low, high, error = (
@@ -98,7 +100,7 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
         *RELIABILITY.columns(
             {"kind of interval": "99.7 %; of counted failures Clopper-Pearson"},
-            method=[each.method for each in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
+            method=[result.method for result in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
             failure=failure, failure_low=low, failure_high=high, error=error, samples=samples, invalid=invalid,
             evaluations=evaluations, used=np.array(used), sigma_level=_sigma_level(failure), ppm=1e6 * failure,
         ),
@@ -201,8 +203,8 @@ def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> 
     columns: dict[str, Floats] = {}
     for kind in ("first", "total") if found else ():
         values = np.full((3, *shape), np.nan)
-        for pose, each in found.items():
-            values[:, pose] = getattr(each, kind)
+        for pose, indices in found.items():
+            values[:, pose] = getattr(indices, kind)
         columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
     return columns
 
