@@ -16,7 +16,7 @@ from mechdesign.analyses.reliability.cycle import with_cycle
 from mechdesign.analyses.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.analyses.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
 from mechdesign.analyses.reliability.method_warnings import method_warnings
-from mechdesign.analyses.reliability.question import ask, unsaid
+from mechdesign.analyses.reliability.question import ambiguous_points, ask
 from mechdesign.analyses.reliability.simulation import Setting, forward_plan
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.sources import Sources
@@ -50,7 +50,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     assert section is not None
     task, groups, doubts = _first_order(study, study_poses(study, "reliability"), sources)
     poses = task.poses
-    warnings += [*doubts, *unsaid(study, task.question)]
+    warnings += [*doubts, *ambiguous_points(study, task.question)]
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
         task, settings=_settings(task, groups), seed=study.seed if seed is None else seed, samples=section.samples,

@@ -72,7 +72,9 @@ class Marginal(ABC):
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
         """The law at these poses."""
-        return replace(self, low=taken(self.low, rows), high=taken(self.high, rows), nominal=taken(self.nominal, rows))
+        return replace(
+            self, low=at_rows(self.low, rows), high=at_rows(self.high, rows), nominal=at_rows(self.nominal, rows)
+        )
 
     @property
     def mean(self) -> Number:
@@ -116,7 +118,7 @@ class Marginal(ABC):
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
-def taken(value: Number, rows: Any) -> Number:
+def at_rows(value: Number, rows: Any) -> Number:
     """A number at these poses (an index of the array of poses); the number itself where it is the same at all poses."""
     return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
 
@@ -290,7 +292,7 @@ class Beta(Marginal):
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
         a, b = self.shape
-        return replace(super().take(rows), shape=(taken(a, rows), taken(b, rows)))
+        return replace(super().take(rows), shape=(at_rows(a, rows), at_rows(b, rows)))
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechdesign.analyses.reliability.copula import Correlation
-from mechdesign.analyses.reliability.laws import Marginal, taken
+from mechdesign.analyses.reliability.laws import Marginal, at_rows
 from mechdesign.analyses.reliability.pin_laws import PIN_LAWS, SLIDE_LAWS, PinLaw, SlideLaw
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
@@ -33,7 +33,7 @@ class Scalar:
 
     def take(self, rows: Sequence[int] | Ints) -> Scalar:
         """At some of many poses."""
-        moves = {name: (taken(slope, rows), quantity) for name, (slope, quantity) in self.moves.items()}
+        moves = {name: (at_rows(slope, rows), quantity) for name, (slope, quantity) in self.moves.items()}
         return replace(self, law=self.law.take(rows), moves=moves)
 
     @property
@@ -73,10 +73,10 @@ class Pin:
     def take(self, rows: Sequence[int] | Ints) -> Pin:
         """At some of many poses."""
         directions = tuple(
-            {name: taken(slope, rows) for name, slope in direction.items()} for direction in self.directions
+            {name: at_rows(slope, rows) for name, slope in direction.items()} for direction in self.directions
         )
         law = None if self.law is None else self.law.take(rows)
-        return replace(self, radius=taken(self.radius, rows), law=law, directions=directions)
+        return replace(self, radius=at_rows(self.radius, rows), law=law, directions=directions)
 
     @property
     def laws(self) -> Mapping[str, PinLaw] | Mapping[str, SlideLaw]:

@@ -88,12 +88,9 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
         ]
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
-    failure, low, high, error = (
-        np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
-    )
-    samples, invalid, evaluations = (
-        np.array([getattr(e, name) for e in estimates], dtype=np.int64)
-        for name in ("samples", "invalid", "evaluations")
+    failure, low, high, error, samples, invalid, evaluations = (
+        np.array([getattr(e, name) for e in estimates])
+        for name in ("failure", "low", "high", "error", "samples", "invalid", "evaluations")
     )
     columns = [
         *RELIABILITY.columns({}, scope=np.where(whole, "cycle", "pose")),
