@@ -17,7 +17,7 @@ from mechdesign.results import Column
 from mechdesign.study.schema.matrix import Best
 from mechdesign.terms import path_of, terms_of
 
-# Differences up to this part of the largest number count as none: tables have as many digits.
+# Differences up to this part of the largest number count as none, the precision of tables.
 _RESOLUTION = 1e-12
 
 

@@ -126,7 +126,7 @@ def _goals(study: Study) -> dict[str, int]:
 
 
 def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
-    """The number of the case and how it ended, what varies, the requirements, the results, and why it failed."""
+    """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
     yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
     for place, name in enumerate(cases.names):

@@ -45,7 +45,7 @@ def named(name: str, jobs: int | None) -> Pool:
     Parameters
     ----------
     jobs : int or None
-        Number of workers, where the executor does not have a number of its own; None: as many as processors.
+        Number of workers, where the executor has no number of its own; None: one for each processor.
 
     Raises
     ------

@@ -105,7 +105,7 @@ class Taken:
         raise Divided
 
     def write(self, directory: Path, origin: Mapping[str, Any], command: str) -> None:
-        """Write what is kept into a folder; `origin` decides the values, `command` was given.
+        """Write the kept values into a folder; `origin` decides the values, `command` was given.
 
         Raises
         ------

@@ -50,7 +50,7 @@ class Evaluator:
     Raises
     ------
     StudyError
-        If a goal names what no result has, or the study lacks what it needs.
+        If no result has the column of a goal, or the study lacks a section that it needs.
     """
 
     def __init__(self, study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> None:
@@ -214,7 +214,7 @@ class Evaluator:
                 reasons[rows] = without_numbers(error)
                 continue
             found = other({name: values[rows] for name, values in own.items()})
-            # Only designs of the same structure have as many rows behind their goals.
+            # Designs of another structure may have another number of rows behind their goals.
             width = self.layout.width if other.layout.width == self.layout.width else self.layout.head
             table[rows, :width] = found.table[:, :width]
             reasons[rows] = found.reasons if own else found.reasons[0]

@@ -119,9 +119,9 @@ class Explorer:
     Parameters
     ----------
     evaluate
-        Function from points, shape (m, dimensions), to what is known of them.
+        Evaluates points, shape (m, dimensions).
     snap
-        Function that moves points, shape (m, dimensions), so that points of the same design are equal.
+        Moves points, shape (m, dimensions), so that points of the same design are equal.
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
 

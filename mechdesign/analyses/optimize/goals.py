@@ -88,7 +88,7 @@ class Goal:
         Parameters
         ----------
         result : Result
-            Of several designs, as many rows of each, one design after the other.
+            The result of all designs, with the same number of rows for each, design by design.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Goal:
 
 
 class Judgement(NamedTuple):
-    """What a goal is for some designs.
+    """The values of a goal for some designs.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -
 
 
 def shape_of(outline: Outline, number: Callable[[float], Any] = float) -> Shape:
-    """The shape that an outline is, by what `number` makes of its numbers: one each, or one for each design."""
+    """The shape of an outline; `number` evaluates its numbers, to one value or to one for each design."""
     centre = None
     if outline.center is not None:
         x, y = outline.center
@@ -228,7 +228,7 @@ def shape_of(outline: Outline, number: Callable[[float], Any] = float) -> Shape:
 
 
 def _parts(result: str | Expression) -> tuple[str, str, str, Expression | None]:
-    """Name, command, column and expression of what is judged."""
+    """Name, command, column and expression of a judged result."""
     if isinstance(result, Expression):
         return result.text, "", result.text, result
     return result, command_of(result) or "workspace", path_of(result), None

@@ -134,7 +134,7 @@ class Designs:
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
     def merits(self, row: int) -> str:
-        """What a design is best for: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        """The optima that a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
         places = np.flatnonzero(self.winners == row).tolist()
         marks = [self.marks[place] for place in places if place < len(self.chosen)]
         weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]
@@ -180,7 +180,7 @@ class Designs:
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
-        """Unit of what a condition bounds; none of the scale of a shape."""
+        """Unit of the result that a condition bounds; the scale of a shape has none."""
         return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
@@ -247,7 +247,7 @@ class Judge:
         self._found: list[Floats] = []
 
     def parts(self) -> list[Part]:
-        """The rows of a result that belong to each goal or condition; those of assembly come last."""
+        """The rows of a result that belong to each goal or condition; the margins of assembly come last."""
         head, margins = self.layout.head, self.layout.margins
         places = {goal: slice(at.start - head, at.stop - head) for goal, at in self.layout.rows.items()}
         found = [

@@ -45,7 +45,7 @@ class Terms:
                 squares += [part] if objective[part.column] > 0 else []
             elif objective[part.column] * part.sign > 0:
                 self._edged.append(part)
-        # Of a root mean square that is the only goal the square is minimised.
+        # The only goal is a root mean square: its square is minimised.
         self._residuals = squares[0] if len(squares) == np.count_nonzero(objective) == 1 else None
         self._smooth = objective.copy()
         self._smooth[[part.column for part in self._edged]] = 0.0

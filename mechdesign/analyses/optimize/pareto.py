@@ -63,7 +63,7 @@ def allowance(goals: int, *, alone: bool) -> int:
 
 
 def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
-    """Find the front: the best design of each goal, with what is best in the others there, then designs between.
+    """Search the front: its ends, each the best design of one goal, then designs between them.
 
     Parameters
     ----------
@@ -342,7 +342,7 @@ def doubts(growth: Table, evaluations: int) -> Iterator[Caution]:
 
 
 def growth_table(designs: Designs) -> Table:
-    """Hypervolume of the front after so many designs, and how it grew."""
+    """Hypervolume of the front by the number of designs, and its growth."""
     rows = np.flatnonzero(designs.feasible)
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = counts - counts // 10

@@ -1,4 +1,4 @@
-"""Thousands of designs at once: tables with as many rows of each, and how far their poses are from assembling."""
+"""Thousands of designs at once: tables with the same number of rows for each, and the poses' margins of assembly."""
 
 from __future__ import annotations
 
@@ -88,9 +88,9 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
 def grouped(
     designs: Designs, command: str, rows: Ints, failed: Callable[[Ints, MechdesignError], None]
 ) -> Iterator[tuple[Ints, Study, Poses]]:
-    """Some designs in groups that share a study and have as many poses: their rows, the study, and the poses.
+    """Designs in groups that share a study and have the same number of poses: rows, study and poses of each group.
 
-    `failed` is told of designs whose numbers make no study or no poses.
+    `failed` is called with the designs whose numbers make no study or no poses.
     """
     if shared(designs.study, command, designs.changed):
         for some in alike(designs, command, rows):

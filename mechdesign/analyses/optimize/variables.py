@@ -204,7 +204,7 @@ def parted(study: Study, design: Design) -> tuple[Study, dict[str, float]]:
 
 
 def study_of(study: Study, design: Design) -> Study:
-    """The study of a design; see `mechdesign.study.designs.Designs.one` of what it raises."""
+    """The study of a design; raises as `mechdesign.study.designs.Designs.one`."""
     return variant(*parted(study, design))
 
 
@@ -214,10 +214,10 @@ def check_choices(study: Study) -> None:
     Raises
     ------
     StudyError
-        Where the entry itself is wrong then, every mistake in one go; what is wrong only together with other choices
-        is the reason of an infeasible design.
+        Where the entry itself is wrong, every mistake in one go. A mistake that needs several choices makes a design
+        infeasible.
     """
-    # As they are written, for their units must fit.
+    # Choices are tried as they are written: the units must fit the entry.
     choices = {
         name: study.resolved["optimize"]["variables"][name]["choices"]
         for name, variable in variables_of(study).items()

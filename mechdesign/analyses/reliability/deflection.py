@@ -149,13 +149,12 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
-    section, stiffness = study.reliability, study.stiffness
-    assert section is not None
-    section = section if poses is None else poses.section(section)
+    stiffness, poses = study.stiffness, Poses.single({}) if poses is None else poses
+    assert study.reliability is not None
     if stiffness is None:
         return None, []
-    resolved = stiffness if poses is None else poses.section(stiffness)
-    loads = resolved.loads if section.load is None else (section.load,)
+    section = poses.section(study.reliability)
+    loads = poses.section(stiffness).loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:
         notes.append(Caution(
@@ -166,8 +165,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
-    asked, mechanism = ask(study), study.mechanism
-    asked = asked if poses is None else asked.at(poses, np.arange(poses.count))
+    asked, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
     network, graph, links = asked.network, mechanism.graph, mechanism.description.links
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()

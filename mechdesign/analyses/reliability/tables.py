@@ -122,7 +122,7 @@ def _sigma_level(failure: Floats) -> Floats:
 def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     """Process capability of each limited output by itself, at every pose by every method that has moments [ISO 22514].
 
-    Limits of errors are those of the value about its nominal one.
+    Limits of an error are added to the nominal value.
     """
     known, question = _with_moments(task, results), task.question.at(task.nominal)
     single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)

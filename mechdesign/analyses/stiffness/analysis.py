@@ -153,7 +153,7 @@ class Drawn:
 
 
 def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
-    """What pictures show: the poses, the first valid one, and the first with a free twist."""
+    """Data of the pictures: the poses, the first valid one, and the first with a free twist."""
     drawn: dict[str, Any] = {"poses": poses, "shown": solved.shown}
     for name, pose in (("first", solved.first), ("loose", solved.loose)):
         if pose is not None:
@@ -167,7 +167,7 @@ def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
 def solve(
     study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress: Progress = NULL, *, effects: bool = True
 ) -> Solved:
-    """Solve all poses; one that cannot be assembled is nan. `effects` adds those of the loads, if any."""
+    """Solve all poses; one that cannot be assembled is nan. `effects` adds the effects of the study's loads."""
     held = Held.unknown(poses.count, body.size)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []

@@ -1,4 +1,4 @@
-"""The body or the pin whose stiffness a study asks, what carries it, and how it is held in a batch of poses."""
+"""The body or the pin whose stiffness a study asks, its legs and network, and how it is held in a batch of poses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The body, or the pin, whose stiffness is asked, and what carries it, for any number of poses.
+    """The body, or the pin, whose stiffness is asked, with its legs and its network, for any number of poses.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Body:
         return np.stack(parts, axis=-1).reshape(-1, len(self.given.loads), 3)
 
     def length(self, configuration: Configuration) -> Floats:
-        """Length as which a radian counts where sizes are compared, shape (n,): the spread of the joints that carry.
+        """Length that stands for a radian where sizes are compared, shape (n,): the spread of the network's joints.
 
         No result depends on it.
         """
@@ -84,7 +84,7 @@ class Body:
 
 
 def ask(study: Study) -> Body:
-    """The body whose stiffness the study asks, and what carries it.
+    """The body whose stiffness the study asks, with its legs and its network.
 
     Raises
     ------

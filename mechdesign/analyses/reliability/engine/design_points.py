@@ -19,7 +19,7 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
 _SPREAD_SAMPLES = 160
 EXPLORED = len(SPREADS) * _SPREAD_SAMPLES
-# Most starts for one limit; so many leave no wide gap on a limit that is a circle about the mean.
+# Most starts for one limit, enough to leave no wide gap on a limit that is a circle about the mean.
 _STARTS = 24
 # The same with random directions, which have starts of their own, and where margins end, whose tangents are rough.
 _FEW_STARTS = 8

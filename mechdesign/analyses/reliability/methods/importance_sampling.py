@@ -62,7 +62,7 @@ _BEYOND_FROM = 0.9
 # Samples by which the number of all samples is planned, and the factor by which more than planned are drawn.
 _FIRST_SAMPLES = 3000
 _MARGIN = 1.1
-# Least density, and largest logarithm of a density, that are told from 0 and from infinity.
+# Least density and largest logarithm of a density; smaller and larger ones are clipped against overflow.
 _LEAST_DENSITY = 1e-200
 _MAX_LOG_DENSITY = 600.0
 
@@ -125,7 +125,7 @@ rung = importance_sampling
 
 
 def _about(problem: Problem, points: DesignPoints) -> Mixture:
-    """Parts about the design points, weighted by the tangents' probabilities, and what is beyond the nearest one."""
+    """Parts about the design points, weighted by the tangents' probabilities, and a part beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
     near = points.near

@@ -24,7 +24,7 @@ _FEW_FAILURES = 200
 
 
 def run(task: Task) -> MethodResult:
-    """About as many points at each pose as the study gives samples."""
+    """Results at every pose, with about the study's number of samples as points."""
     return pose_by_pose(NAME, task, _at_pose)
 
 
