@@ -73,11 +73,10 @@ def vector(x: Floats, y: Floats) -> Complexes: ...
 def vector(x: Value, y: Value) -> Vector: ...
 def vector(x: Value, y: Value) -> Vector:
     """Complex number x + i y without the temporaries of ``x + 1j * y``."""
-    shape = np.broadcast_shapes(np.shape(x), np.shape(y))
-    if not shape:
+    if not np.ndim(x) and not np.ndim(y):
         # A NumPy scalar, not Python's: it divides by zero without raising.
         return np.complex128(complex(x, y))
-    z = np.empty(shape, dtype=complex)
+    z = np.empty(np.broadcast_shapes(np.shape(x), np.shape(y)), dtype=complex)
     z.real = x
     z.imag = y
     return z

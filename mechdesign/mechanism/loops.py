@@ -274,12 +274,10 @@ def _quarter_turn(value: Vector) -> Vector:
 
 
 def rows_of(lines: Sequence[Sequence[Vector]]) -> list[list[Value]]:
-    """Loop equations as rows of a real matrix: of each line of columns real and imaginary parts, each contiguous."""
-    return [[_part(column, name) for column in line] for line in lines for name in ("real", "imag")]
+    """Loop equations as rows of a real matrix: of each line of columns the real and the imaginary parts."""
+    parts = [part for line in lines for part in ([z.real for z in line], [z.imag for z in line])]
+    return [[_contiguous(value) for value in row] for row in parts]
 
 
-def _part(value: Vector, name: str) -> Value:
-    if isinstance(value, float):
-        return value if name == "real" else 0.0
-    part = getattr(value, name)
+def _contiguous(part: Value) -> Value:
     return part if isinstance(part, float) or not part.ndim else np.ascontiguousarray(part)

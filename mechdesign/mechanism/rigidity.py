@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -67,10 +67,10 @@ class Equations:
         (group,) = whole(self.graph).groups
         return np.array(unknowns_of(group, nodes, rotations, slides), dtype=float) / self._units
 
-    def at(self, x: Floats, held: Sequence[Coordinate] = ()) -> Loops:
-        """The loops at given unknowns, lengths as in the study, with held coordinates that should be zero."""
+    def at(self, x: Floats, held: Sequence[Coordinate] = (), values: Sequence[float] = ()) -> Loops:
+        """The loops at given unknowns, lengths as in the study; held coordinates should have `values`, or be zero."""
         structure = whole(self.graph, held)
-        loops = Loops.start(self.graph, structure, self.geometry.nominal, [0.0] * len(held))
+        loops = Loops.start(self.graph, structure, self.geometry.nominal, values or [0.0] * len(held))
         loops.put(structure.groups[0], x * self._units)
         return loops
 
@@ -131,22 +131,25 @@ class Equations:
         """
         from scipy.optimize import least_squares
 
-        coordinates = [coordinate for coordinate, _ in held]
+        coordinates, values = [coordinate for coordinate, _ in held], [value for _, value in held]
+        turns = np.array([False] * 2 * len(self.graph.edges) + [c.quantity == "angle" for c in coordinates])
         ahead = np.zeros((0, len(x))) if step is None else step[None] / np.linalg.norm(step)
         start = x if step is None else x + step
 
+        # The solver asks for the slope where it has just asked for the residual.
+        @lru_cache(maxsize=1)
+        def system(unknowns: bytes) -> tuple[Floats, Floats]:
+            return self._system(self.at(np.frombuffer(unknowns), coordinates, values))
+
         def residual(y: Floats) -> Floats:
-            errors, count = self._system(self.at(y, coordinates))[0], 2 * len(self.graph.edges)
-            for k, (coordinate, value) in enumerate(held, start=count):
-                miss = errors[k] - value / (self.size if coordinate.quantity == "length" else 1.0)
-                errors[k] = wrap(miss) if coordinate.quantity == "angle" else miss
-            return np.concatenate([errors, ahead @ (y - start)])
+            errors, _ = system(y.tobytes())
+            return np.concatenate([np.where(turns, wrap(errors), errors), ahead @ (y - start)])
 
         def slope(y: Floats) -> Floats:
-            return np.vstack([self.jacobian(y, coordinates), ahead])
+            return np.vstack([system(y.tobytes())[1], ahead])
 
-        found = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
-        return found.x, float(np.abs(found.fun).max(initial=0.0))
+        result = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
+        return result.x, float(np.abs(result.fun).max(initial=0.0))
 
     def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
