@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from typing import Any, Literal
 
@@ -124,8 +125,7 @@ class Expression:
 
     text: str
     program: tuple[_Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
-    angle_unit: float  # radians in one of the units that trigonometry takes and gives
-    names: frozenset[str]  # variables, dotted ones (``B.x``) included
+    angle_unit: float = 1.0  # radians in one of the units that trigonometry takes and gives
 
     @classmethod
     def parse(cls, text: str, angle_unit: float = 1.0) -> Expression:
@@ -136,9 +136,12 @@ class Expression:
         ExpressionError
             Where the text is not an expression; the message tells what is wrong with it.
         """
-        program = _Parser(text).parse()
-        names = frozenset(str(item) for kind, item in program if kind == "name")
-        return cls(text, program, angle_unit, names)
+        return cls(text, _Parser(text).parse(), angle_unit)
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names of the variables, dotted ones (``B.x``) included."""
+        return frozenset(str(item) for kind, item in self.program if kind == "name")
 
     def evaluate(self, env: Mapping[str, ArrayLike]) -> Number:
         """Value with the variables of `env`, which broadcast against each other.
@@ -207,17 +210,14 @@ class Expression:
 
     def substituted(self, values: Mapping[str, Expression | float]) -> Expression:
         """The expression with others, or numbers, in place of its variables; trigonometry has their angle unit."""
-        given = {name: value for name, value in values.items() if isinstance(value, Expression)}
-        parts: dict[str, tuple[_Step, ...]] = {
-            name: value.program if isinstance(value, Expression) else (("constant", value),)
-            for name, value in values.items()
-        }  # fmt: skip
-        program = tuple(
-            chain.from_iterable(parts[str(item)] if kind == "name" else ((kind, item),) for kind, item in self.program)
-        )
-        names = frozenset(str(item) for kind, item in program if kind == "name")
-        unit = next((each.angle_unit for each in given.values()), self.angle_unit)
-        return Expression(self.text, program, unit, names)
+        units = [value.angle_unit for value in values.values() if isinstance(value, Expression)]
+
+        def variable(name: str) -> tuple[_Step, ...]:
+            value = values[name]
+            return value.program if isinstance(value, Expression) else (("constant", value),)
+
+        program = self._run(_constant_step, variable, _call_steps)
+        return Expression(self.text, program, next(iter(units), self.angle_unit))
 
     def turning(self, name: str) -> tuple[Expression, dict[str, tuple[Expression, float]]]:
         """The expression with variables in place of its arctangents, and these, each with the turn after it repeats.
@@ -225,23 +225,18 @@ class Expression:
         An arctangent jumps where a direction passes half a turn, or a line a quarter; as a variable it can be followed.
         `name` begins the names of the variables.
         """
-        found: dict[str, tuple[Expression, float]] = {}
-        stack: list[tuple[_Step, ...]] = []
-        for step in self.program:
-            kind, item = step
-            if kind != "call":
-                stack.append((step,))
-                continue
-            count = arity(str(item))
-            program = (*chain.from_iterable(stack[-count:]), step)
-            if item in _TURNS:
-                variable = f"{name}:{len(found)}"
-                names = frozenset(str(part) for what, part in program if what == "name")
-                found[variable] = Expression(self.text, program, self.angle_unit, names), _TURNS[str(item)]
-                program = (("name", variable),)
-            stack[-count:] = [program]
-        names = frozenset(str(part) for what, part in stack[0] if what == "name")
-        return Expression(self.text, stack[0], self.angle_unit, names), found
+        arctangents: dict[str, tuple[Expression, float]] = {}
+
+        def call(function: str, inner: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+            program = _call_steps(function, inner)
+            if function not in _TURNS:
+                return program
+            variable = f"{name}:{len(arctangents)}"
+            arctangents[variable] = replace(self, program=program), _TURNS[function]
+            return (("name", variable),)
+
+        program = self._run(_constant_step, lambda variable: (("name", variable),), call)
+        return replace(self, program=program), arctangents
 
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]
@@ -293,6 +288,15 @@ class Expression:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
+
+
+def _constant_step(value: float) -> tuple[_Step, ...]:
+    return (("constant", value),)
+
+
+def _call_steps(function: str, arguments: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+    """The program of a call from those of its arguments."""
+    return (*chain.from_iterable(arguments), ("call", function))
 
 
 def meanings() -> dict[str, tuple[str, str]]:
