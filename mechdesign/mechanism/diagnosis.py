@@ -9,12 +9,12 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Prismatic
 from mechdesign.mechanism.rigidity import Equations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Floats
 
 DRIVES = "mechanism.drives"

@@ -15,13 +15,13 @@ from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
+from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Jacobian, Linearization
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH
-from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats
 
 # Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).

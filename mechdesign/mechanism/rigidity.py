@@ -17,11 +17,12 @@ import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, vector, wrap
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.decomposition import TWICE_AND_FREE, Undetermined
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.loops import Loops, unknowns_of
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Structure, Undetermined, whole
+from mechdesign.mechanism.structure import Structure, whole
 from mechdesign.numerics.arrays import Complexes, Floats
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
@@ -257,7 +258,4 @@ def check_independent(equations: Equations, structure: Structure) -> None:
             if not singular:
                 return
     if singular:
-        raise Undetermined(
-            "the given coordinates fix one part of the mechanism twice and leave another free; give one of the other "
-            "part instead"
-        )
+        raise Undetermined(f"{TWICE_AND_FREE}; give one of the other part instead")
