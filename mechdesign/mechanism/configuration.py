@@ -119,24 +119,16 @@ class Configuration:
     def take(self, index: Ints | int | tuple[int, ...] | tuple[Ints, ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
-        reason = self.reason[index]
+        reason = np.asarray(self.reason[index])
 
         def pick(value: Either) -> Either:
-            if np.ndim(value) == 0 and reason.ndim == 0:
-                return value
-            return np.broadcast_to(np.asarray(value), self.shape)[index]
+            return np.broadcast_to(value, self.shape)[index] if np.ndim(value) else value
 
-        vectors = Vectors(
-            [pick(w) for w in self.vectors.w],
-            [pick(d) for d in self.vectors.d],
-            {body: v if isinstance(v, float) else pick(v) for body, v in self.vectors.offsets.items()},
-            {name: pick(v) for name, v in self.vectors.parameters.items()},
-        )
-        return Configuration(
-            self.graph, vectors, np.shape(reason), [pick(x) for x in self.nodes], [pick(u) for u in self.rotations],
-            [pick(s) for s in self.slides], [pick(c) for c in self.closures], np.asarray(reason),
-            {name: pick(v) for name, v in self.places.items()}, {key: pick(v) for key, v in self.near.items()},
-            self.counted,
+        return replace(
+            self, vectors=self.vectors.map(pick), shape=reason.shape, reason=reason,
+            nodes=[pick(x) for x in self.nodes], rotations=[pick(u) for u in self.rotations],
+            slides=[pick(s) for s in self.slides], closures=[pick(c) for c in self.closures],
+            places={name: pick(v) for name, v in self.places.items()}, near={k: pick(v) for k, v in self.near.items()},
         )  # fmt: skip
 
 
