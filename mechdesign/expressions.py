@@ -173,8 +173,8 @@ class Expression:
             # A quotient by a constant is linear; all else of a variable counts as not.
             return inner[0] if function == "/" and not inner[1] else 2 * max(inner)
 
-        found: int = self._run(lambda value: 0, lambda name: 1, degree)
-        return found <= 1
+        highest: int = self._run(lambda value: 0, lambda name: 1, degree)
+        return highest <= 1
 
     def is_angle(self, quantities: Mapping[str, str]) -> bool:
         """Whether the value is an angle, by the quantities of variables: one, or a sum of whole multiples of some.
@@ -301,14 +301,14 @@ def _call_steps(function: str, arguments: list[tuple[_Step, ...]]) -> tuple[_Ste
 
 def meanings() -> dict[str, tuple[str, str]]:
     """Functions, operators and constants by name: how each is written, and what it is."""
-    found = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
+    entries = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
     turn = {"takes": "; the angle is in the study's unit", "gives": ", in the study's unit", "": ""}
     for name, function in _FUNCTIONS.items():
         call = "(y, x)" if name == "atan2" else "(x, y)" if arity(name) == 2 else "(x)"
         written = f"{name}{call}" if name in FUNCTIONS else f"x {name} y"
         if name != "negate":
-            found[name] = (written, function.meaning + turn[function.angles])
-    return found
+            entries[name] = (written, function.meaning + turn[function.angles])
+    return entries
 
 
 def arity(name: str) -> int:
@@ -407,8 +407,8 @@ class _Parser:
 
     def _call(self, name: str) -> None:
         if name not in FUNCTIONS:
-            known = ", ".join(sorted(FUNCTIONS))
-            raise ExpressionError(f"unknown function {name!r}; the functions are {known}")
+            names = ", ".join(sorted(FUNCTIONS))
+            raise ExpressionError(f"unknown function {name!r}; the functions are {names}")
         self._operand_chain(0)
         count = 1
         while self._take(","):
@@ -421,9 +421,9 @@ class _Parser:
             if count == 1:
                 raise ExpressionError(f"{name} compares two numbers or more")
             return
-        wanted = arity(name)
-        if count != wanted:
-            raise ExpressionError(f"{name} takes {wanted} number{'s' * (wanted > 1)}, not {count}")
+        arguments = arity(name)
+        if count != arguments:
+            raise ExpressionError(f"{name} takes {arguments} number{'s' * (arguments > 1)}, not {count}")
         self.program.append(("call", name))
 
     def _close(self) -> None:

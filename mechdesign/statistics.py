@@ -106,8 +106,8 @@ def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
     """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
     none = -np.inf if largest else np.inf
     inside = np.where(counts, values, none)
-    found = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
-    return np.where(counts.any(axis=-1), found, np.nan)
+    value = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
+    return np.where(counts.any(axis=-1), value, np.nan)
 
 
 class Interval(NamedTuple):

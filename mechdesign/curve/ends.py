@@ -73,7 +73,7 @@ class Ends:
     @cached_property
     def ends(self) -> tuple[End, ...]:
         """Where the motions end and where they go to infinity, in order along the lines."""
-        pieces, found = self._curve.pieces, list[End]()
+        pieces, ends = self._curve.pieces, list[End]()
         joined = pieces.joined_to_next
         if not len(pieces.line):
             return ()
@@ -89,15 +89,15 @@ class Ends:
             held |= outer & self._curve.poses.closed
             piece, outside = piece[~held], outside[~held]
             causes = self._causes(pieces.line[piece], outside)
-            found += [
+            ends += [
                 End(int(pieces.line[k]), float(place[k]), self._named(k, x, cause), k, x)
                 for k, cause in zip(piece.tolist(), causes, strict=True)
             ]
-        found += [
+        ends += [
             End(int(pieces.line[k]), float(pieces.end[k]), self._curve.margins.causes[number], k, 1, endless=True)
             for k, number in self._at_joints("across", PARALLEL)
         ]
-        return tuple(sorted(found, key=lambda end: (end.line, end.place, end.x)))
+        return tuple(sorted(ends, key=lambda end: (end.line, end.place, end.x)))
 
     def changes(self) -> list[Change]:
         """Where two assemblies meet and motions go on, in order along the lines; the first and last pose count."""

@@ -79,12 +79,12 @@ class Functions(Series):
                 np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
                 for table in (self._table, self._divisor)
             )
-            found = above / below
+            limits = above / below
         places = self.curve.inside(line[lanes], place[lanes])
         shape = len(rows), len(lanes)
         own, which = (part.ravel() for part in np.broadcast_arrays(rows[:, None], line[lanes]))
         table = self.at(line[lanes], places)[rows]
-        values[:, lanes] = self._true(own, which, table.ravel(), found.ravel()).reshape(shape)
+        values[:, lanes] = self._true(own, which, table.ravel(), limits.ravel()).reshape(shape)
         return values
 
     def _rows(self, names: Sequence[str]) -> Ints:
@@ -143,7 +143,7 @@ class Functions(Series):
             Their rounding.
         """
         rows, lines = self._rows(names), self.curve.lines
-        found = np.full((2, 2 * len(rows) * lines), np.nan)
+        table = np.full((2, 2 * len(rows) * lines), np.nan)
         if len(self.pieces.line) and len(rows):
             rows, sign = np.tile(rows, 2), np.repeat([-1.0, 1.0], len(rows))
             still = np.tile(still, (2, 1))
@@ -158,8 +158,8 @@ class Functions(Series):
             lanes, first = np.unique(lane[tie], return_index=True)
             chosen = tie[first]
             own, sign, still = rows[lanes // lines], sign[lanes // lines], still.ravel()[lanes]
-            found[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
-        value, place = found.reshape(2, 2, len(names), lines)
+            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
+        value, place = table.reshape(2, 2, len(names), lines)
         return Extremes(value, place)
 
     def _settled(
@@ -194,11 +194,11 @@ class Functions(Series):
         The smallest and the largest value of a function are neighbouring lanes, half of them all apart.
         """
         line, poled, half = self.pieces.line, self._poled[rows], len(rows) // 2
-        known = self._table[rows[:half]]
-        known = np.where(np.isnan(known) | poled[:half, None, None], -np.inf, known)
+        values = self._table[rows[:half]]
+        values = np.where(np.isnan(values) | poled[:half, None, None], -np.inf, values)
         with np.errstate(invalid="ignore"):
-            steps = np.nan_to_num(np.abs(np.diff(known, axis=2)), nan=np.inf).max(axis=2)
-        nodes = np.concatenate([np.where(np.isinf(known), -np.inf, -known).max(axis=2), known.max(axis=2)])
+            steps = np.nan_to_num(np.abs(np.diff(values, axis=2)), nan=np.inf).max(axis=2)
+        nodes = np.concatenate([np.where(np.isinf(values), -np.inf, -values).max(axis=2), values.max(axis=2)])
         best = np.full((len(rows), self.curve.lines), -np.inf)
         largest(best, line, nodes)
         # Between its nodes a function is larger than there by less than it moves from one to the next.
@@ -233,9 +233,9 @@ class Functions(Series):
         lane, piece = lane[which], piece[which]
         x, value = self._refined(rows[lane], sign[lane], piece, m, table[which, m])
         corner, where = np.nonzero(rough & (nodes >= best[:, line]) & np.isfinite(nodes))
-        found = self._corners(rows[corner], sign[corner], where)
+        corners = self._corners(rows[corner], sign[corner], where)
         return tuple(
-            np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *found), strict=True)
+            np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *corners), strict=True)
         )  # type: ignore[return-value]
 
     def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
@@ -283,7 +283,7 @@ class Functions(Series):
 
     def _poles(self, rows: Ints, sign: Floats) -> tuple[Ints, Ints, Floats, Floats]:
         """Places at which functions times a sign run to plus infinity: lane, piece, place in it, infinity."""
-        found: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
+        poles: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
         for k in np.flatnonzero(self._poled[rows]).tolist():
             product, divisor = (chebyshev.series(table[rows[k]]) for table in (self._table, self._divisor))
             sizes = self._scale[rows[k], self.pieces.line], self._divisor_scale[rows[k], self.pieces.line]
@@ -302,8 +302,8 @@ class Functions(Series):
             beside = np.stack([x - 1e-4, x + 1e-4])
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
             up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
-            found.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
-        lane, piece, x = (np.concatenate(part) for part in zip(*found, strict=True))
+            poles.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
+        lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
         return lane, piece, x, np.full(len(x), np.inf)
 
     def zeros(self, names: Sequence[str], touching: float) -> Zeros:

@@ -57,9 +57,7 @@ class Series:
             for name, by_what in (divisors or {}).items()
         }
         self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
-        self._means, self._zeros = (
-            np.array([name in wanted for name in names], dtype=bool) for wanted in (means, zeros)
-        )
+        self._means, self._zeros = (np.array([name in group for name in names], dtype=bool) for group in (means, zeros))
         # Whether the largest, and the smallest, values are wanted.
         self._extremes = np.array(
             [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
@@ -112,20 +110,20 @@ class Series:
             finite = np.isfinite(values)
             largest(self._scale, pending.line, np.where(finite, np.abs(values), 0.0).max(axis=2))
             largest(self._divisor_scale, pending.line, np.abs(np.nan_to_num(divisors)).max(axis=2))
-            known = np.where(finite & ~self._poled[:, None, None], values, np.nan)
-            missing = np.isnan(known)
-            ends = [np.where(missing, -np.inf, sign * known).max(axis=2) for sign in (1.0, -1.0)]
+            finite_values = np.where(finite & ~self._poled[:, None, None], values, np.nan)
+            missing = np.isnan(finite_values)
+            ends = [np.where(missing, -np.inf, sign * finite_values).max(axis=2) for sign in (1.0, -1.0)]
             for end, top in zip(ends, best, strict=True):
                 largest(top, pending.line, end)
             scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
             rest = chebyshev.remainder(chebyshev.series(values))
             rough = ~(rest <= exact * scale) & finite.any(axis=2)
             with np.errstate(invalid="ignore"):
-                steps = np.abs(np.diff(known, axis=2))
+                steps = np.abs(np.diff(finite_values, axis=2))
                 steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
                 above = [
-                    wanted[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
-                    for end, top, wanted in zip(ends, best, self._extremes, strict=True)
+                    is_sought[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
+                    for end, top, is_sought in zip(ends, best, self._extremes, strict=True)
                 ]
             mean = np.zeros_like(rough)
             if self._means.any():

@@ -29,10 +29,10 @@ def picked(value: Either, index: Ints | int | slice) -> Either:
 
 def largest(values: Iterable[Value], least: float = 0.0) -> Value:
     """The largest size of several values, at least `least`."""
-    found: Value = least
+    size: Value = least
     for value in values:
-        found = np.maximum(found, np.abs(value))
-    return found
+        size = np.maximum(size, np.abs(value))
+    return size
 
 
 def norm2(z: Vector) -> Value:

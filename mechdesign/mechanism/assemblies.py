@@ -55,7 +55,7 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         raise MechanismError(
             f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes", "mechanism.sketch"
         )
-    found: list[Assembly] = []
+    listed: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
         modes = list(plan.modes)
         for index, sign in zip(choosing, signs, strict=True):
@@ -66,14 +66,14 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         ]
         drawn = modes == list(plan.modes)
         if not plan.iterative:
-            found.append(Assembly(" ".join(names) or "only", _variant(mechanism, plan, modes, None), drawn))
+            listed.append(Assembly(" ".join(names) or "only", _variant(mechanism, plan, modes, None), drawn))
             continue
         for number, configuration in enumerate(_solutions(plan, modes, drawn), 1):
             label = " ".join([*names, f"#{number}"])
-            found.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
-            if len(found) > MAX_ASSEMBLIES:
+            listed.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
+            if len(listed) > MAX_ASSEMBLIES:
                 raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes", SKETCH)
-    return tuple(found)
+    return tuple(listed)
 
 
 def _variant(
@@ -112,12 +112,12 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
         # A leg without length has no direction: whatever its angle, it is no assembly.
         with np.errstate(invalid="ignore"):
             good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
-    found = [sketch] if drawn else []
+    solutions = [sketch] if drawn else []
     for lane in np.flatnonzero(good):
         one = every.take(int(lane))
-        if not any(_same(one, other, size) for other in found):
-            found.append(one)
-    return found
+        if not any(_same(one, other, size) for other in solutions):
+            solutions.append(one)
+    return solutions
 
 
 def _same(one: Configuration, other: Configuration, size: float) -> bool:

@@ -94,8 +94,8 @@ class Atlas:
             given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, values)]
             first = plan.solve(given, limits=False)
             start = plan.start(first)
-            found = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
-            return found, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
+            grown = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
+            return grown, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
 
         atlas, table = begun(held)
         lattice = np.zeros(table.shape[1], dtype=complex)
@@ -178,11 +178,11 @@ class Atlas:
         rows = np.flatnonzero(~state.solved(z.shape, self.signs.tolist()))
         if not len(rows):
             return state, fold_distance
-        found = table_of(state.unknowns, z.shape)
+        solved = table_of(state.unknowns, z.shape)
         own = {name: value[rows] for name, value in sizes.items()}
-        found[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
+        solved[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
         z[rows] = within[rows]
-        return self._run(z, sizes, found, 0, beyond), fold_distance
+        return self._run(z, sizes, solved, 0, beyond), fold_distance
 
     def _beside_fold(self, z: Complexes, sizes: Sizes, table: Floats) -> tuple[Floats, Floats]:
         """Unknowns and distances from a fold, by single corrections until a pose is solved or seen to be beyond.
@@ -193,7 +193,7 @@ class Atlas:
         Corrections alone would only halve D each time; a longer one ends at the root of g, or beside the fold.
         """
         fold_distance, left = np.full(z.shape, np.nan), np.arange(len(z))
-        found, guess = table.copy(), table
+        unknowns, guess = table.copy(), table
         # The last place, the determinants there, and whether a correction led from there.
         last, before, led = guess, np.full((len(self.signs), len(z)), np.nan), np.zeros(len(z), dtype=bool)
         for _ in range(SINGLE_CORRECTIONS):
@@ -204,10 +204,10 @@ class Atlas:
             crossed = np.sign(now) != self.signs
             beyond = crossed.any(axis=0)
             solved = ~beyond & state.solved(left.shape)
-            found[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
+            unknowns[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
             # Beyond the fold: the pose at the fold.
             share = np.where(crossed & led, before / (before - now), 1.0).min(axis=0)
-            found[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
+            unknowns[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
             squared = np.where(crossed & led, squares, now**2)
             fold_distance[left[beyond]] = -np.abs(np.prod(squared, axis=0))[beyond]
             # The group that is nearest to its fold says how much longer the correction should have been.
@@ -221,7 +221,7 @@ class Atlas:
             led = ~longer[moving]
             if not len(left):
                 break
-        return found, fold_distance
+        return unknowns, fold_distance
 
     def _run(self, z: Complexes, sizes: Sizes, table: Floats, steps: int, beyond: bool = False) -> State:
         """The whole mechanism after some of Newton's corrections."""
@@ -301,13 +301,13 @@ class Atlas:
 
         design, lattice, table = (np.concatenate(parts, axis=-1) for parts in zip(*layers, strict=True))
         slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
-        found = []
+        designs = []
         for k in range(count):
             lanes = np.flatnonzero(design == k)
             z = self.origin + self.spacing * lattice[lanes]
             tree = cKDTree(np.stack([z.real, z.imag], axis=-1))
-            found.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
-        return found
+            designs.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
+        return designs
 
     def _slopes(self, lattice: Complexes, sizes: Sizes, table: Floats) -> Floats:
         """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
@@ -319,10 +319,10 @@ class Atlas:
 
     def _within(self, state: State, sizes: Sizes, shape: tuple[int, ...]) -> Flags:
         """Which poses are within the study's limits."""
-        found = np.ones(shape, dtype=bool)
+        within = np.ones(shape, dtype=bool)
         for _, margin in self.plan.core.margins(self._configuration(state, sizes, np.zeros(shape, dtype=bool))):
-            found &= np.asarray(margin) >= 0
-        return found
+            within &= np.asarray(margin) >= 0
+        return within
 
     def _configuration(self, state: State, places: Mapping[str, Value], lost: Flags) -> Configuration:
         """A flat batch of states in the shape of `lost`, nan where that is true."""
@@ -342,10 +342,10 @@ class Atlas:
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
         """Where a leg does not reach, or has no length."""
         lengths = [state.slides[slide] for slide in self.plan.core.graph.telescopic]
-        found = np.zeros(shape, dtype=bool)
+        open_ = np.zeros(shape, dtype=bool)
         for margin in (*state.closures, *lengths):
-            found |= ~(np.asarray(margin) > 0)
-        return found
+            open_ |= ~(np.asarray(margin) > 0)
+        return open_
 
 
 def _pick(poses: _Poses, z: Complexes) -> tuple[Complexes, Floats, Floats]:

@@ -77,13 +77,13 @@ class ChangePoints:
 
     def _parity(self, values: Floats, groups: int) -> list[Value]:
         """Modes of the first groups; the others as drawn."""
-        found: list[Value] = list(self._modes)
+        modes: list[Value] = list(self._modes)
         for index in range(groups):
             places = self._places[index]
             if len(places):
                 passed = np.searchsorted(places, values) - np.searchsorted(places, self.sketch)
-                found[index] = found[index] * np.where(passed % 2, -1, 1)
-        return found
+                modes[index] = modes[index] * np.where(passed % 2, -1, 1)
+        return modes
 
     def _closures(self, index: int, values: Floats) -> Floats:
         modes = self._parity(values, index)[: index + 1]

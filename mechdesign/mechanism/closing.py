@@ -60,9 +60,9 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
             def valid(sweep: Floats, k: int = k) -> Flags:
                 return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
-            found = closing_range(valid, coordinate, core.size, unit)
-            if found:
-                mend = f"{found}; draw it there, or {mend}"
+            ranges = closing_range(valid, coordinate, core.size, unit)
+            if ranges:
+                mend = f"{ranges}; draw it there, or {mend}"
                 break
     return MechanismError(f"{start}: {where}; {mend}", SKETCH)
 
@@ -95,12 +95,12 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
         return MechanismError(
             f"the sketch is at a singular position: with its drives held, {free}; draw another", SKETCH
         )
-    found = equations.at(x)
-    if not plan.iterative or any(found.slides[slide] <= 0 for slide in graph.telescopic):
+    closed = equations.at(x)
+    if not plan.iterative or any(closed.slides[slide] <= 0 for slide in graph.telescopic):
         return None
     moving = [
         f"{point}: [{place.real:.6g}, {place.imag:.6g}]"
-        for point, place in zip(graph.nodes, found.nodes, strict=True)
+        for point, place in zip(graph.nodes, closed.nodes, strict=True)
         if ":" not in point and (GROUND, point) not in graph.points
     ]
     return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", SKETCH)
@@ -128,7 +128,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     if group.form == "two slides":
         one, two = slides
         return f"the slides '{one}' and '{two}' are parallel, which holds nothing along them", "change a direction"
-    known, vectors, directions = state.dyad(group)
+    span, vectors, directions = state.dyad(group)
     # By the angle that they turn with: links with the distance of the joints that they hold apart, and these joints.
     links: dict[int, str] = {}
     ends: dict[int, list[int]] = {}
@@ -144,7 +144,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     def points(nodes: Iterable[int]) -> str:
         return " and ".join(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node])
 
-    gap = float(np.abs(known))
+    gap = float(np.abs(span))
     if group.form == "two angles":
         (one, two), (first, second) = links.values(), ends.values()
         inner = [node for node in first if node in second]
@@ -158,7 +158,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     if group.form == "angle and fixed slide":
         on_line = {n for k in group.edges if edges[k].slide == slide for n in (edges[k].tail, edges[k].head)}
         pins = [node for node in ends[root] if node not in on_line] or ends[root]
-        off = abs(cross(directions[slide], known))
+        off = abs(cross(directions[slide], span))
         line = f"the line of '{name}' passes {points(pins[:1])} at a distance of {off:.5g}"
         return f"link {links[root]} is too short to reach its slide: {line}", CHECK_LENGTHS
     off = abs(cross(directions[slide], vectors[root]))

@@ -152,9 +152,9 @@ def joined(
     for part in parts:
         some = slice(end, end := end + len(part.reason))
         reason[some] = part.reason
-        each: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
-        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in each]
-        for k, value in enumerate(each):
+        values: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in values]
+        for k, value in enumerate(values):
             if np.ndim(value) > np.ndim(whole[k]):
                 # What was the same for every pose so far is a single number.
                 whole[k] = np.full(count, whole[k], dtype=value.dtype)

@@ -66,10 +66,10 @@ def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:
 
 def angle_rows(structure: Structure) -> Flags:
     """Which rows of a table are angles, shape (rows, 1)."""
-    found = [
+    flags = [
         np.arange(rows.stop - rows.start) < len(structure.groups[k].angles) for k, rows in structure.unknowns.items()
     ]
-    return np.concatenate(found)[:, None]
+    return np.concatenate(flags)[:, None]
 
 
 def scale_of(structure: Structure, size: float, table: Floats) -> Floats:

@@ -71,12 +71,12 @@ class Bound:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
                 return [(self.label, margin)]
-        found = []
+        margins = []
         if low is not None:
-            found.append((f"{self.label} min", value - low))
+            margins.append((f"{self.label} min", value - low))
         if high is not None:
-            found.append((f"{self.label} max", high - value))
-        return found
+            margins.append((f"{self.label} max", high - value))
+        return margins
 
     @property
     def of_angle(self) -> bool:
@@ -154,8 +154,8 @@ class Core:
     def drawn_angles(self) -> dict[str, float]:
         """Angles of drives and in measures and limits as the sketch has them (radians)."""
         named = [self.coordinate(name) for name in (*self.description.drives, *self.description.measures)]
-        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
-        return {name: float(self.sketch_configuration.value(angle)) for name, angle in found.items()}
+        angles = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
+        return {name: float(self.sketch_configuration.value(angle)) for name, angle in angles.items()}
 
     @cached_property
     def counting(self) -> tuple[Coordinate, ...]:

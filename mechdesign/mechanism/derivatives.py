@@ -176,18 +176,18 @@ class Linearization(Loops):
         none, edges = [0.0] * len(self.structure.given), self.structure.edges
         s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))
         rest: list[Vector] = []
-        known: list[tuple[Vector, ...]] = []
+        arms: list[tuple[Vector, ...]] = []
         for k, edge in enumerate(edges):
             (w_z, d_z), d, m = explicit[k], self.vectors.d[k], self.arm(k)
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             m_z, m1 = w_z + s[k] * d_z + s_z[k] * d, s1[k] * d
-            known.append((m, m_z, m1, d, d_z))
+            arms.append((m, m_z, m1, d, d_z))
             here = 1j * omega * m_z + s1[k] * d_z + 1j * turn_z * (m1 + 1j * omega * m)
             rest.append(self.turned(here, edge.frame))
         velocity_z = self._solve(none, rest)
         s1_z = self._along(velocity_z.slides)
         for k, edge in enumerate(edges):
-            m, m_z, m1, d, d_z = known[k]
+            m, m_z, m1, d, d_z = arms[k]
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             alpha, omega_z = acceleration.angles[edge.frame], velocity_z.angles[edge.frame]
             m1_z, bend = s1_z[k] * d + s1[k] * d_z, 1j * alpha - omega * omega
@@ -237,9 +237,10 @@ class Linearization(Loops):
         sizes = configuration.places
         # Of nominal dimensions they are numbers, the same for every pose.
         vectors = configuration.vectors if sizes else self.geometry.nominal
-        each = [self.geometry.derivatives(place, sizes, vectors) for place in places]
+        changes = [self.geometry.derivatives(place, sizes, vectors) for place in places]
         explicit = [
-            (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
+            (lead([w[k] for w, _ in changes]), lead([d[k] for _, d in changes]))
+            for k in range(len(self.structure.edges))
         ]
         offsets = {
             body: lead([self.geometry.angle_derivative(turns, place, sizes) for place in places])
@@ -251,13 +252,13 @@ class Linearization(Loops):
 
 def determinants(linearization: Linearization) -> list[Value]:
     """Per group of the drives' structure, the determinant of its loop equations; zero at a forward singularity."""
-    found = []
+    values = []
     for index, group in enumerate(linearization.structure.groups):
         if group.form == "place":
             continue
         lines = linearization.loop_columns(index, group)
-        found.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
-    return found
+        values.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
+    return values
 
 
 def regularity(linearization: Linearization) -> Value:

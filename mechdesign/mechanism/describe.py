@@ -88,13 +88,13 @@ def describe(mechanism: Mechanism) -> str:
 
 def links_in_words(description: Description) -> list[LinkWords]:
     """Every link with its points, and its length where it has two ends."""
-    found = []
+    words = []
     for name, link in description.links.items():
         points = (*link.points, *(end for end in link.ends or () if end not in link.points))
         length = link.points[link.ends[1]][0] if link.ends is not None and not link.telescopic else None
         number = description.places[length].nominal if isinstance(length, str) else length
-        found.append(LinkWords(name, points, number, link.telescopic))
-    return found
+        words.append(LinkWords(name, points, number, link.telescopic))
+    return words
 
 
 def drives_in_words(description: Description) -> list[str]:
@@ -144,13 +144,13 @@ def assemblies_in_words(mechanism: Mechanism) -> list[str]:
 def placed_before(graph: Graph, structure: Structure) -> list[set[str]]:
     """Bodies whose places are known before each group is solved, and last those known in the end."""
     roots, nodes = {0}, {0} | {node for node, _, _ in structure.known_nodes}
-    found = []
+    placed = []
     for group in structure.groups:
-        found.append(_lying(graph, structure, roots, nodes))
+        placed.append(_lying(graph, structure, roots, nodes))
         roots |= set(group.angles)
         for k, _ in group.tree:
             nodes |= {structure.edges[k].tail, structure.edges[k].head}
-    return [*found, _lying(graph, structure, roots, nodes)]
+    return [*placed, _lying(graph, structure, roots, nodes)]
 
 
 def _lying(graph: Graph, structure: Structure, roots: set[int], nodes: set[int]) -> set[str]:

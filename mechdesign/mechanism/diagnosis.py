@@ -41,16 +41,16 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
             if link not in holders.setdefault(point, []):
                 holders[point].append(link)
     clamps = [joint.point for joint in description.joints.values() if isinstance(joint, Fixed)]
-    found = [
+    words = [
         f"revolute {point} ({', '.join(links)})"
         for point, links in holders.items()
         if len(links) - clamps.count(point) > 1
     ]
-    found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
+    words += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
     for name, joint in description.joints.items():
         parts = (*joint.links, joint.point)[:2]
-        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
-    return found
+        words.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
+    return words
 
 
 def near_singular(regularity: float) -> list[Caution]:
@@ -78,9 +78,9 @@ def wrong_count(
         real, x = equations.mobility(x)
         if real > max(count, 0):
             return over_constrained(description, equations, x, count, real, given)
-    found = joints_in_words(description, equations.graph)
-    more = f"; and {len(found) - MAX_NAMED} more" if len(found) > MAX_NAMED else ""
-    joints = f". Joints found: {'; '.join(found[:MAX_NAMED]) or 'none'}{more}"
+    words = joints_in_words(description, equations.graph)
+    more = f"; and {len(words) - MAX_NAMED} more" if len(words) > MAX_NAMED else ""
+    joints = f". Joints found: {'; '.join(words[:MAX_NAMED]) or 'none'}{more}"
     # From here on special dimensions are not at fault: those of the sketch might only feign motions (a dead centre).
     jacobian = equations.generic(drives)
     if given < count:
@@ -268,15 +268,15 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
 
 def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
     """Independent motions that the rows of a Jacobian leave, the first link's first."""
-    found = separated(null_space(jacobian), equations.inner)
-    return sorted(found, key=lambda motion: np.flatnonzero(motion).tolist())
+    motions = separated(null_space(jacobian), equations.inner)
+    return sorted(motions, key=lambda motion: np.flatnonzero(motion).tolist())
 
 
 def motions_in_words(equations: Equations, jacobian: Floats) -> str:
     """What can still move under the rows of a Jacobian; empty where nothing can."""
-    found = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
-    more = [f"and {len(found) - MAX_MOTIONS} more motions"] if len(found) > MAX_MOTIONS else []
-    return "; ".join([*found[:MAX_MOTIONS], *more])
+    words = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
+    more = [f"and {len(words) - MAX_MOTIONS} more motions"] if len(words) > MAX_MOTIONS else []
+    return "; ".join([*words[:MAX_MOTIONS], *more])
 
 
 def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
@@ -319,13 +319,13 @@ def doubled(equations: Equations, jacobian: Floats) -> tuple[list[int], list[boo
 
 def owners_of(graph: Graph, edges: Iterable[int]) -> list[str]:
     """Links and joints that edges belong to, the ground left out."""
-    found = []
+    names = []
     for k in edges:
         edge = graph.edges[k]
         name = graph.slides[edge.slide] if edge.slide is not None else edge.locals[0][1].removesuffix(":rod")
         if name != GROUND:
-            found.append(name)
-    return list(dict.fromkeys(found))
+            names.append(name)
+    return list(dict.fromkeys(names))
 
 
 def repeating(description: Description, equations: Equations, x: Floats, excess: int) -> list[str]:
@@ -338,7 +338,7 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
     free, more = equations.without(jacobian, set(), set())
     stressed, _ = doubled(equations, jacobian)
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)}
-    found: list[str] = []
+    repeated: list[str] = []
     edges: set[int] = set()
     classes: set[int] = set()
     for name in reversed(list(dict.fromkeys(owners_of(graph, stressed)))):
@@ -356,22 +356,22 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
         freedom, left = equations.without(jacobian, edges | own, classes | frames)
         gain = more - left
         if freedom == free and gain > 0:
-            found.append(name)
+            repeated.append(name)
             edges |= own
             classes |= frames
             excess, more = excess - gain, left
             if excess <= 0:
-                return found
+                return repeated
     return []
 
 
 def _can_go(description: Description, joint: str) -> bool:
     """Whether a slide can be left out and its links still turn together as before."""
-    found = description.joints[joint]
-    if not isinstance(found, Prismatic):
+    slide = description.joints[joint]
+    if not isinstance(slide, Prismatic):
         return True
     pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
-    reached = {found.line.link}
+    reached = {slide.line.link}
     for _ in pairs:
         reached.update(*(pair for pair in pairs if pair & reached))
-    return found.slider in reached
+    return slide.slider in reached

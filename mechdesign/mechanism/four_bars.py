@@ -193,12 +193,12 @@ def four_bars(mechanism: Mechanism) -> tuple[FourBar, ...]:
 def chains(mechanism: Mechanism) -> tuple[FourBar, ...]:
     """Every four-bar and slider-crank by the joints alone, without lengths; some of its links may be points."""
     bodies = _Bodies(mechanism)
-    found: dict[frozenset[tuple[str, int, int]], FourBar] = {}
+    rings: dict[frozenset[tuple[str, int, int]], FourBar] = {}
     for links, joints in _rings(bodies):
         key = frozenset((joint.name, joint.node, joint.edge) for joint in joints)
-        if key not in found:
-            found[key] = bodies.four_bar(links, joints)
-    return tuple(sorted(found.values(), key=lambda chain: bodies.ground not in chain.links))
+        if key not in rings:
+            rings[key] = bodies.four_bar(links, joints)
+    return tuple(sorted(rings.values(), key=lambda chain: bodies.ground not in chain.links))
 
 
 def describe_loops(mechanism: Mechanism) -> list[str]:

@@ -108,21 +108,21 @@ def _classes(
     for a, b, turns in ties:
         neighbours[a].append((b, turns))
         neighbours[b].append((a, _reverse(turns)))
-    found: dict[str, tuple[int, tuple[Turn, ...]]] = {}
+    class_of: dict[str, tuple[int, tuple[Turn, ...]]] = {}
     count = 0
     for root in bodies:
-        if root in found:
+        if root in class_of:
             continue
-        found[root] = (count, ())
+        class_of[root] = (count, ())
         queue = deque([root])
         while queue:
             body = queue.popleft()
             for other, turns in neighbours[body]:
-                if other not in found:
-                    found[other] = (count, found[body][1] + turns)
+                if other not in class_of:
+                    class_of[other] = (count, class_of[body][1] + turns)
                     queue.append(other)
         count += 1
-    return found, count
+    return class_of, count
 
 
 def build_graph(description: Description) -> Graph:

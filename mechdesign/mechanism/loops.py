@@ -258,9 +258,9 @@ def unknowns_of(
     group: Group, nodes: Sequence[Vector], rotations: Sequence[Vector], slides: Sequence[Value]
 ) -> list[Value]:
     """A group's angles, slides, and x and y of its bases, at given positions; see `Loops.put`."""
-    found: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
-    found += [slides[slide] for slide in group.slides]
-    return found + [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
+    unknowns: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
+    unknowns += [slides[slide] for slide in group.slides]
+    return unknowns + [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
 
 
 def nothing(value: Vector) -> bool:

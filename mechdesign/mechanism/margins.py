@@ -50,7 +50,7 @@ class Cause:
 
 def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]:
     """What may end it, in the order in which the mechanism is solved: groups, `legs`, stated limits."""
-    graph, found = mechanism.graph, list[Cause]()
+    graph, listed = mechanism.graph, list[Cause]()
     for index, group in enumerate(plan.structure.groups):
         joint = " ".join(graph.joined(group.edges))
         links = "-".join(
@@ -58,18 +58,18 @@ def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]
         )
         leg = next((graph.slides[slide] for slide in group.slides if slide in graph.telescopic), None)
         if group.form == "two angles":
-            found += [Cause(DEAD_CENTRE, f"{links} {how}", joint, index, "closure") for how in ("stretched", "folded")]
+            listed += [Cause(DEAD_CENTRE, f"{links} {how}", joint, index, "closure") for how in ("stretched", "folded")]
         elif group.form == "angle and turning slide" and leg is not None:
-            found.append(Cause(ZERO_LENGTH, f"{links} at its reach", leg, index, "closure"))
+            listed.append(Cause(ZERO_LENGTH, f"{links} at its reach", leg, index, "closure"))
         elif group.form in ("angle and turning slide", "angle and fixed slide"):
-            found.append(Cause(DEAD_CENTRE, f"{links} at its reach", joint, index, "closure"))
+            listed.append(Cause(DEAD_CENTRE, f"{links} at its reach", joint, index, "closure"))
         elif group.form == "two slides":
-            found.append(Cause(SINGULARITY, joint, joint, index, "across"))
+            listed.append(Cause(SINGULARITY, joint, joint, index, "across"))
         elif group.form == "newton":
-            found.append(Cause(SINGULARITY, joint, joint, index, "reached"))
-    found += [Cause(ZERO_LENGTH, f"{leg} length", leg, -1, "leg") for leg in legs]
+            listed.append(Cause(SINGULARITY, joint, joint, index, "reached"))
+    listed += [Cause(ZERO_LENGTH, f"{leg} length", leg, -1, "leg") for leg in legs]
     stated = mechanism.margins(mechanism.sketch_configuration)
-    return found + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
+    return listed + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
 
 
 class Margins:
@@ -148,7 +148,7 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
     """
     position = linear.sensitivity(places)
     shape = linear.configuration.shape
-    found: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
+    pairs: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
     for index, group in enumerate(linear.structure.groups):
         if group.form in ("place", "two slides"):
             continue
@@ -161,20 +161,20 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
                 size = sum(value * value for value in column)
                 logarithmic = logarithmic + solve_linear(rows, column_z)[0][k]
                 logarithmic = logarithmic - sum(v * v_z for v, v_z in zip(column, column_z, strict=True)) / size
-            found.append((1.0, 2.0 * logarithmic))
+            pairs.append((1.0, 2.0 * logarithmic))
             continue
         ((a, b),), ((a_z, b_z),) = lines, changes
         if group.form == "two angles":
             sides = [_length(a, a_z), _length(b, b_z), _length(a + b, a_z + b_z)]
             total, total_z = (sum(part) for part in zip(*sides, strict=True))
-            found += [(total - 2.0 * side, total_z - 2.0 * side_z) for side, side_z in sides]
+            pairs += [(total - 2.0 * side, total_z - 2.0 * side_z) for side, side_z in sides]
             continue
         (size, size_z), (unit, unit_z) = _length(a, a_z), _length(b, b_z)
         reach = dot(a, b) / unit
         reach_z = (dot(a_z, b) + dot(a, b_z) - reach * unit_z) / unit
-        found += [(size - way * reach, size_z - way * reach_z) for way in (1.0, -1.0)]
-    margins, slopes = np.empty((len(found), *shape)), np.empty((len(found), len(places), *shape))
-    for k, (margin, slope) in enumerate(found):
+        pairs += [(size - way * reach, size_z - way * reach_z) for way in (1.0, -1.0)]
+    margins, slopes = np.empty((len(pairs), *shape)), np.empty((len(pairs), len(places), *shape))
+    for k, (margin, slope) in enumerate(pairs):
         margins[k], slopes[k] = margin, slope
     return margins, slopes
 
@@ -209,8 +209,8 @@ def turning_point(
     """
     guess = plan.unknowns(near, given(place))
     folds = [(index, _fold(plan, given, place, reach, near, guess, index)) for index in plan.structure.unknowns]
-    found = [(abs(fold[0] - place), index, fold) for index, fold in folds if fold is not None]
-    distance, index, (end, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
+    candidates = [(abs(fold[0] - place), index, fold) for index, fold in folds if fold is not None]
+    distance, index, (end, state) = min(candidates, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
     if state is None or distance > reach:
         return None
     return end, plan.configuration(state, (), near.places, None), index

@@ -275,10 +275,10 @@ class Variant(Mechanism):
     def _assemble_sketch(self) -> Configuration:
         before, changed = self.original.nominal, self._changed
         if self.forward.iterative:
-            found = begun(self.original, changed)
-            return replace(found, places={name: v for name, v in found.places.items() if v == before[name]})
-        found = drawn(self.original, changed)
-        return replace(found if found.valid else elsewhere(self.original, changed), places={})
+            pose = begun(self.original, changed)
+            return replace(pose, places={name: v for name, v in pose.places.items() if v == before[name]})
+        pose = drawn(self.original, changed)
+        return replace(pose if pose.valid else elsewhere(self.original, changed), places={})
 
 
 def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configuration:
@@ -308,7 +308,7 @@ def begun(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
 
     Where it does not it is the sketch with its own dimensions: these change on the way to a pose as the drives do.
     """
-    found = drawn(mechanism, places)
-    if found.valid.all():
-        return found
-    return drawn(mechanism, {name: np.where(found.valid, v, mechanism.nominal[name]) for name, v in places.items()})
+    sketch = drawn(mechanism, places)
+    if sketch.valid.all():
+        return sketch
+    return drawn(mechanism, {name: np.where(sketch.valid, v, mechanism.nominal[name]) for name, v in places.items()})

@@ -198,13 +198,13 @@ class Plan:
         if reached is not None:
             # What the path came near to must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
-        found = self.configuration(state, shape, dims, reached, values)
+        poses = self.configuration(state, shape, dims, reached, values)
         if self.angles:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
-            found = replace(found, near={**found.near, **near})
+            poses = replace(poses, near={**poses.near, **near})
         if limits:
-            self.judge(found)
-        return found
+            self.judge(poses)
+        return poses
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """Values within half a turn of which angles are reported: given ones as given, drives within their limits."""
@@ -259,7 +259,7 @@ class Plan:
             )
 
         given = [_flat(v, shape) for v in values]
-        found, reached, near = solve(given, None)
+        unknowns, reached, near = solve(given, None)
         # First the given turns; but where they are not reached, the pose is the same with its angles in other turns.
         turned = [
             nearest(v, at) if c.quantity == "angle" else v
@@ -269,9 +269,9 @@ class Plan:
         rows = np.flatnonzero(other & ~reached)
         if len(rows):
             better, there, turns = solve(turned, rows)
-            found[:, rows[there]], reached[rows] = better[:, there], there
+            unknowns[:, rows[there]], reached[rows] = better[:, there], there
             near[:, rows[there]] = turns[:, there]
-        return found.reshape(len(found), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
+        return unknowns.reshape(len(unknowns), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
 
     def configuration(
         self,
@@ -286,12 +286,12 @@ class Plan:
         with np.errstate(invalid="ignore"):
             open_: Flags = np.zeros((), dtype=bool)
             # A group that does not close leaves nan in its first unknown.
-            known = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
-            known += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
-            known += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
-            known += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
-            known += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
-            for value in known:
+            values = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
+            values += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
+            values += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
+            values += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
+            values += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
+            for value in values:
                 open_ = open_ | ~np.isfinite(np.real(value))
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)

@@ -79,9 +79,9 @@ class Equations:
         """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
-        known = np.isfinite(drawn)
+        is_drawn = np.isfinite(drawn)
         anywhere = self.size * vector(*rng.uniform(-0.5, 0.5, (2, len(drawn))))
-        nodes = list(np.where(known, drawn, drawn[known].mean() + anywhere))
+        nodes = list(np.where(is_drawn, drawn, drawn[is_drawn].mean() + anywhere))
         turns = [np.exp(1j * rng.uniform(-3, 3)) if turn is None else turn for turn in sketch.rotations]
         loops = replace(sketch, nodes=nodes, rotations=turns, slides=[*sketch.slides])
         for k, edge in enumerate(self.graph.edges):
@@ -173,7 +173,7 @@ class Equations:
             step *= NULL_SPACE_STEP / np.abs(step).max()
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
-                best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
+                best = max(best, (self._realised(y, ordinary), y), key=lambda trial: trial[0])
         return best
 
     def _realised(self, x: Floats, ordinary: int) -> int:

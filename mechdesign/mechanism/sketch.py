@@ -84,12 +84,12 @@ class Sketch(Loops):
                 turns.append(turn * self.vectors.offsets[body])
             return float(np.angle(turns[0] * np.conj(turns[1])))
         k, edge = next((k, e) for k, e in enumerate(self.graph.edges) if e.slide == coordinate.slide)
-        known = (self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame])
-        return None if any(value is None for value in known) else float(self.displacement(k))
+        parts = (self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame])
+        return None if any(value is None for value in parts) else float(self.displacement(k))
 
     def unknowns(self, structure: Structure) -> list[float]:
         """Angles and slides of the groups without a closed form as drawn: where Newton's method starts."""
-        found: list[float] = []
+        starts: list[float] = []
         for group in (structure.groups[index] for index in structure.unknowns):
             for root in group.angles:
                 turn = self.rotations[root] if root < self.graph.classes else None
@@ -97,7 +97,7 @@ class Sketch(Loops):
                     link = next((body for body, (frame, _) in self.graph.bodies.items() if frame == root), "?")
                     message = f"the points of link '{link}' are needed as a start; add them to the sketch"
                     raise MechanismError(message, SKETCH)
-                found.append(float(np.angle(turn)))
+                starts.append(float(np.angle(turn)))
             for slide in group.slides:
                 value = self.value(Coordinate("", "slide", "length", slide=slide))
                 if value is None:
@@ -105,8 +105,8 @@ class Sketch(Loops):
                         f"the ends of '{self.graph.slides[slide]}' are needed as a start; add them to the sketch",
                         SKETCH,
                     )
-                found.append(value)
-        return found
+                starts.append(value)
+        return starts
 
 
 def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch:
@@ -129,9 +129,9 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
                     rotations[frame] = fit / abs(fit)
                     changed = True
         for k, edge in enumerate(graph.edges):
-            known = [nodes[end] is not None for end in (edge.tail, edge.head)]
-            if edge.slide is None and rotations[edge.frame] is not None and any(known) and not all(known):
-                walk(graph.edges, [(k, 1 if known[0] else -1)], nodes, sketch.edge)
+            placed = [nodes[end] is not None for end in (edge.tail, edge.head)]
+            if edge.slide is None and rotations[edge.frame] is not None and any(placed) and not all(placed):
+                walk(graph.edges, [(k, 1 if placed[0] else -1)], nodes, sketch.edge)
                 changed = True
         changed = changed or _lay_along_slide(sketch)
     return sketch

@@ -64,12 +64,12 @@ class State(Loops):
 
     def solved(self, shape: tuple[int, ...], signs: Sequence[Value] | None = None) -> Flags:
         """Which poses of a batch converged in all groups, with determinants of these signs."""
-        found = np.ones(shape, dtype=bool)
+        solved = np.ones(shape, dtype=bool)
         for converged in self.converged:
-            found &= converged
+            solved &= converged
         for determinant, sign in zip(self.determinants, signs or (), strict=False):
-            found &= np.sign(determinant) == sign
-        return found
+            solved &= np.sign(determinant) == sign
+        return solved
 
 
 def solve_newton(state: State, index: int, guess: Unknowns) -> None:
@@ -78,24 +78,24 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     A pose that has converged is not changed any more: its result does not depend on its batch.
     """
     group = state.structure.groups[index]
-    found: list[Value] = [np.asarray(value, dtype=float) for value in guess]
+    unknowns: list[Value] = [np.asarray(value, dtype=float) for value in guess]
     count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(state.steps):
-        state.put(group, found)
+        state.put(group, unknowns)
         solution, determinant = solve_linear(*state.equations(group))
         turned, moved = largest(solution[:count]), largest(solution[count:])
         moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
             moving = moving & active
-        found = [value - step for value, step in zip(found, solution, strict=True)]
+        unknowns = [value - step for value, step in zip(unknowns, solution, strict=True)]
         active = np.asarray(moving)
         if not active.any():
             break
-    state.put(group, found)
-    state.unknowns += found
+    state.put(group, unknowns)
+    state.unknowns += unknowns
     state.converged.append(~active)
     state.determinants.append(determinant)
 
