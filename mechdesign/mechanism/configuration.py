@@ -46,9 +46,9 @@ class Configuration:
     closures: Sequence[Value]  # positive inside the range in which each group closes, zero at its limits
     reason: NDArray[np.int8]  # `Reason` of each pose, of this very shape
     places: Mapping[str, Value]  # dimensions that differ from the nominal ones
-    # By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
+    # By name, values that angles are reported within half a turn of; other angles are in (-pi, pi].
     near: Mapping[str, Value] = field(default_factory=dict)
-    counted: frozenset[str] = frozenset()  # those of them whose turns count: given, or followed along a motion
+    counted: frozenset[str] = frozenset()  # names of angles whose turns count: given, or followed along a motion
 
     def __repr__(self) -> str:
         return (
@@ -77,7 +77,7 @@ class Configuration:
 
     @quiet
     def value(self, coordinate: Coordinate) -> Value:
-        """Value of a coordinate (angles in radians, within half a turn of what they are `near`)."""
+        """Value of a coordinate; angles in radians, in the turn that `near` tells."""
         if coordinate.kind == "x":
             return self.nodes[coordinate.node].real
         if coordinate.kind == "y":
@@ -109,10 +109,7 @@ class Configuration:
         }
 
     def beside(self, other: Configuration, coordinates: Iterable[Coordinate]) -> Configuration:
-        """The same poses, the angles of some coordinates on the branch of another configuration.
-
-        Where a turn is given it stays.
-        """
+        """The same poses with angles in the turns that they have in another configuration; turns that count stay."""
         near = {k: other.value(angle) for k, angle in angles_of(coordinates).items() if k not in self.counted}
         return replace(self, near={**self.near, **near})
 
@@ -133,7 +130,7 @@ class Configuration:
 
 
 def hide(value: Either, lost: Flags) -> Either:
-    """nan for poses that cannot be assembled; a value that is the same for every pose (the ground) stays one."""
+    """A value with nan for the poses that are `lost`."""
     whole: NDArray[Any] = np.asarray(value)
     if whole.ndim == 0 and not lost.all():
         whole = np.broadcast_to(whole, lost.shape)
@@ -146,7 +143,7 @@ def hide(value: Either, lost: Flags) -> Either:
 def joined(
     parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
 ) -> Configuration:
-    """Flat batches of one mechanism put together to one of a shape; its angles are in (-pi, pi]."""
+    """Flat batches of one mechanism joined to one batch of a shape; angles are in (-pi, pi]."""
     count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
     reason = np.empty(count, dtype=np.int8)
     for part in parts:

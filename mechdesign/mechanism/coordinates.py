@@ -21,9 +21,9 @@ class Coordinate:
 
     ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide`` displacement (a
     telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`, of
-    which a ``parameter`` is the same in every pose. `turn` is after what the value repeats, such as that of an angle
-    (radians); 0 where it does not. `links` are those whose ends of the pins at `node` and `other` are
-    meant; empty for the pin itself.
+    which a ``parameter`` is the same in every pose. `turn` is the period of the value, such as 2 pi of an angle, and 0
+    without one. Where `links` are named, the points are those of the links at the pins `node` and `other`, which differ
+    from the pins by clearances.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Coordinate:
 
     @property
     def ends(self) -> tuple[tuple[str, int], ...]:
-        """Points that it depends on itself, link and node of each."""
+        """Link and node of each point that the coordinate or a part of it is measured at."""
         nodes = {"x": (self.node,), "y": (self.node,), "distance": (self.node, self.other)}.get(self.kind, ())
         return (*zip(self.links, nodes, strict=False), *(end for part in self.parts for end in part.ends))
 

@@ -16,21 +16,21 @@ from mechdesign.numerics.arrays import Ints
 
 
 def offset_names(body: str, point: str) -> tuple[str, str]:
-    """Places of a pin's offset from its nominal place, in the frame of the body's link (zero unless given)."""
+    """Names of the x and the y offset of a pin from its nominal place in the body's frame (zero unless given)."""
     name = f"{body.removesuffix(':rod')}.{point}"
     return f"{name}.dx", f"{name}.dy"
 
 
 def slide_offset(joint: str) -> str:
-    """Place of a slide's offset from its line, to the left of its direction (zero unless given)."""
+    """Name of a slide's offset from its line, positive to the left of its direction (zero unless given)."""
     return f"{joint}.offset"
 
 
 @dataclass(frozen=True)
 class Vectors:
-    """Values of all edges for one set of dimensions: w and d of each edge, the offset rotation of each body.
+    """Numbers of a graph for one set of dimensions.
 
-    Also of the parameters that measures take, by their names.
+    Vectors w and d of each edge, the offset of each body as a rotation, and the parameters of measures by their names.
     """
 
     w: Sequence[Vector]
@@ -45,7 +45,7 @@ class Vectors:
         return Vectors([function(w) for w in self.w], [function(d) for d in self.d], offsets, parameters)
 
     def take(self, index: Ints | slice) -> Vectors:
-        """Those of some dimensions of a flat batch; what is the same for all stays a number."""
+        """The vectors of some sets of dimensions of a flat batch; a value that is the same for all stays a number."""
         return self.map(lambda value: picked(value, index))
 
 
@@ -59,7 +59,7 @@ class _Recorded(dict[str, Value]):
 
 @dataclass(frozen=True)
 class Geometry:
-    """Evaluates the edges of a graph; dimensions left out keep their nominal value."""
+    """Evaluates the edges of a graph; dimensions that are not given are nominal."""
 
     graph: Graph
     places: Mapping[str, Place]
@@ -72,7 +72,7 @@ class Geometry:
         return term
 
     def place(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
-        """Coordinates of a point in its body's frame, those of its hole where a pin moves in it."""
+        """Coordinates of a point in its body's frame; of a pin that has an offset, those of its hole."""
         return vector(*(self.term(term, values) for term in self.graph.points[body, point]))
 
     def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
@@ -109,7 +109,7 @@ class Geometry:
 
     @cached_property
     def measured(self) -> Mapping[str, str]:
-        """Parameters that measures take, and the place of each."""
+        """Names of the parameters in measures, and the place of each."""
         return {name.removeprefix(MEASURED): name for name in self.places if name.startswith(MEASURED)}
 
     @cached_property
@@ -200,7 +200,7 @@ class Geometry:
     def _arms(
         self, edge: Edge, values: Mapping[str, Value], place: str = ""
     ) -> Iterator[tuple[int, str, Vector, complex]]:
-        """What `w` of an edge is the sum of: sign, body, vector in its frame, and derivative of that by a place."""
+        """Terms of an edge's w: sign, body, vector in the body's frame, and its derivative by a place."""
         for sign, body, point in edge.locals:
             change = _equal(self.graph.points[body, point], place) + _equal(offset_names(body, point), place)
             yield sign, body, self.local(body, point, values), change
@@ -209,5 +209,5 @@ class Geometry:
 
 
 def _equal(terms: tuple[Term, Term], place: str) -> complex:
-    """The derivative of two terms, x and y, by a place."""
+    """Derivative of the vector of two terms, x and y, by a place."""
     return complex(terms[0] == place, terms[1] == place)

@@ -18,13 +18,13 @@ from mechdesign.mechanism.structure import Group, Structure, whole
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
-# Forms of groups that have one assembly, or one that is searched for.
+# Forms of groups without an assembly mode: with a single assembly, or with one that is searched for.
 _WITHOUT_MODE = ("place", "newton", "two slides")
 
 
 @dataclass
 class Sketch(Loops):
-    """World position of each node and rotation of each angle class, `None` where the sketch does not tell."""
+    """Position of each node and rotation of each angle class as drawn; `None` where the sketch does not show them."""
 
     def modes(self, structure: Structure) -> tuple[int, ...]:
         """Assembly mode (+1 or -1) of each group of a structure as drawn; 0 for groups that have none.
@@ -53,7 +53,7 @@ class Sketch(Loops):
         if group.form in _WITHOUT_MODE:
             return 0
         (loop,) = group.loops
-        # A direction is unknown only where the whole link is drawn at one place, which decides nothing whatever it is.
+        # The direction is missing only of a link that is drawn as a point; then it decides nothing, and any will do.
         turns = [1.0 if turn is None else turn for turn in self.rotations]
         nodes = [np.nan if node is None else node for node in self.nodes]
         drawn = replace(self, structure=structure, nodes=nodes, rotations=turns)
@@ -74,7 +74,7 @@ class Sketch(Loops):
         return 1 if side > 0 else -1
 
     def value(self, coordinate: Coordinate) -> float | None:
-        """Value of a drive as drawn (radians), or `None` where the sketch does not tell."""
+        """Value of a drive as drawn (radians or length), or `None` where the sketch does not show it."""
         if coordinate.kind == "angle":
             turns = []
             for body in (coordinate.body, coordinate.reference):
@@ -138,7 +138,7 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
 
 
 def _lay_along_slide(sketch: Sketch) -> bool:
-    """Lay a class that nothing else shows along one of its slides, taken as positive; False where there is none."""
+    """Take the direction of a class from one of its slides, as if displaced forwards; False where there is none."""
     for k, edge in enumerate(sketch.graph.edges):
         tail, head = sketch.nodes[edge.tail], sketch.nodes[edge.head]
         if edge.slide is None or tail is None or head is None or tail == head:
@@ -171,7 +171,7 @@ def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
 
 
 def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
-    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
+    """Names of the joints whose place the assembly mode of a group chooses, or of its slides where it has no joints."""
     ends = {graph.nodes[node] for loop in group.loops for node in (loop.start, loop.end)}
     names = [name for name in graph.joined(group.edges) if name not in ends]
     return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)

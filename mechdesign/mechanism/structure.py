@@ -27,7 +27,7 @@ class Tie:
     offsets: tuple[tuple[int, str], ...] = ()
 
     def reversed(self, frame: int) -> Tie:
-        """How the root turns with class `frame`, whose tie this is."""
+        """The tie of the root to class `frame`, of which this is the tie to the root."""
         return Tie(frame, tuple((-s, k) for s, k in self.given), tuple((-s, body) for s, body in self.offsets))
 
 
@@ -44,9 +44,9 @@ class Loop:
 class Group:
     """Unknowns that are solved together: angles of classes (roots of ties), slides, and places of `bases`.
 
-    Their equations are `loops` between nodes known before and `conditions`, the given coordinates that they determine
-    besides. The edges of `tree`, each with its sign, then place the group's nodes in order; each base begins the tree
-    of a part that only conditions hold.
+    Their equations are `loops` between nodes that are already placed, and `conditions`: indices of given coordinates
+    that are equations of this group. The edges of `tree`, each with its sign, then place the group's nodes in order. A
+    base is the first node of a part that no loop but only conditions hold.
     """
 
     form: Form
@@ -59,7 +59,7 @@ class Group:
 
     @property
     def edges(self) -> tuple[int, ...]:
-        """Edges round its loops, in their order."""
+        """Edges around the loops, in order."""
         return tuple(k for loop in self.loops for k, _ in loop.edges)
 
 
