@@ -1,4 +1,4 @@
-"""Why a sketch cannot be assembled at its own drive values: which joints cannot meet, and by how much."""
+"""Messages for a sketch that cannot be assembled at its own drive values: which joints cannot meet, and by how much."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
-# Poses of a sweep for the range in which a mechanism closes.
+# Number of drive values in the search for the range in which a mechanism closes.
 SWEEP_POSES = 721
-# Halvings of a step of that sweep that find an end of the range.
+# Bisections between two of these values for an end of the range.
 END_HALVINGS = 40
-# Advice for most groups that do not close.
+# Advice for a group that does not close.
 CHECK_LENGTHS = "check the lengths"
-# Loops that stay open by less than this part of the mechanism's size nearly close, as they do in a singular pose.
+# Loops that stay open by less than this part of the mechanism's size nearly close, as near a singular pose.
 NEARLY = 0.01
 NEARLY_CLOSED = (
     "the sketch may be drawn in a singular pose, in which the drives do not hold it: draw it in another pose, the "
@@ -39,7 +39,7 @@ NEARLY_CLOSED = (
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
     """Why a sketch cannot be assembled at its own drive values (radians or lengths), and what would mend it.
 
-    `state` is what the plan of the drives ended in.
+    `state` is the result of the plan of the drives.
     """
     unit, equations = core.description.angle_unit, core.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
@@ -68,7 +68,7 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
 
 
 def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
-    """Check that the sketch, assembled by Newton's method, is not one of a chain that its drives do not hold at all.
+    """Check that the drives hold the sketch if it was assembled by Newton's method.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
 
 
 def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> MechanismError | None:
-    """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
+    """The error for a mechanism that closes at the drive values, but is singular there or far from the sketch."""
     equations, graph, drives = core.equations, core.graph, plan.structure.given
     real, middle = equations.mobility(x)
     if real > len(drives):
@@ -107,7 +107,7 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
 
 
 def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
-    """Why the first group that is open does not close, and what would mend it; `gaps` is what each edge misses."""
+    """Why the first open group does not close, and what would mend it; `gaps` by which each edge misses its head."""
     converged = iter(state.converged)
     for group in state.structure.groups:
         if group.form == "newton":
@@ -129,7 +129,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
         one, two = slides
         return f"the slides '{one}' and '{two}' are parallel, which holds nothing along them", "change a direction"
     span, vectors, directions = state.dyad(group)
-    # By the angle that they turn with: links with the distance of the joints that they hold apart, and these joints.
+    # By unknown angle: the links that turn with it and the distance between their joints; the nodes of these joints.
     links: dict[int, str] = {}
     ends: dict[int, list[int]] = {}
     for root, z in vectors.items():
@@ -181,10 +181,10 @@ def _newton(state: State, group: Group, gaps: Complexes) -> str:
 
 
 def closing_range(valid: Callable[[Floats], Flags], coordinate: Coordinate, size: float, unit: float) -> str:
-    """For which values of one drive, the others held, a mechanism closes; empty where for none.
+    """The values of one drive for which a mechanism closes while the others are held; empty if there are none.
 
-    `valid` says so of an array of its values (radians or lengths); lengths are tried up to four times `size`, either
-    way. `unit` is the radians in one of the study's units of angle.
+    `valid` tells for an array of values (radians or lengths) where the mechanism closes; lengths are tried from -4 to 4
+    times `size`. `unit` is the study's unit of angle in radians.
     """
     angle = coordinate.quantity == "angle"
     values = np.linspace(0.0, 2 * np.pi, SWEEP_POSES) if angle else np.linspace(-4 * size, 4 * size, SWEEP_POSES)

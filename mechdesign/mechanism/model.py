@@ -34,7 +34,8 @@ class Link:
     """A rigid link, or a telescopic leg (two bodies and a slide), whose length is a coordinate.
 
     `points` has the coordinates (x, y) of each point in the link's frame. The x axis of a binary or telescopic link
-    runs from its first end, at (0, 0), to its second, at (length, 0), which is not among the points of a telescopic leg.
+    runs from its first end, at (0, 0), to its second, at (length, 0); the second end of a telescopic leg is not among
+    its points.
     """
 
     name: str

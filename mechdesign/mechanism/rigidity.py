@@ -2,9 +2,9 @@
 
 Counting unknowns and equations is right for links of any dimensions; special dimensions (equal cranks, parallel
 guides) make equations depend on each other. Here the equations of all edges are solved from the sketch by least
-squares, and their Jacobian is judged at the place found and at a second one, reached along its null space: a motion
-that is only infinitesimal (a stretched chain) is none. The motions are the right null space, and the equations that
-depend on each other, the states of self-stress, the left one [Pellegrino and Calladine 1986].
+squares, and the rank of their Jacobian is taken there and at a second configuration, reached along its null space: a
+motion that is only infinitesimal (a stretched chain) does not count. The motions are the right null space, and the
+equations that depend on each other, the states of self-stress, the left one [Pellegrino and Calladine 1986].
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from mechdesign.numerics.arrays import Complexes, Floats
 RANK = 1e-7
 # Gaps below this fraction of the mechanism's size are closed.
 CLOSED = 1e-9
-# Step along the null space (radians, or fractions of the size).
+# Step along the null space (radians, or fractions of the mechanism's size).
 NULL_SPACE_STEP = 0.05
-# A motion that goes on for at least this part of a step is a finite one.
+# A motion that can be followed over at least this part of a step is finite.
 REAL_MOTION = 0.3
-# Directions and starts that are tried, drawn from fixed seeds.
+# Number of random directions, starts and dimensions that are tried, from fixed seeds.
 ATTEMPTS = 6
-# Random dimensions that are tried until one is regular: of a train of 200 four-bars one in three is.
+# Random dimensions that are tried until the equations are regular; for a train of 200 four-bars one try in three is.
 DRAWS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """All edges' equations; the unknowns are angles of classes, slides, and nodes, lengths as fractions of `size`."""
+    """The equations of all edges; unknowns are angles of classes, slides and nodes, lengths as fractions of `size`."""
 
     graph: Graph
     geometry: Geometry
@@ -59,7 +59,7 @@ class Equations:
 
     @cached_property
     def _units(self) -> Floats:
-        """Radians and lengths that unknowns are counted in."""
+        """Unit of each unknown: a radian, or the length `size`."""
         unknowns = self.inner + 2 * (len(self.graph.nodes) - 1)
         return np.where(np.arange(unknowns) < self.angles, 1.0, self.size)
 
@@ -69,14 +69,14 @@ class Equations:
         return np.array(unknowns_of(group, nodes, rotations, slides), dtype=float) / self._units
 
     def at(self, x: Floats, held: Sequence[Coordinate] = (), values: Sequence[float] = ()) -> Loops:
-        """The loops at given unknowns, lengths as in the study; held coordinates should have `values`, or be zero."""
+        """The loops at given unknowns; `values` of the held coordinates (radians or lengths) are zero if left out."""
         structure = whole(self.graph, held)
         loops = Loops.start(self.graph, structure, self.geometry.nominal, values or [0.0] * len(held))
         loops.put(structure.groups[0], x * self._units)
         return loops
 
     def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
-        """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
+        """Unknowns as drawn, or random where the sketch does not show them; then all are moved by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
         is_drawn = np.isfinite(drawn)
@@ -91,7 +91,7 @@ class Equations:
         return x + spread * rng.uniform(-1, 1, len(x))
 
     def gaps(self, x: Floats) -> Complexes:
-        """By how much each edge misses its head, in the study's lengths."""
+        """Vector by which each edge misses its head, in the study's length."""
         return self._system(self.at(x))[0].view(np.complex128) * self.size
 
     def jacobian(self, x: Floats, held: Sequence[Coordinate] = ()) -> Floats:
@@ -99,24 +99,24 @@ class Equations:
         return self._system(self.at(x, held))[1]
 
     def _system(self, loops: Loops) -> tuple[Floats, Floats]:
-        """Errors of the equations and values of the held coordinates, lengths as fractions, and their derivatives."""
+        """Residuals of the edges and of the held coordinates, lengths as fractions of `size`, and their Jacobian."""
         rows, errors = loops.equations(loops.structure.groups[0])
         held = [self.size if c.quantity == "length" else 1.0 for c in loops.structure.given]
         units = np.array([self.size] * 2 * len(self.graph.edges) + held)
         return np.array(errors, dtype=float) / units, np.array(rows, dtype=float) * self._units / units[:, None]
 
     def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
-        """The Jacobian for dimensions without any special relation (but the directions of slides).
+        """The Jacobian for random dimensions, free of special relations except between the directions of slides.
 
-        Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
-        expression may be defined for few values only.
+        It is the one of largest rank of several draws, as chance can only lower the rank. It is not finite where no
+        draw is: a held expression may have no value for most dimensions.
         """
         draws = [self.drawn(held, seed) for seed in range(ATTEMPTS)]
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
         return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
 
     def drawn(self, held: Sequence[Coordinate], seed: int) -> Floats:
-        """The Jacobian for dimensions drawn at random (but the directions of slides)."""
+        """The Jacobian for dimensions drawn at random; the directions of slides stay."""
         loops = self.at(np.random.default_rng(seed).uniform(-1, 1, len(self._units)), held)
         for k, edge in enumerate(self.graph.edges):
             loops.w[k] += np.conj(loops.rotations[edge.frame]) * (loops.chord(k) - loops.edge(k))
@@ -127,8 +127,8 @@ class Equations:
     ) -> tuple[Floats, float]:
         """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap.
 
-        With a `step` the solution must lie that far from `x` in its direction: a point where two motions cross, or
-        where one ends, draws all others to itself.
+        With a `step` the solution must lie that far from `x` in the direction of the step. Otherwise the solver would
+        run back to `x` where two motions cross or one ends.
         """
         from scipy.optimize import least_squares
 
@@ -177,7 +177,7 @@ class Equations:
         return best
 
     def _realised(self, x: Floats, ordinary: int) -> int:
-        """How many of the motions at a configuration go on beyond the first order."""
+        """Number of motions at a configuration that are finite, not only of first order."""
         motions = np.linalg.qr(null_space(self.jacobian(x)))[0]
         if motions.shape[1] == ordinary:
             return ordinary
@@ -190,9 +190,9 @@ class Equations:
         return int((np.linalg.svd(kept, compute_uv=False) > REAL_MOTION).sum())
 
     def without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> tuple[int, int]:
-        """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place.
+        """Degrees of freedom, and the excess of equations over unknowns, if edges and classes are left out.
 
-        And how many more equations than unknowns are left.
+        Slides along these edges and nodes that no other edge places are left out as well.
         """
         every = self.graph.edges
         left = [k for k in range(len(every)) if k not in edges]
@@ -217,9 +217,10 @@ def null_space(matrix: Floats) -> Floats:
 
 
 def separated(basis: Floats, pivots: int) -> list[Floats]:
-    """Basis vectors reduced against each other, so that independent motions come one by one.
+    """Basis of the same space by Gauss-Jordan elimination, so that each vector is a motion of few links.
 
-    Pivots are taken among the first `pivots` entries while these say anything. Entries within rounding are zero.
+    Pivots are taken among the first `pivots` entries as long as these are not all zero. Entries within rounding are
+    set to zero.
     """
     rows = basis.T.copy()
     for index in range(len(rows)):
@@ -236,23 +237,23 @@ def separated(basis: Floats, pivots: int) -> list[Floats]:
 
 
 def check_independent(equations: Equations, structure: Structure) -> None:
-    """Check a mechanism with groups without a closed form for equations that depend on each other.
+    """Check that the equations of groups without a closed form are independent.
 
-    A perfect matching of equations and unknowns is necessary, but not enough: a part may be joined within itself too
-    often while another floats. So the rank of the equations is taken for random dimensions. Chance can make a draw
-    singular, but never singular equations regular: one regular draw is proof.
+    A perfect matching of equations and unknowns is necessary but not sufficient: one part may be over-constrained while
+    another floats. So the rank is computed for random dimensions. One regular draw is proof, as chance can make regular
+    equations singular but not the reverse.
 
     Raises
     ------
     Undetermined
-        If there are any whatever the dimensions.
+        If the equations depend on each other for all dimensions.
     """
     if not any(group.form == "newton" for group in structure.groups):
         return
     singular = False
     for seed in range(DRAWS):
         draw = equations.drawn(structure.given, seed)
-        # A given expression may have no value at random dimensions; such a draw does not count.
+        # A given expression may have no value for random dimensions; such a draw does not count.
         if np.isfinite(draw).all():
             singular = null_space(draw).shape[1] > 0
             if not singular:
