@@ -16,9 +16,9 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import SKETCH, deciding_joints
 
-# Assemblies that are listed and followed at most.
+# Largest number of assemblies.
 MAX_ASSEMBLIES = 256
-# The assemblies of a group without a closed form are found by Newton's method from so many starts, in so many steps.
+# Newton's method finds the assemblies of a group without a closed form from this many starts, in this many steps.
 SEARCH_STARTS = 512
 SEARCH_STEPS = 40
 # Solutions nearer than this (radians, or parts of the mechanism's size) are the same.
@@ -40,9 +40,8 @@ class Assembly:
 def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 
-    Groups with a closed form have two modes each, whether or not they close at the sketch. Those of a group without
-    one are searched at the sketch's values of the given coordinates by Newton's method from many starts: all that were
-    found are followed, and there may be more.
+    Groups with a closed form have two modes each, whether or not they close at the sketch. For a group without one,
+    Newton's method searches from many starts at the sketch's values of the given coordinates; it may miss some.
 
     Raises
     ------
@@ -94,7 +93,7 @@ def _variant(
 
 
 def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configuration]:
-    """Assembled poses at the sketch's values for some modes of the closed forms; the sketch first, if it is one."""
+    """Assembled poses at the sketch's values for given modes of the closed forms; the sketch first if `drawn`."""
     sketch = plan.core.sketch_configuration
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
@@ -109,7 +108,7 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     every = plan.configuration(state, (SEARCH_STARTS,), {}, state.solved((SEARCH_STARTS,)))
     good = every.valid
     for slide in plan.core.graph.telescopic:
-        # A leg without length has no direction: whatever its angle, it is no assembly.
+        # A leg of length zero closes at any angle, and is no assembly.
         with np.errstate(invalid="ignore"):
             good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
     solutions = [sketch] if drawn else []
