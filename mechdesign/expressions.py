@@ -39,7 +39,7 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class _Function:
-    """A function of the language, what it is, and its partial derivatives, on floats and arrays."""
+    """A function of the language: its meaning, its value and its partial derivatives, on floats and arrays."""
 
     meaning: str
     value: Callable[..., Any]
@@ -104,7 +104,7 @@ _FUNCTIONS: dict[str, _Function] = {
     "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
-# Functions whose value repeats, and after how many turns.
+# Functions whose value has a period, in turns.
 _TURNS = {"atan2": 1.0, "atan": 0.5}
 _OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
 _UNARY_BINDING = 30
@@ -114,7 +114,7 @@ FUNCTIONS = frozenset(name for name in _FUNCTIONS if name.isalnum() and name != 
 CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
 """Values and meanings of the constants that an expression may name."""
 RESERVED = FUNCTIONS | CONSTANTS.keys()
-"""Names that a parameter cannot bear."""
+"""Names that no parameter can have."""
 
 _Step = tuple[Literal["constant", "name", "call"], float | str]
 
@@ -134,7 +134,7 @@ class Expression:
         Raises
         ------
         ExpressionError
-            Where the text is not an expression; the message tells what is wrong with it.
+            If the text is no expression; the message says what is wrong.
         """
         return cls(text, _Parser(text).parse(), angle_unit)
 
@@ -150,7 +150,7 @@ class Expression:
         nan or inf there.
         """
         result: Number = self._run(float, lambda name: self._variable(env, name), self._apply)
-        # Where a variable is nan its own mistake has been reported.
+        # A variable that is nan has its own message already.
         if type(result) is float and not math.isfinite(result) and not any(np.isnan(env[n]).any() for n in self.names):
             raise ExpressionError(f"{self.text!r} has no finite value")
         return result
@@ -163,7 +163,7 @@ class Expression:
         return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
 
     def is_linear(self) -> bool:
-        """Whether the derivatives are the same everywhere, as the form shows."""
+        """Whether the expression is linear in its variables, judged by its form."""
 
         def degree(function: str, inner: list[int]) -> int:
             if function in ("+", "-", "negate"):
@@ -177,14 +177,14 @@ class Expression:
         return highest <= 1
 
     def is_angle(self, quantities: Mapping[str, str]) -> bool:
-        """Whether the value is an angle, by the quantities of variables: one, or a sum of whole multiples of some.
+        """Whether the value is an angle, by the quantities of the variables: a sum of whole multiples of angles.
 
-        Other variables are numbers. A bare number beside an angle is one in the same unit. Any other multiple may be
-        an arc as well.
+        Variables without a quantity are numbers. A number added to an angle is an angle in the same unit. Other
+        multiples of an angle may be arcs, and do not count.
         """
 
         def kind(function: str, inner: list[str]) -> str:
-            """``angle``, ``whole`` or other ``number``, or ``other``: nothing that may stand beside an angle."""
+            """``angle``, ``whole`` for a whole number, ``number``, or ``other``, which cannot be added to an angle."""
             if _FUNCTIONS[function].angles == "gives":
                 return "angle"
             if "angle" not in inner:
@@ -209,7 +209,7 @@ class Expression:
         return bool(self._run(constant, variable, kind) == "angle")
 
     def substituted(self, values: Mapping[str, Expression | float]) -> Expression:
-        """The expression with others, or numbers, in place of its variables; trigonometry has their angle unit."""
+        """The expression with expressions or numbers in place of its variables; it takes the angle unit of these."""
         units = [value.angle_unit for value in values.values() if isinstance(value, Expression)]
 
         def variable(name: str) -> tuple[_Step, ...]:
@@ -220,10 +220,10 @@ class Expression:
         return Expression(self.text, program, next(iter(units), self.angle_unit))
 
     def turning(self, name: str) -> tuple[Expression, dict[str, tuple[Expression, float]]]:
-        """The expression with variables in place of its arctangents, and these, each with the turn after it repeats.
+        """The expression with variables in place of its arctangents, and these with their periods in turns.
 
-        An arctangent jumps where a direction passes half a turn, or a line a quarter; as a variable it can be followed.
-        `name` begins the names of the variables.
+        `atan2` jumps at half a turn and `atan` at a quarter; as a variable the angle can be followed without jumps.
+        The names of the variables are `name:0`, `name:1` and so on.
         """
         arctangents: dict[str, tuple[Expression, float]] = {}
 
@@ -241,7 +241,7 @@ class Expression:
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]
     ) -> Any:
-        """What the program leaves on the stack, where constants, variables and calls mean these."""
+        """Result of the program, with the meanings of constants, variables and calls that are passed."""
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
@@ -300,7 +300,7 @@ def _call_steps(function: str, arguments: list[tuple[_Step, ...]]) -> tuple[_Ste
 
 
 def meanings() -> dict[str, tuple[str, str]]:
-    """Functions, operators and constants by name: how each is written, and what it is."""
+    """Functions, operators and constants by name: how each is written, and its meaning."""
     entries = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
     turn = {"takes": "; the angle is in the study's unit", "gives": ", in the study's unit", "": ""}
     for name, function in _FUNCTIONS.items():

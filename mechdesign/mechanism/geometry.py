@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Either, Value, Vector, cross, norm2, picked, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, Vector, cross, norm2, picked, plus, rotation, vector
 from mechdesign.mechanism.graph import Edge, Graph, Turn
 from mechdesign.mechanism.model import MEASURED, Place, Term
 from mechdesign.numerics.arrays import Ints
@@ -38,7 +38,7 @@ class Vectors:
     offsets: Mapping[str, Vector]
     parameters: Mapping[str, Value]
 
-    def map(self, function: Callable[[Either], Either]) -> Vectors:
+    def map(self, function: Callable[[Any], Any]) -> Vectors:
         """The same with a function applied to each value."""
         offsets = {body: function(turn) for body, turn in self.offsets.items()}
         parameters = {name: function(value) for name, value in self.parameters.items()}
