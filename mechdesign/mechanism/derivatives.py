@@ -317,7 +317,13 @@ class Jacobian:
             return a * d - b * c
         matrix = _matrix(entries, self.shape)
         finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
-        return np.where(finite, np.linalg.det(np.where(finite[..., None, None], matrix, 0.0)), np.nan)
+        matrix = np.where(finite[..., None, None], matrix, 0.0)
+        determinant = np.asarray(np.linalg.det(matrix))
+        # Elimination may leave exactly 0 where entries are as large as at a forward singularity met to rounding: the
+        # product of the singular values stays large there, and 0 where the rates of the output vanish.
+        if (zero := finite & (determinant == 0)).any():
+            determinant[zero] = np.linalg.svd(matrix[zero], compute_uv=False).prod(axis=-1)
+        return np.where(finite, determinant, np.nan)
 
     @cached_property
     @quiet
