@@ -19,11 +19,17 @@ KINDS = {
         "poses, samples or designs that cannot be assembled, or that a limit of motion forbids", "theory/limits"
     ),
     "singular": Kind(
-        "the mechanism is at, near or passes a singularity, dead centre or change point", "theory/kinematics"
+        "the mechanism is at, near or passes a singularity, dead centre or change point, where rates and forces lose "
+        "digits or have no bound; nothing is wrong with a dead centre where the output shall turn back",
+        "theory/kinematics",
     ),
-    "disagree": Kind("methods of reliability that disagree", "theory/reliability"),
+    "disagree": Kind(
+        "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
+    ),
     "unconverged": Kind(
-        "a number is known less exactly than asked, or a search or simulation ended too early", "theory/limits"
+        "a number is known less exactly than asked, or a search or simulation ended too early; more samples, rays or "
+        "evaluations help, or a wider tolerance",
+        "theory/limits",
     ),
     "undefined": Kind("numbers that have no value where they are asked", "theory/conventions"),
     "incomplete": Kind("a part of what was asked is left out", "theory/limits"),

@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mechdesign.results import Result
 
+HELP_PAGE = "reference/commands"
+
 
 EXIT_CODES = {
     0: "done, every requirement met",

@@ -16,6 +16,8 @@ from typing import TextIO
 
 from mechdesign.errors import OutputError, StudyError
 
+HELP_PAGE = "reference/commands"
+
 try:
     import fcntl
 except ImportError:

@@ -25,6 +25,8 @@ from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
 
+HELP_PAGE = "howto/batch"
+
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"

@@ -183,7 +183,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         journal.discard()
     shards.remove(directory)
-    warnings = [*(Caution("suspect", str(warning)) for warning in study.warnings), *result.warnings, *undrawn]
+    warnings = _placed(study, [*study.cautions, *result.warnings, *undrawn])
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
@@ -251,9 +251,15 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     settle(directory)
     code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
-        table=table,
+        study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
+        written=True, table=table,
     )  # fmt: skip
+
+
+def _placed(study: Study, warnings: Sequence[Caution]) -> list[Caution]:
+    """Warnings of a result, those of the study with file, line and column."""
+    places = study.cautions
+    return [dataclasses.replace(each, message=str(places.get(each, each))) for each in warnings]
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:

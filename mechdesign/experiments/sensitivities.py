@@ -30,6 +30,8 @@ from mechdesign.study.text.units import Amount, QuantityError, Units
 from mechdesign.study.variants import entry_unit
 from mechdesign.work.threads import one_thread
 
+HELP_PAGE = "howto/sensitivities"
+
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
 # A derivative is told as uncertain from this relative error on, unless so little of the result hangs on it.

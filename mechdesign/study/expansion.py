@@ -19,6 +19,8 @@ from mechdesign.study.schema.poses import PoseSection, Sweep
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
+HELP_PAGE = "reference/study/kinematics"
+
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
@@ -64,7 +66,7 @@ def sweep_values(sweep: Sweep, numbers: Numbers = OWN) -> Floats:
     with np.errstate(all="ignore"):
         steps = (end - begin) / step + 1e-9
     if not (steps < MAX_POSES).all():
-        raise StudyError(f"a sweep of more than {MAX_POSES} poses")
+        raise StudyError(f"a sweep of more than {MAX_POSES} poses; take a larger step")
     if not (steps >= 0).all():
         raise StudyError(f"a step of {step[0]:g} never leads from {begin[0]:g} to {end[0]:g}")
     return begin[:, None] + step[:, None] * np.arange(math.floor(steps.min()) + 1, dtype=np.float64)

@@ -107,9 +107,9 @@ class Study:
         return (ALL,) if self.strict else self.fail_on
 
     @property
-    def cautions(self) -> tuple[Caution, ...]:
-        """What is likely a mistake, as warnings of its results."""
-        return tuple(Caution("suspect", f"{problem.key}: {problem.message}") for problem in self.warnings)
+    def cautions(self) -> dict[Caution, Problem]:
+        """What is likely a mistake, as warnings of its results, each with its place in the study."""
+        return {Caution("suspect", f"{problem.key}: {problem.message}"): problem for problem in self.warnings}
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -295,7 +295,9 @@ def _plain_data(value: Any, what: str) -> Any:
     try:
         return json.loads(json.dumps(value, default=plainly))
     except (TypeError, ValueError, RecursionError) as error:
-        message = f"{what} is not plain data (mappings, lists, texts, numbers): {error}"
+        message = (
+            f"{what} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
+        )
         raise StudyError([Problem(message)]) from None
 
 
@@ -421,7 +423,9 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
         raw = data.get(key)
         if raw is None:
             if field.is_required():
-                reporter.report((key,), "is missing: a study describes a mechanism")
+                reporter.report(
+                    (key,), "is missing: a study describes a mechanism; 'mechdesign new' prints one to begin with"
+                )
             continue
         if key == "mechanism" and isinstance(raw, dict):
             # The parameters have been read already, in their order.
@@ -476,7 +480,11 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                     place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
                     reporter.report(place, str(error))
             if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
-                reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
+                reporter.report(
+                    (command, "speed"),
+                    "the path's point does not move: it has no direction; give two different places",
+                    at_key=True,
+                )
         if command == "kinematics" and parts["targets"]:
             try:
                 assumed = found or expansion.default(mechanism.description)

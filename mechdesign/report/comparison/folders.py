@@ -21,6 +21,8 @@ from mechdesign.rows import UnknownColumnError, in_unit
 from mechdesign.study.text.document import leaves, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
+HELP_PAGE = "howto/batch"
+
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
 

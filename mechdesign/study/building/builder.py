@@ -164,14 +164,15 @@ class Builder:
         points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
         if section.telescopic:
             if name == GROUND:
-                self.report(("links", name), "the ground cannot be telescopic")
+                self.report(("links", name), "the ground cannot be telescopic; a leg is a link of its own")
             return points
         length: float = section.length or 1.0
         if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
             length = abs(drawn[1] - drawn[0])
             if length == 0.0:
                 self.report(
-                    ("links", name), f"{start!r} and {end!r} are at one place in the sketch: no length to measure"
+                    ("links", name),
+                    f"{start!r} and {end!r} are at one place in the sketch: no length to measure; give the length",
                 )
                 length = 1.0
         points[end] = (self.place(f"{name}.length", length, measured=section.length is None), 0.0)
@@ -205,7 +206,9 @@ class Builder:
         elif free or ends:
             if drawn[0] == drawn[1]:
                 first, second = [*known, *measured][:2]
-                self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
+                self.report(
+                    path, f"{first!r} and {second!r} are at one place in the sketch: no x axis; draw them apart"
+                )
                 return {}
             start, turn = drawn[0], (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
         found = {point: (at - start) / turn + centre for point, at in zip(measured, places, strict=True)}

@@ -227,7 +227,9 @@ def _drives(builder: Builder) -> dict[str, Drive]:
         elif section is None:
             right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
         elif kind == "length" and item in mechanism.moving and item not in mechanism.legs:
-            builder.report(path, f"link {item!r} is not telescopic: its length is fixed")
+            builder.report(
+                path, f"link {item!r} is not telescopic: its length is fixed; write 'telescopic: true' in its place"
+            )
             right = False
         else:
             right = builder.check_name(item, known[kind][1], known[kind][0], path)

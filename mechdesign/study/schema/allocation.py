@@ -20,6 +20,8 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import QuantityError
 
+HELP_PAGE = "theory/reliability"
+
 # Grades where a study does not name them, and all that there are.
 USUAL = tuple(f"IT{number}" for number in range(5, 13))
 _MOST_GRADE = 18
@@ -47,7 +49,7 @@ def _grades(raw: Any, context: Context) -> tuple[str, ...]:
                 f"expected true, or grades from IT1 to IT{_MOST_GRADE} such as [IT6, IT7, IT8], not {shown(name)}"
             )
     if names and context.units.length == "dimensionless":
-        raise failure("grades are of sizes in mm, and this study's lengths are dimensionless")
+        raise failure("grades are of sizes in mm, and this study's lengths are dimensionless; give 'units'")
     return tuple(sorted(dict.fromkeys(names), key=_number))
 
 

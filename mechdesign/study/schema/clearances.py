@@ -14,6 +14,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 
+HELP_PAGE = "theory/reliability"
+
 PIN_MODELS = {
     "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
     "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",

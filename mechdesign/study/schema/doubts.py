@@ -37,7 +37,10 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
         _tolerances(checker, reliability)
     for name in checker.mechanism.drives:
         if name.casefold() == GROUND:
-            checker.doubt(("mechanism", "drives", name), f"{name!r} is the name of a drive, and the ground never moves")
+            checker.doubt(
+                ("mechanism", "drives", name),
+                f"{name!r} is the name of a drive, and the ground never moves; name what it moves",
+            )
 
 
 def _angles(checker: Checker, section: PoseSection) -> None:
@@ -91,7 +94,8 @@ def _pivots(checker: Checker, ground: Link, description: Description) -> None:
     for one, other in combinations(pins, 2):
         if abs(pins[one] - pins[other]) <= 1e-9 * max(map(abs, pins.values())):
             checker.doubt(
-                ("mechanism", "links", GROUND), f"{one!r} and {other!r} are at one place; is it one pivot, or two?"
+                ("mechanism", "links", GROUND),
+                f"{one!r} and {other!r} are at one place; is it one pivot, or two? Of one, use one name",
             )
 
 

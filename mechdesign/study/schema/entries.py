@@ -14,6 +14,8 @@ from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import shown
 
+HELP_PAGE = "theory/optimize"
+
 # Sections of which designs may differ in an entry.
 _DESIGNED = ("mechanism", *(command for command in COMMANDS if command != "optimize"))
 
@@ -86,7 +88,7 @@ def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSecti
                 message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
                 checker.report((*path, key), message)
         if section.method == "grid" and not variable.stepped and variable.step is None and variable.number is None:
-            checker.report(path, "a variable of a grid needs either 'step' or 'number'")
+            checker.report(path, "a variable of a grid needs either 'step' or 'number'; 'method: search' needs neither")
         own, keys = _named(name, variable, checker)
         varied.add(keys, name, path)
         variables[own] = variable

@@ -11,6 +11,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import Amount
 
+HELP_PAGE = "theory/reliability"
+
 # What the names of errors of positions, velocities and accelerations end in.
 SUFFIXES = ("", "_velocity", "_acceleration")
 

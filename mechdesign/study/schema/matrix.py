@@ -22,6 +22,8 @@ from mechdesign.study.text.document import KeyPath, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 
+HELP_PAGE = "howto/sweep"
+
 # Cases of one study.
 MAX_CASES = 10_000_000
 GRID = "grid"
@@ -233,7 +235,9 @@ class MatrixSection(fields.Model):
         if not lines:
             raise StudyError(f"{self.cases} has no cases below its first line")
         if len(lines) > MAX_CASES:
-            raise StudyError(f"{self.cases} has {len(lines):,} cases, and at most {MAX_CASES:,} are answered")
+            raise StudyError(
+                f"{self.cases} has {len(lines):,} cases, and at most {MAX_CASES:,} are answered; divide the file"
+            )
         return tuple(names), tuple(self._row(number, names, row) for number, row in lines)
 
     def _row(self, number: int, names: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:

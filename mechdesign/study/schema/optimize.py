@@ -24,6 +24,8 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
 from mechdesign.terms import command_of, sum_of
 
+HELP_PAGE = "theory/optimize"
+
 # Commands whose section no default can replace.
 _UNASSUMED = ("reliability", "stiffness")
 
@@ -376,7 +378,11 @@ class OptimizeSection(fields.Model):
         if self.method == "pareto" and len(self.maximize + self.minimize) == 1:
             report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
         if self.method == "grid" and self.evaluations is not None:
-            report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+            report(
+                (*root, "evaluations"),
+                "the designs of a grid follow from its steps; 'evaluations' is of 'method: search'",
+                at_key=True,
+            )
         moved = checker.parameters.moved(self.variables)
         goals = [
             (goal, (*root, key, k)) for key in ("maximize", "minimize") for k, goal in enumerate(getattr(self, key))

@@ -20,6 +20,8 @@ from mechdesign.study.text.fields import Context, failure, read_number, read_row
 from mechdesign.study.text.inputs import Folder, file_of
 from mechdesign.study.text.units import Amount
 
+HELP_PAGE = "reference/study/kinematics"
+
 # Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
 CIRCLE_POSES = 72
 LINE_POSES = 51
@@ -67,7 +69,9 @@ class Arc(fields.Model):
     """Angle of the last place; less than ``from``: clockwise. Example: 180"""
 
     def misfits(self) -> Iterator[fields.Misfit]:
-        yield fields.Misfit(self.from_ == self.to, "an arc needs two different angles 'from' and 'to'")
+        yield fields.Misfit(
+            self.from_ == self.to, "an arc needs two different angles 'from' and 'to'; a whole turn is a 'circle'"
+        )
 
 
 def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:

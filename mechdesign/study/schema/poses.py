@@ -17,6 +17,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 
+HELP_PAGE = "reference/study/kinematics"
+
 
 def _range(raw: list[Any] | str) -> str:
     """The keys of a range that is written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; nothing of what is none."""

@@ -29,6 +29,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
+HELP_PAGE = "theory/reliability"
+
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 
 
@@ -144,7 +146,7 @@ class ReliabilitySection(MotionSection):
             if pair in pairs[:index]:
                 checker.report(("reliability", "correlation", index), "this pair is given twice; leave one out")
         if not self.methods:
-            checker.report(("reliability", "methods"), "name at least one method")
+            checker.report(("reliability", "methods"), "name at least one method, as in [analytic, monte_carlo]")
         for index, method in enumerate(self.methods):
             if method in self.methods[:index]:
                 checker.report(("reliability", "methods", index), f"{method!r} is given twice")

@@ -11,6 +11,8 @@ from mechdesign.study.schema.matrix import Results
 from mechdesign.study.schema.optimize import check_result
 from mechdesign.study.text import fields
 
+HELP_PAGE = "howto/sensitivities"
+
 
 def _name(raw: Any, _context: fields.Context) -> str:
     if not isinstance(raw, str):

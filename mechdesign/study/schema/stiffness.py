@@ -18,6 +18,8 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number
 from mechdesign.study.text.units import Amount
 
+HELP_PAGE = "theory/stiffness"
+
 # Keys of each kind of section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
@@ -107,7 +109,7 @@ def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
     parts = {f"k{number}": read_number(each, context) for number, each in enumerate(fields.as_list(raw))}
     if not parts:
-        raise failure("expected a stiffness, or a list of those in series")
+        raise failure("expected a stiffness, or a list of those in series, [1e6, 2e6]")
     for part in parts.values():
         if part <= 0:
             raise failure(f"must be positive, not {part:g}")

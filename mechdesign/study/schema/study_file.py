@@ -83,9 +83,13 @@ def _apply(document: Document, text: str) -> None:
     name, separator, value = text.partition("=")
     segments = name.strip().split(".")
     if not separator or not all(segments):
-        raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
+        raise StudyError(
+            [Problem("an override is <dotted name>=<value>, in quotes where it has spaces or brackets", file=label)]
+        )
     if len(name) > MAX_NAME:
-        raise StudyError([Problem(f"a name longer than {MAX_NAME} characters", file=label)])
+        raise StudyError(
+            [Problem(f"a name longer than {MAX_NAME} characters; a whole section can be one value", file=label)]
+        )
     # Bytes that the terminal could not decode are reported as not UTF-8, as they would be in a file.
     parsed = read(value.encode(errors="surrogateescape"), label) if value.strip() else Document(label, None)
     if parsed.problems:
@@ -142,7 +146,14 @@ def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> 
     if isinstance(data, list):
         index = LIST_FORM.get(rest[0], int(rest[0]) if _INDEX.fullmatch(rest[0]) else -1)
         if not 0 <= index <= len(data) or (index == len(data) and len(rest) > 1):
-            raise StudyError([Problem(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}", file=label)])
+            raise StudyError(
+                [
+                    Problem(
+                        f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}, and the first is 0",
+                        file=label,
+                    )
+                ]
+            )
         return index, rest[1:]
     # The longest existing key wins.
     for length in range(len(rest), 0, -1):

@@ -20,6 +20,8 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.reporter import Reporter
 
+HELP_PAGE = "theory/kinematics"
+
 ROOT: KeyPath = ("mechanism", "targets")
 
 

@@ -29,6 +29,8 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount, QuantityError
 
+HELP_PAGE = "theory/reliability"
+
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 DISTRIBUTIONS = {
@@ -49,7 +51,7 @@ def millimetre(context: Context, text: str) -> float:
     try:
         return context.units.convert("1 mm")
     except QuantityError:
-        raise failure(f"{text!r} is of sizes in mm, and this study's lengths are dimensionless") from None
+        raise failure(f"{text!r} is of sizes in mm, and this study's lengths are dimensionless; give 'units'") from None
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,9 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
         if "*" in name or "?" in name:
             matching = parameters.match(name)
             if not matching:
-                report(path, f"no dimension matches {name!r}", at_key=True)
+                report(
+                    path, f"no dimension matches {name!r}; name a parameter, or a place such as rod.length", at_key=True
+                )
             for place in matching:
                 if place not in dimensions:
                     found[place] = _check_dimension(checker, place, dimension, path)

@@ -164,7 +164,7 @@ def _mark(part: Any, name: str) -> Mark:
 
 def _check_depth(depth: int, here: Mark) -> None:
     if depth > MAX_DEPTH:
-        raise StudyError([here.problem(f"nested deeper than {MAX_DEPTH} levels")])
+        raise StudyError([here.problem(f"nested deeper than {MAX_DEPTH} levels; write the section flatter")])
 
 
 class _Builder:
@@ -179,7 +179,13 @@ class _Builder:
         _check_depth(len(path), here)
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise StudyError([here.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
+            raise StudyError(
+                [
+                    here.problem(
+                        f"more than {MAX_NODES} values once its aliases are expanded; put the numbers into a file"
+                    )
+                ]
+            )
         self.document.values[path] = here
         if isinstance(node, yaml.ScalarNode):
             return _scalar(node)

@@ -110,7 +110,7 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Amoun
     except (QuantityError, ExpressionError) as error:
         raise failure(str(error)) from None
     except OverflowError:
-        raise failure("too large a number") from None
+        raise failure("too large a number; choose a larger unit") from None
     if not isinstance(raw, str) and not math.isfinite(value):
         raise failure(f"expected a finite number, not {value:g}")
     largest, what = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")

@@ -54,7 +54,7 @@ class Folder:
                 raise StudyError(f"{file} cannot be read: larger than {MAX_FILE_BYTES // 1_000_000} MB")
             return content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            raise StudyError(f"{file} cannot be read: not a text file") from None
+            raise StudyError(f"{file} cannot be read: not a text file; save the table as CSV in UTF-8") from None
         except (OSError, ValueError, RuntimeError) as error:
             # A name may hold what no file system knows, and links may go round in a circle.
             raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'no such name'}") from None

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import nearest
 from mechdesign.expressions import Expression, Number
 
+HELP_PAGE = "reference/expressions"
+
 Powers = tuple[int, ...]
 """Exponents of length, angle, time and force."""
 
@@ -307,7 +309,7 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     """
     match = QUANTITY.fullmatch(text)
     if match is None:
-        raise QuantityError(f"{text!r} is not a number with a unit")
+        raise QuantityError(f"{text!r} is not a number with a unit, such as '40 mm'")
     unit = match["unit"]
     if len(unit) > MAX_UNIT:
         raise QuantityError(f"{unit[:MAX_UNIT]!r}... is no unit: none is longer than {MAX_UNIT} characters")
