@@ -55,25 +55,14 @@ class Matrix:
         if self.cases is not None:
             beside = study.parent if study is not None else Path()
             yield f"matrix.cases={in_yaml(os.path.relpath(self.cases, beside))}"
-        if self.method is not None:
-            yield f"matrix.method={in_yaml(self.method)}"
-        if self.samples is not None:
-            yield f"matrix.samples={self.samples}"
-        if self.results:
-            yield f"matrix.results={_listed(self.results)}"
         if self.maximize or self.minimize:
             yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
-        if self.maximize:
-            yield f"matrix.best.maximize={_listed(self.maximize)}"
-        if self.minimize:
-            yield f"matrix.best.minimize={_listed(self.minimize)}"
-        if self.sort:
-            yield "matrix.best.sort=true"
-
-
-def _listed(texts: Sequence[str]) -> str:
-    """Names with commas between them."""
-    return in_yaml([name.strip() for text in texts for name in text.split(",")])
+        lists = {"results": self.results, "best.maximize": self.maximize, "best.minimize": self.minimize}
+        values = {"method": self.method, "samples": self.samples, "best.sort": self.sort or None}
+        values |= {
+            key: [name.strip() for text in texts for name in text.split(",")] for key, texts in lists.items() if texts
+        }
+        yield from (f"matrix.{key}={in_yaml(value)}" for key, value in values.items() if value is not None)
 
 
 def _varied(text: str) -> tuple[str, Any]:

@@ -121,7 +121,7 @@ class _Dask(Pool):
             if address == LOCAL:
                 raise StudyError(f"--executor {name}: no cluster starts: {error}") from None
             raise StudyError(
-                f"--executor {name}: no scheduler answers there; start 'dask scheduler': {error}"
+                f"--executor {name}: no scheduler answers there: {error}; start 'dask scheduler'"
             ) from None
         try:
             self._client.wait_for_workers(1, timeout=_NO_WORKERS)

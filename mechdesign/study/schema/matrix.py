@@ -94,27 +94,31 @@ class Values(fields.Model):
             return len(self.values)
         if self.number is not None:
             return self.number
+        assert self.step is not None
+        low, high = self._ends
+        return int(min((high - low) / self.step + 1e-9, 1e15)) + 1
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Ends of the range."""
         assert self.from_ is not None
         assert self.to is not None
-        assert self.step is not None
-        return int(min((self.to - self.from_) / self.step + 1e-9, 1e15)) + 1
+        return self.from_, self.to
 
     def on_grid(self) -> tuple[Any, ...]:
         """The values on a grid, both ends of a range included: ``from + k step <= to + 1e-9 step``."""
         if self.values is not None:
             return self.values
-        assert self.from_ is not None
-        assert self.to is not None
-        step = self.step if self.step is not None else (self.to - self.from_) / max(self.count - 1, 1)
-        return tuple(plainly(self.from_ + k * step) for k in range(self.count))
+        low, high = self._ends
+        step = self.step if self.step is not None else (high - low) / max(self.count - 1, 1)
+        return tuple(plainly(low + k * step) for k in range(self.count))
 
     def at(self, share: float) -> Any:
         """The value at a share of the range, from 0 to 1, or the entry of the list there."""
         if self.values is not None:
             return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
-        assert self.from_ is not None
-        assert self.to is not None
-        return plainly(self.from_ + share * (self.to - self.from_))
+        low, high = self._ends
+        return plainly(low + share * (high - low))
 
 
 def _named(raw: Any, context: Context) -> str:
