@@ -1,4 +1,4 @@
-"""Warnings as values: of what kind, a sentence, and the place that it is about."""
+"""Warnings as values: a kind, a sentence, and the table, row and pose concerned."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of warning: what it is of, and the page of the documentation that tells more, without its suffix."""
+    """A kind of warning: its meaning, and the page of the documentation that explains it, without ``.md``."""
 
     meaning: str
     page: str
@@ -61,15 +61,15 @@ class Caution:
 
     kind: str  #: one of `KINDS`
     message: str  #: the sentence
-    table: str = ""  #: the table of the result that it is about; empty where it is about no single one
-    row: int | None = None  #: the first of its rows, from 0
-    pose: str = ""  #: the first pose, or the case, in words
+    table: str = ""  #: name of the table concerned; empty if the warning concerns the whole result
+    row: int | None = None  #: first row concerned, from 0
+    pose: str = ""  #: first pose or case concerned, in words
 
     def __str__(self) -> str:
         return self.message
 
     def as_data(self) -> dict[str, str | int]:
-        """Plain data, as a manifest has it: the kind, the sentence, and of the place what is known."""
+        """Plain data for a manifest; empty fields are left out."""
         return {name: value for name, value in asdict(self).items() if value not in ("", None)}
 
 

@@ -43,7 +43,7 @@ from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
-_ROWS_AT_ONCE = 20_000  # of a table that is read from its file
+_ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -56,7 +56,7 @@ OUTCOMES = {
 
 @dataclass(frozen=True)
 class Source:
-    """A study as it was read, once, and the folder of the files that it names, with what was read of them."""
+    """The text of a study, read once, and the folder of the files that it names."""
 
     text: bytes
     path: Path | None
@@ -77,15 +77,15 @@ class Outcome:
     verdicts: Sequence[Verdict] = ()
     seconds: float = 0.0
     kept: bool = False
-    written: bool = False  # whether the directory holds what was found
-    table: Table | None = None  # the main one
-    shard: str = ""  # what became of a part of it, where no more was asked
-    left: bool = False  # whether the run ended before it
-    reached: bool = True  # whether what was to be reached by changes was, where all poses assemble
+    written: bool = False  # whether the results are in the directory
+    table: Table | None = None  # the main table
+    shard: str = ""  # what became of the shard, with --shard
+    left: bool = False  # whether the run ended before this question
+    reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
 
     @property
     def word(self) -> str:
-        """What came of it, in a word or two."""
+        """The outcome in a word or two."""
         return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
@@ -148,7 +148,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     elif merging:
-        # A mistake of the study is why there are none.
+        # A mistake in the study explains the missing shards.
         requirements.foresee(study, [command] if command in LONG else [])
         raise shards.missing(directory)
     if command in LONG:
@@ -208,10 +208,10 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     except Divided:
         pass
     except Interrupted:
-        # A part of a part is nothing.
+        # An interrupted shard is not kept.
         raise KeyboardInterrupt from None
     except MechdesignError:
-        # Merge comes to the same, and tells it.
+        # `merge` will meet and report the same error.
         taken.write(directory, origin, options.command)
         raise
     taken.write(directory, origin, options.command)
@@ -220,7 +220,7 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
-    """The result of the study before; its errors begin with its name."""
+    """The result of the `--before` study; its errors begin with its name."""
     try:
         result: Result = getattr(mechdesign, command)(before, seed=options.seed, jobs=options.jobs)
     except MechdesignError as error:
@@ -230,7 +230,7 @@ def _earlier(before: Study, command: str, options: Options) -> Result:
 
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
-    """The answer that an earlier run left whole in the directory, if this run would give the same."""
+    """The outcome of an earlier run in the directory, if it is complete and this run would give the same."""
     content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
@@ -243,7 +243,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
         table = _main_table(directory, content)
         warnings, failed = [Caution(**each) for each in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
-        # Damaged: of another hand than ours.
+        # The manifest was changed by hand.
         return None
     if len(judged) != len(judged_by(study, command)):
         return None
@@ -269,7 +269,7 @@ def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
 
 
 def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
-    """The main table of the results in a folder with this manifest, read from its file where its rows are wanted."""
+    """The main table of a folder with this manifest; its rows are read from the file when they are needed."""
     file, about = next(iter(content["tables"].items()))
 
     def blocks() -> Iterator[Table]:
@@ -292,7 +292,7 @@ def _judged_and_written(
         verdicts = requirements.requirements(study, result)
     except StudyError:
         if result.command in LONG:
-            # What took long is not lost to a requirement that names a row it has not.
+            # A requirement that names a missing row must not lose a long computation.
             writer.write(directory, study, result, (), asked)
         raise
     undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress)
@@ -300,7 +300,7 @@ def _judged_and_written(
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
-    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    """Journal of finished designs or cases; with --resume it begins with those of the earlier run."""
     journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
@@ -309,7 +309,7 @@ def _journal(study: Study, command: str, directory: Path, options: Options) -> J
 
 
 def tell(given: Outcome, study: Study, options: Options) -> None:
-    """Say on stderr, and to GitHub, what came out; what is not met or failed is said even where quiet is wanted."""
+    """Report an outcome on stderr and to GitHub; with --quiet only failures and requirements that are not met."""
     who = f"{given.study}: {given.command}:"
     for warning in given.warnings:
         terminal.say(f"{who} warning: {warning} [{warning.kind}]", quiet=options.quiet)
@@ -334,7 +334,7 @@ def tell(given: Outcome, study: Study, options: Options) -> None:
 def write_report(
     directory: Path, study: Study, answers: Sequence[Outcome], options: Options, left: Sequence[str] = ()
 ) -> None:
-    """Write a study's page from what its questions left in their folders; `left` are questions that were not asked.
+    """Write a study's report from the files of its questions; `left` are questions that were not answered.
 
     Raises
     ------
@@ -356,7 +356,7 @@ def write_report(
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:
-    """The outcome of a question that was interrupted; what was finished of it may be a result."""
+    """The outcome of an interrupted question, which may have a partial result."""
     code = Interrupted.exit_code
     words = str(error) or "interrupted"
     return Outcome(study.label, command, directory, code, 0, failed=words, written=isinstance(error, Interrupted))
@@ -364,7 +364,7 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 @one_thread()
 def ask(command: str, path: Path | None, options: Options) -> Outcome:
-    """One command from end to end."""
+    """Load a study, answer one question, write and show the result."""
     study = load_study(path, options)
     directory = place(folder(study, command, options), options)
     with owned(directory):

@@ -17,9 +17,9 @@ from mechdesign.files import FORMATS, formats_of
 if TYPE_CHECKING:
     from mechdesign.work.shards import Shard
 
-# Widths of the pages of pictures and sizes of their type.
+# Styles of pictures: width of the page and size of the type.
 STYLES = ("screen", "paper")
-# Relative tolerance of `compare`: more than machines differ by, less than anything that matters.
+# Default relative tolerance of `compare`: above the rounding differences between machines, below any real change.
 RELATIVE = 1e-9
 # Options that fill fields of other names.
 _FIELDS = {"--set": "overrides", "--format": "formats"}
@@ -27,7 +27,7 @@ _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
 def _studies(incomplete: str) -> list[str]:
-    """Files of studies that a word may become; a shell completes the names of folders where there are none."""
+    """Study files that complete a word; where there are none the shell completes names of folders."""
     folder, slash, start = incomplete.rpartition("/")
     try:
         found = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
@@ -42,7 +42,7 @@ def _templates(incomplete: str) -> list[str]:
 
 
 def _one_of(words: Iterable[str]) -> Callable[[str], list[str]]:
-    """Completes a word to those known."""
+    """A completion to one of these words."""
     return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
@@ -238,9 +238,9 @@ TOLERANCES = _text(
     "that fits counts, --rtol and --atol where none does.",
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
-# Of the cases of a sweep.
+# Options that make the cases of a sweep.
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
-# What every question takes, and what only some of them do.
+# Options of every question, and those of single questions.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, STRICT, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {
     "kinematics": (ANIMATE, ALL_MODES, BEFORE),
@@ -267,7 +267,7 @@ class Options:
     jobs: int | None = None
     executor: str | None = None
     shard: str | None = None
-    command: str = ""  # that was given
+    command: str = ""  # name of the command
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
@@ -298,7 +298,7 @@ class Options:
 
     @property
     def part(self) -> Shard | None:
-        """The shard that is to be computed."""
+        """The shard to compute; None without --shard."""
         from mechdesign.work.shards import Shard
 
         return None if self.shard is None else Shard.of(self.shard)

@@ -1,4 +1,4 @@
-"""What became of many questions: a table, JUnit for CI, and a line for each that failed."""
+"""Summaries of many questions: a table, JUnit for CI, and a line for each failure."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
     from junitparser import JUnitXml
 
 _SKIPPED = re.compile(r'(?<=") skipped="\d+"')
-_MARK = b'<testsuites name="mechdesign"'  # of a JUnit file
+_MARK = b'<testsuites name="mechdesign"'  # beginning of our JUnit files
 
 
 def mark(path: Path) -> bytes:
-    """By what a file is known whose place a JUnit file may take: that of an older one, none where its name is XML's."""
+    """Mark of files that a JUnit file may replace: older JUnit files of ours; any file if it is named ``*.xml``."""
     return b"" if path.suffix == ".xml" else _MARK
 
 
 def in_brief(given: Outcome) -> str:
-    """What a question failed by, in a line of the list of failures."""
+    """The reason of a failed question, in one line."""
     why = [given.failed.splitlines()[0]] if given.failed else []
     why += [str(verdict) for verdict in given.verdicts if not verdict.met]
     return f"  {given.study}: {given.command}: {given.word}: {'; '.join(why)}"
 
 
 def summary(answers: Sequence[Outcome]) -> Table:
-    """What became of the questions, a row each."""
+    """Table of the outcomes, one row for each question."""
     rows = [given for given in answers if given.command]
     return SUMMARY.table(SUMMARY.columns(
         {}, study=[given.study for given in rows], command=[given.command for given in rows],
@@ -48,10 +48,9 @@ def summary(answers: Sequence[Outcome]) -> Table:
 
 
 def junit(answers: Sequence[Outcome]) -> str:
-    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
+    """JUnit XML for CI servers: a suite for each study, with a case for each command and each requirement.
 
-    A requirement that is not met is a failure; whatever kept a command from its result is an error; what the run ended
-    before is skipped.
+    A requirement that is not met is a failure, a command without a result an error, a command not reached skipped.
     """
     from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
@@ -84,6 +83,6 @@ def junit_text(report: JUnitXml) -> str:
     """The text of a JUnit report, with its counts."""
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
-    # Jenkins' schema (junit-10.xsd of its xunit plugin) allows that count in suites alone.
+    # Jenkins' schema (junit-10.xsd of its xunit plugin) allows this attribute in suites only.
     body = _SKIPPED.sub("", text.decode(), count=1)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

@@ -22,7 +22,7 @@ from mechdesign.study.text.document import in_yaml, read
 
 @dataclass(frozen=True)
 class Matrix:
-    """What the options say of the cases; what is left out is the study's."""
+    """The options that make the cases; those left out are the study's."""
 
     vary: Sequence[str] | None = None
     method: str | None = None
@@ -34,7 +34,7 @@ class Matrix:
     sort: bool = False
 
     def overrides(self, study: Path | None) -> Iterator[str]:
-        """The same as changes of the section ``matrix``; of other cases nothing of the study's design stays.
+        """The options as overrides of the section ``matrix``; new cases replace the study's whole design of cases.
 
         Raises
         ------
@@ -58,7 +58,7 @@ class Matrix:
         if self.maximize or self.minimize:
             yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
         lists = {"results": self.results, "best.maximize": self.maximize, "best.minimize": self.minimize}
-        values = {"method": self.method, "samples": self.samples, "best.sort": self.sort or None}
+        values: dict[str, Any] = {"method": self.method, "samples": self.samples, "best.sort": self.sort or None}
         values |= {
             key: [name.strip() for text in texts for name in text.split(",")] for key, texts in lists.items() if texts
         }
@@ -66,7 +66,7 @@ class Matrix:
 
 
 def _varied(text: str) -> tuple[str, Any]:
-    """An entry and its values: a range, or a list of which commas stand between."""
+    """An entry and its values: a range, or a list separated by commas."""
     name, separator, values = text.partition("=")
     name, values = name.strip(), values.strip()
     label = f"--vary {text}"
@@ -81,7 +81,7 @@ def _varied(text: str) -> tuple[str, Any]:
 
 
 def _as_typed(error: StudyError) -> StudyError:
-    """The same mistakes under the options that say what `Matrix.overrides` made of them."""
+    """The mistakes of overrides from `Matrix.overrides`, with the options that gave them."""
     written = re.compile(r"--set matrix\.(?:best\.)?(\w+)=.*")
     return StudyError([replace(problem, file=written.sub(r"--\1", problem.file)) for problem in error.problems])
 

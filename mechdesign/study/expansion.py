@@ -1,4 +1,4 @@
-"""Poses as arrays from what a study asks: lists, sweeps, grids and paths, of its own design or of many."""
+"""Poses as arrays, from lists, sweeps, grids and paths of a study, for its own design or many."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Numbers:
     """The numbers of a study for some designs."""
 
     count: int = 1
-    # What differs from the study's own design, shape (count,): parameters, and places in lengths and radians.
+    # Values that differ from the study's own design, shape (count,): parameters, and places (lengths, radians).
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     places: Mapping[str, Floats] = field(default_factory=dict)
     nominal: Mapping[str, float] = field(default_factory=dict)  # every parameter of the study's own design
-    changed: frozenset[str] = frozenset()  # names of what is changed itself, and so follows nothing
+    changed: frozenset[str] = frozenset()  # names with values of their own, which no longer follow parameters
 
     def of(self, number: float) -> Floats:
         """A number of each design, shape (count,)."""

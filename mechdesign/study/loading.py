@@ -49,16 +49,16 @@ from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread
 
-# Characters of a study's name that a folder's name does without, and the name of a study that has none.
+# Characters that are replaced in the folder's name, and the name of a study without one.
 _UNFIT = re.compile(r"[^\w.-]+")
 _UNNAMED = "study"
-# What messages call a text that is no file.
+# Name in messages of a study given as a text.
 _TEXT = "<study>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """A validated study; sections are None where it does not ask.
+    """A validated study; sections that its file does not have are None.
 
     >>> import mechdesign
     >>> study = mechdesign.load(text='''
@@ -89,12 +89,12 @@ class Study:
     requirements: tuple[Requirement, ...]  #: in the order of the file
     fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
     targets: Mapping[str, Target]  # by the coordinate or point
-    kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
-    fixed: frozenset[str]  # parameters in whole numbers, which are read once
-    folder: Folder  #: where the files lie that it names, and what they held when it was loaded
+    kinds: Mapping[KeyPath, str]  # kinds of quantities of entries outside the geometry, and of the entries below them
+    fixed: frozenset[str]  # parameters used in whole numbers, which are the same for every design
+    folder: Folder  #: folder of the files that it names, with their contents when it was loaded
     drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
     strict: bool = False  #: whether every kind of warning fails, not only those of `fail_on`
-    warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
+    warnings: tuple[Problem, ...] = ()  #: likely mistakes, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -108,7 +108,7 @@ class Study:
 
     @property
     def cautions(self) -> dict[Caution, Problem]:
-        """What is likely a mistake, as warnings of its results, each with its place in the study."""
+        """Likely mistakes as warnings of its results, each with its place in the study."""
         return {Caution("suspect", f"{problem.key}: {problem.message}"): problem for problem in self.warnings}
 
     @property
@@ -128,12 +128,12 @@ class Study:
         return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
-        """Files that the study reads: the keys of their names, the file, and what it held when the study was loaded."""
+        """Files that the study reads: path of the key, file, and its text when the study was loaded."""
         for keys, name in files(self.resolved, self.questions):
             yield keys, self.folder.path / name, self.folder.text(name)
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
+        """Unit of a number of the geometry, a drive, or a parameter; None if it is not known.
 
         See `Parameters.kind` for that of a parameter.
         """
@@ -155,7 +155,7 @@ class Study:
 
     @cached_property
     def _document(self) -> Document:
-        """The text once more, with the places of its entries."""
+        """The text read again, with the places of its entries."""
         document = read(self.text, str(self.path or _TEXT))
         override(document, self.overrides)
         return document
@@ -187,7 +187,7 @@ def load(
 
 
 def read_file(file: pathlib.Path) -> bytes:
-    """The text of a study, or as much of it as tells that it is too long.
+    """The text of a study file, at most one byte more than is allowed.
 
     Raises
     ------
@@ -235,7 +235,7 @@ def load_bytes(
 
 
 def _drawing(document: Document) -> dict[str, Any]:
-    """What a sketch is assembled from: a study's units and mechanism."""
+    """The units and the mechanism of a study, which determine how its sketch is assembled."""
     data = document.data if isinstance(document.data, dict) else {}
     return {key: plain(data[key]) for key in ("units", "mechanism") if data.get(key) is not None}
 
@@ -244,7 +244,7 @@ def _load_changed(
     document: Document, path: pathlib.Path | None, folder: Folder, text: bytes, sha256: str, changes: tuple[str, ...],
     seed: int | None, drawn: Mapping[str, Any],
 ) -> Study:  # fmt: skip
-    """Load a study whose overrides are applied; its assembly is that of the study before, `drawn`, if that has one."""
+    """Load a study after its overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
     if drawn == _drawing(document) or not same_sketch(drawn, document.data):
         return load_document(document, path, folder, text, sha256, changes, seed)
     original = None
@@ -260,7 +260,7 @@ def _load_changed(
             "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that "
             "it shows without the change", "mechanism", "sketch",
         ))  # fmt: skip
-    # The units in full, as the data of the study has them.
+    # With all units, as in the data of the study.
     drawn = {**drawn, "units": study.resolved["units"]}
     return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
 
@@ -281,7 +281,7 @@ def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _plain_data(value: Any, what: str) -> Any:
-    """Data of mappings, lists, texts and numbers alone."""
+    """Data of mappings, lists, texts and numbers only."""
 
     def plainly(each: Any) -> Any:
         if isinstance(each, Mapping):
@@ -328,7 +328,7 @@ def load_document(
     assert section is not None
     builder = Builder(section, context, reporter)
     description = build(builder)
-    # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
+    # Mobility and sketch are checked if the mechanism itself has no mistakes, even if other sections have.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
@@ -369,7 +369,7 @@ def load_document(
 
 
 def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
-    """The study's top level with sections that are named but empty as empty mappings."""
+    """The top level of the study; an empty section becomes an empty mapping."""
     data = document.data
     if not isinstance(data, dict):
         message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
@@ -378,9 +378,9 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
 
 
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
-    """Units and parameters, which all other numbers are read with."""
+    """Units and parameters, which are needed to read all other numbers."""
     units = Units()
-    # A wrong unit is reported with the mistakes of the other sections.
+    # A wrong unit is reported later, with the mistakes of other sections.
     with contextlib.suppress(ValidationError):
         units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
@@ -413,7 +413,7 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
 
 
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
-    """Validate part by part, so that a mistake in one does not hide those in another; wrong parts are left out."""
+    """Validate each top-level key by itself, so that all mistakes are found; wrong parts are left out."""
     parts: dict[str, Any] = {"seed": 0, "requirements": (), "fail_on": ()}
     fields = StudyFile.model_fields
     for key in data:
@@ -428,20 +428,20 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
                 )
             continue
         if key == "mechanism" and isinstance(raw, dict):
-            # The parameters have been read already, in their order.
+            # The parameters have been read by `_context`.
             raw = {name: value for name, value in raw.items() if name != "parameters" or not isinstance(value, dict)}
         try:
             parts[key] = _adapter(key).validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
-            # Names are checked all the same where the mistakes so far are in numbers and keys alone.
+            # If only numbers and keys are wrong, the names in this part can still be checked.
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
 
 
 def _checked(checker: Checker) -> dict[str, Any]:
-    """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
+    """Check the validated sections and the targets; returns them with wildcards and defaults filled in."""
     if "optimize" in checker.parts:
         checker.parts["optimize"] = check_variables(checker.parts["optimize"], checker)
     found = dict(checker.parts)
@@ -461,8 +461,8 @@ def _checked(checker: Checker) -> dict[str, Any]:
 
 
 def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
-    """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
-    targets fit those of kinematics.
+    """Check that poses determine the mechanism and are not too many, and that the targets fit the poses of
+    kinematics.
     """
     for command in COMMANDS:
         section = parts.get(command)
@@ -494,9 +494,9 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:
-    """Note parameters that no number, design variable or varying dimension of the study uses."""
+    """Report parameters that no number, design variable or varying dimension uses."""
     if reporter.problems:
-        # What was wrong may have been what uses them.
+        # A part with a mistake may use them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
     used = context.used.union(
@@ -530,5 +530,5 @@ def _compiled(description: Description, reporter: Reporter, original: Mechanism 
 
 
 def _alike(one: Description, other: Description) -> bool:
-    """Whether two mechanisms differ in numbers alone."""
+    """Whether two mechanisms differ only in numbers."""
     return dataclasses.replace(one, places=other.places, sketch=other.sketch) == other

@@ -1,4 +1,4 @@
-"""What is allocated among tolerances: a reliability or a Cpk, at least cost, in any numbers or in standard grades."""
+"""Allocation of tolerances: the cheapest for a reliability or a Cpk, in any numbers or in standard grades."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mechdesign.study.text.units import QuantityError
 
 HELP_PAGE = "theory/reliability"
 
-# Grades where a study does not name them, and all that there are.
+# Grades used by default, and the largest grade.
 USUAL = tuple(f"IT{number}" for number in range(5, 13))
 _MOST_GRADE = 18
 _GRADE = re.compile(r"IT([1-9]\d?)")

@@ -21,7 +21,7 @@ HELP_PAGE = "theory/reliability"
 
 
 class ToleranceClassError(ValueError):
-    """A tolerance class that is not given for a size, or none at all; the message says what there is."""
+    """No such tolerance class, or not for this size; the message names those there are."""
 
 
 def _numbers(text: str) -> Floats:

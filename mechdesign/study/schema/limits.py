@@ -13,7 +13,7 @@ from mechdesign.study.text.units import Amount
 
 HELP_PAGE = "theory/reliability"
 
-# What the names of errors of positions, velocities and accelerations end in.
+# Endings of the names of positions, velocities and accelerations.
 SUFFIXES = ("", "_velocity", "_acceleration")
 
 

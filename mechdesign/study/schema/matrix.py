@@ -24,7 +24,7 @@ from mechdesign.study.text.inputs import Folder
 
 HELP_PAGE = "howto/sweep"
 
-# Cases of one study.
+# Most cases of one study.
 MAX_CASES = 10_000_000
 GRID = "grid"
 METHODS = {
@@ -32,10 +32,10 @@ METHODS = {
     "latin_hypercube": "random; of as many equal parts of each range as there are samples, one sample lies in each",
     "sobol": "a scrambled Sobol' sequence, random and evenly spread; a power of two is most even",
 }
-# A range as the command line has it, and the keys of its parts.
+# A range as written on the command line, and the keys of its parts.
 RANGE = re.compile(r"[^:,\[\]{}]+(?::[^:,\[\]{}]+){1,2}")
 _PARTS = ("from", "to", "step")
-# A plain number, which most cells of a file of cases are: a million of them are not read as YAML one by one.
+# A plain number. Most cells of a file of cases are such numbers, and reading each as YAML would be slow.
 _DECIMAL = re.compile(r"-?(?:0|[1-9][0-9]{0,14})(\.[0-9]+)?")
 
 
@@ -84,7 +84,7 @@ class Values(fields.Model):
 
     @property
     def spaced(self) -> bool:
-        """Whether a grid knows which values these are."""
+        """Whether the values on a grid are determined."""
         return self.values is not None or self.step is not None or self.number is not None
 
     @property
@@ -215,7 +215,7 @@ class MatrixSection(fields.Model):
         return self
 
     def checked(self, checker: Checker) -> Self:
-        """Check the commands that results name; whether they have such a result is found at a look."""
+        """Check the commands that results name; `experiments` checks that they have such a result."""
         named: dict[KeyPath, Results] = {("matrix", "results"): self.results}
         if self.best is not None:
             named |= {("matrix", "best", key): getattr(self.best, key) for key in ("maximize", "minimize")}

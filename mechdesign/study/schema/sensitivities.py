@@ -49,7 +49,7 @@ class SensitivitiesSection(fields.Model):
         return self
 
     def checked(self, checker: Checker) -> Self:
-        """Check the commands that results name; whether they have such a result is found at a look."""
+        """Check the commands that results name; `experiments` checks that they have such a result."""
         for k, named in enumerate(self.results):
             check_result(checker, named.result, ("sensitivities", "results", k))
         return self

@@ -20,7 +20,7 @@ from mechdesign.study.text.units import Amount
 
 HELP_PAGE = "theory/stiffness"
 
-# Keys of each kind of section.
+# Keys of each form of cross-section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
@@ -159,16 +159,16 @@ class StiffnessSection(PoseSection):
 
     @property
     def point(self) -> str:
-        """The asked point without its link."""
+        """The point without its link."""
         return self.at.rpartition(".")[2]
 
     @property
     def bearer(self) -> str | None:
-        """The link whose point is asked; None of a pin."""
+        """The link of the point; None for a pin."""
         return self.link or self.at.rpartition(".")[0] or None
 
     def checked(self, checker: Checker) -> Self:
-        """Check what is named as well, and the units of stiffnesses; loads get three numbers."""
+        """Also check names and the units of stiffnesses; loads get three numbers."""
         root: KeyPath = ("stiffness",)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.known(self.at, [*owners, *ends], "point", (*root, "at"))

@@ -100,7 +100,7 @@ def _apply(document: Document, text: str, label: str) -> None:
     key: Any = path[-1]
     there = has(holder, key)
     if isinstance(holder, dict) and parsed.data is None:
-        # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
+        # An empty value removes the entry: `--set kinematics.sweep=` makes room for other poses.
         if not there and key not in schema_fields(StudyFile, path[:-1]):
             raise StudyError(f"there is no {dotted(path)} to take away{suggestion(key, holder)}")
         holder.pop(key, None)
@@ -119,7 +119,7 @@ def _apply(document: Document, text: str, label: str) -> None:
 
 
 def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, KeyPath]:
-    """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
+    """The mapping or list that holds an entry, and the entry's path; `making` adds missing mappings on the way."""
     data: Any = document.data
     path: list[str | int] = []
     rest = list(segments)
@@ -190,6 +190,6 @@ def entry(data: Any, name: str) -> KeyPath:
 
 
 def kinds_of(keys: KeyPath) -> set[str]:
-    """Kinds (of `units.KINDS`) of the number at a path, as far as the format itself tells them."""
+    """Kinds (of `units.KINDS`) of the number at a path, if the format determines them."""
     field = schema_fields(StudyFile, keys[:-1]).get(str(keys[-1]))
     return {read.kind for read in fields.reads(field.annotation, field.metadata) if read.kind} if field else set()

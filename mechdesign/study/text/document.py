@@ -32,7 +32,7 @@ _WORDS = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-# What mends a mistake, by the words that YAML has for it.
+# Cures by the messages of the YAML parser.
 _HINTS = {
     "cannot start any token": " (indent with spaces, not tabs; put special characters in quotes)",
     "alias": " (put a word that begins with '*' in quotes, as in \"*.length\")",
@@ -68,12 +68,12 @@ class Document:
     data: Any
     keys: dict[KeyPath, Mark] = field(default_factory=dict)
     values: dict[KeyPath, Mark] = field(default_factory=dict)
-    # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
+    # Mistakes after which the rest can be read, and the parts in which further mistakes only follow from them.
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[KeyPath] = field(default_factory=set)
     # Lists in which two numbers may be one with a decimal comma, and that number.
     commas: dict[KeyPath, str] = field(default_factory=dict)
-    # Entries that the text does not have: an override made them.
+    # Entries that an override has added.
     added: set[KeyPath] = field(default_factory=set)
 
 
@@ -139,7 +139,7 @@ def _misread(error: yaml.MarkedYAMLError, name: str) -> Problem:
 
 
 def _check_events(text: str, name: str) -> None:
-    """Check what can be judged of a text before anything is built of it."""
+    """Check the events of the YAML parser before any data are built."""
     depth = documents = 0
     event: Any
     for event in yaml.parse(text, Loader=_Loader):
