@@ -31,7 +31,7 @@ HELP_PAGE = "howto/batch"
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 _HEADER = to_csv(Comparison().table).encode()
-# Most differences listed beside the table.
+# Changes that are printed as messages, not in the table.
 _SAID = ("verdict", "outcome")
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))

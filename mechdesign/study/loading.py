@@ -295,10 +295,9 @@ def _plain_data(value: Any, what: str) -> Any:
     try:
         return json.loads(json.dumps(value, default=plainly))
     except (TypeError, ValueError, RecursionError) as error:
-        message = (
+        raise StudyError(
             f"{what} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
-        )
-        raise StudyError([Problem(message)]) from None
+        ) from None
 
 
 @few_comparisons()
@@ -373,7 +372,7 @@ def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
     data = document.data
     if not isinstance(data, dict):
         message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
-        raise StudyError([document.values[()].problem(message)])
+        raise document.values[()].failure(message)
     return {key: {} if value is None and key in COMMANDS else value for key, value in data.items()}
 
 

@@ -96,7 +96,7 @@ def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from None
     if not isinstance(document.data, dict):
-        raise StudyError([document.values[()].problem("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")])
+        raise document.values[()].failure("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")
     patterns, problems = {}, list(document.problems)
     for pattern, given in document.data.items():
         try:
