@@ -20,7 +20,6 @@ from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, n
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     Outcome,
-    Source,
     answer,
     interrupted,
     load_source,
@@ -39,6 +38,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
 from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
+from mechdesign.study.loading import Source
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK

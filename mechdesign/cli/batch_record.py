@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import Outcome, Source
+from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
@@ -22,6 +22,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
 from mechdesign.study import Study
+from mechdesign.study.loading import Source
 from mechdesign.work.pool import LostWorkerError
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
-from mechdesign.study.loading import load_bytes, read_file
+from mechdesign.study.loading import Source, load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import shards
@@ -52,15 +52,6 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
-
-
-@dataclass(frozen=True)
-class Source:
-    """The text of a study, read once, and the folder of the files that it names."""
-
-    text: bytes
-    path: Path | None
-    folder: Folder
 
 
 @dataclass(frozen=True)
@@ -103,8 +94,8 @@ def source(path: Path | None, options: Options) -> Source:
         what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
         terminal.say(f"study: {what}", quiet=options.quiet)
     if path == STANDARD_INPUT:
-        return Source(sys.stdin.buffer.read(MAX_BYTES + 1), None, Folder(anywhere=options.allow_files))
-    return Source(read_file(path), path, Folder(path.parent, options.allow_files))
+        return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
+    return Source(path, Folder(path.parent, options.allow_files), read_file(path))
 
 
 def load_source(source: Source, options: Options) -> Study:

@@ -73,14 +73,16 @@ def messages() -> tuple[Message, ...]:
 
 
 def find_messages(words: str) -> list[Entry]:
-    """Entries of the messages in which these words stand, or that these words are."""
+    """Entries of messages that contain these words or are these words, and of reasons why a pose fails."""
     found = [
         Entry(message.text, KIND, f"{message.meaning}; see the page {message.page} of the documentation")
         for message in messages() if message.holds(words)
     ]  # fmt: skip
-    return found or [
-        Entry(reason, KIND, f"why a pose fails: {cure}") for reason, cure in REASONS.items() if reason in words
-    ]
+    reasons = [
+        Entry(reason, KIND, f"why a pose fails: {cure}")
+        for reason, cure in REASONS.items() if words == reason or (reason in words and not found)
+    ]  # fmt: skip
+    return [*reasons, *found]
 
 
 def _modules(folder: Traversable, page: str = "") -> Iterator[tuple[str, ast.Module]]:

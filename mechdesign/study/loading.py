@@ -42,7 +42,7 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, in_yaml, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
@@ -54,6 +54,16 @@ _UNFIT = re.compile(r"[^\w.-]+")
 _UNNAMED = "study"
 # Name in messages of a study given as a text.
 _TEXT = "<study>"
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a study is read from: its file and text, empty of a mapping, and the folder of the files that it names."""
+
+    path: pathlib.Path | None
+    folder: Folder
+    text: bytes = b""
+    sha256: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,6 +110,11 @@ class Study:
     def questions(self) -> tuple[str, ...]:
         """Commands that the study has a section for."""
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
+
+    @property
+    def source(self) -> Source:
+        """What it was read from."""
+        return Source(self.path, self.folder, self.text, self.text_sha256)
 
     @property
     def barred(self) -> tuple[str, ...]:
@@ -203,18 +218,15 @@ def read_file(file: pathlib.Path) -> bytes:
 
 
 def load_data(
-    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
+    mapping: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
     drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
     """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
     folder. See `load`.
     """
-    data = _plain_data(source, "the study")
-    document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
-    drawn = drawn or _drawing(document)
-    override(document, changes)
-    sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-    return _load_changed(document, None, folder, b"", sha256, changes, seed, drawn)
+    data = _plain_data(mapping, "the study")
+    source = Source(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
+    return _load_changed(Document.of(data), source, _texts(overrides), seed, drawn)
 
 
 @one_thread()
@@ -226,12 +238,9 @@ def load_bytes(
     folder: Folder | None = None,
 ) -> Study:
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
-    document, changes = read(content, str(path or _TEXT)), _texts(overrides)
-    drawn = _drawing(document)
-    override(document, changes)
-    sha256 = hashlib.sha256(content).hexdigest()
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
-    return _load_changed(document, path, folder, content, sha256, changes, seed, drawn)
+    source = Source(path, folder, content, hashlib.sha256(content).hexdigest())
+    return _load_changed(read(content, str(path or _TEXT)), source, _texts(overrides), seed)
 
 
 def _drawing(document: Document) -> dict[str, Any]:
@@ -241,17 +250,18 @@ def _drawing(document: Document) -> dict[str, Any]:
 
 
 def _load_changed(
-    document: Document, path: pathlib.Path | None, folder: Folder, text: bytes, sha256: str, changes: tuple[str, ...],
-    seed: int | None, drawn: Mapping[str, Any],
+    document: Document, source: Source, changes: tuple[str, ...], seed: int | None,
+    drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
-    """Load a study after its overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
+    """Load a study with overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
+    drawn = drawn or _drawing(document)
+    override(document, changes)
     if drawn == _drawing(document) or not same_sketch(drawn, document.data):
-        return load_document(document, path, folder, text, sha256, changes, seed)
+        return load_document(document, source, changes, seed)
     original = None
     with contextlib.suppress(StudyError):
-        own = Document("", plain(drawn), values={(): Mark("")})
-        original = load_document(own, path, folder, b"", "").mechanism
-    study = load_document(document, path, folder, text, sha256, changes, seed, original)
+        original = load_document(Document.of(plain(drawn)), Source(source.path, source.folder)).mechanism
+    study = load_document(document, source, changes, seed, original)
     if not isinstance(study.mechanism, Variant):
         return study
     warnings = [*study.warnings]
@@ -303,10 +313,7 @@ def _plain_data(value: Any, what: str) -> Any:
 @few_comparisons()
 def load_document(
     document: Document,
-    path: pathlib.Path | None,
-    folder: Folder,
-    text: bytes,
-    text_sha256: str,
+    source: Source,
     changes: tuple[str, ...] = (),
     seed: int | None = None,
     original: Mechanism | None = None,
@@ -331,22 +338,22 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    checker = Checker(builder, parameters, parts, folder)
+    checker = Checker(builder, parameters, parts, source.folder)
     parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     doubts.note(checker, parts, description)
     assert mechanism is not None
-    _check_poses(parts, mechanism, reporter, folder)
+    _check_poses(parts, mechanism, reporter, source.folder)
     reporter.done()
-    name = parts.get("name") or (path.stem if path is not None else _UNNAMED)
+    name = parts.get("name") or (source.path.stem if source.path is not None else _UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(
         name=name,
-        path=path,
-        text=text,
-        text_sha256=text_sha256,
+        path=source.path,
+        text=source.text,
+        text_sha256=source.sha256,
         seed=seed,
         overrides=changes,
         units=context.units,
@@ -362,7 +369,7 @@ def load_document(
         targets=parts["targets"],
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
-        folder=folder,
+        folder=source.folder,
         warnings=tuple(reporter.warnings),
     )
 

@@ -20,7 +20,7 @@ from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document, same_sketch
 from mechdesign.study.schema.entries import number_at
 from mechdesign.study.schema.study_file import entry, kinds_of, override
-from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, in_yaml, leaves, plain, read
+from mechdesign.study.text.document import Document, KeyPath, dotted, in_yaml, leaves, plain, read
 
 Changes = Sequence[tuple[str, Any]]
 """Entries of a study, by the names that ``--set`` takes, and their values."""
@@ -48,12 +48,12 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
-    document = Document("", data, values={(): Mark("")})
+    document = Document.of(data)
     override(document, overrides(changes))
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
     return load_document(
-        document, study.path, study.folder, study.text, study.text_sha256, (*study.overrides, *overrides(changes)),
+        document, study.source, (*study.overrides, *overrides(changes)),
         original=study.mechanism if same_sketch(data, study.resolved) else None,
     )  # fmt: skip
 

@@ -80,6 +80,11 @@ class Document:
     # Entries that an override has added.
     added: set[KeyPath] = field(default_factory=set)
 
+    @classmethod
+    def of(cls, data: Any, name: str = "") -> Document:
+        """A document of data without a text."""
+        return cls(name, data, values={(): Mark(name)})
+
 
 def dotted(path: Sequence[str | int]) -> str:
     """Write a path as the user would: ``mechanism.links.crank.length``."""
