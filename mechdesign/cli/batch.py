@@ -179,7 +179,7 @@ def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> Non
     Raises
     ------
     KeyboardInterrupt
-        When what an interrupt has left is told.
+        When the run was interrupted, after its outcomes are recorded.
     """
     jobs = worker_count(options.jobs)
     # Work for an executor is sent from this process.
@@ -266,11 +266,11 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
     task = tasks[index]
     options = task.options
     words = io.StringIO()
-    told: list[Outcome] = []
+    outcomes: list[Outcome] = []
     ended = End()
 
-    def say(given: Outcome | None = None) -> None:
-        hear(Said(words.getvalue(), given))
+    def say(outcome: Outcome | None = None) -> None:
+        hear(Said(words.getvalue(), outcome))
         words.seek(0)
         words.truncate()
 
@@ -282,16 +282,16 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
             return ended
         try:
             for command, directory in task.questions:
-                given = _question(study, command, directory, options, Reported(command, hear))
-                told.append(given)
-                say(given)
-                if given.exit_code and options.fail_fast:
+                outcome = _question(study, command, directory, options, Reported(command, hear))
+                outcomes.append(outcome)
+                say(outcome)
+                if outcome.exit_code and options.fail_fast:
                     break
         except KeyboardInterrupt as error:
-            told.append(interrupted(study, command, directory, error))
+            outcomes.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
-            ended = replace(ended, entry=_page(study, task, told, several=several))
+            ended = replace(ended, entry=_page(study, task, outcomes, several=several))
         except Exception as error:
             code, message = explained(error)
             terminal.say(f"{study.label}: report: {message}")
@@ -304,33 +304,33 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
     """Answer one question and report its outcome, also if it fails."""
     try:
         with owned(directory):
-            given = answer(study, command, directory, options, progress)
-        tell(given, study, options)
+            outcome = answer(study, command, directory, options, progress)
+        tell(outcome, study, options)
     except Exception as error:
         return failure(study.label, command, directory, error, study)
-    return replace(given, table=None)
+    return replace(outcome, table=None)
 
 
-def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -> Entry | None:
+def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None
-    left = [command for command, _ in task.questions if command not in {given.command for given in told}]
-    write_report(task.root, study, told, options, left)
+    left = [command for command, _ in task.questions if command not in {outcome.command for outcome in outcomes}]
+    write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
     from mechdesign.report.page.page import Entry, thumbnail
 
-    verdicts = [verdict for given in told for verdict in given.verdicts]
+    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
     return Entry(
         study.name,
         study.label,
-        [(given.command, given.word, given.exit_code) for given in told],
+        [(outcome.command, outcome.word, outcome.exit_code) for outcome in outcomes],
         met=sum(verdict.met for verdict in verdicts),
         required=sum(number_of(study, command) for command, _ in task.questions),
-        warnings=len({warning for given in told for warning in given.warnings}),
+        warnings=len({warning for outcome in outcomes for warning in outcome.warnings}),
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
     )

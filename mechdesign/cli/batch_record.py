@@ -50,7 +50,7 @@ class Said:
     """Messages about a study, and the outcome of a question if one is finished."""
 
     words: str
-    given: Outcome | None = None
+    outcome: Outcome | None = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class BatchRecord:
         self._asked = asked
         self._root = options.out or RESULTS
         self._check()
-        self._answers: list[list[Outcome]] = [[] for _ in asked]
+        self._outcomes: list[list[Outcome]] = [[] for _ in asked]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
@@ -92,15 +92,15 @@ class BatchRecord:
             if self.options.report:
                 check_marked(self._root / pages.INDEX, PAGE)
 
-    def missing(self, number: int, given: Outcome) -> None:
+    def missing(self, number: int, outcome: Outcome) -> None:
         """Record a study that could not be read, or whose process was killed."""
-        self._answers[number].append(given)
+        self._outcomes[number].append(outcome)
         self._left -= 1
         self.stopped |= self.options.fail_fast
         if self.options.report and self.several:
             from mechdesign.report.page.page import Entry
 
-            self._entries[number] = Entry(given.study, given.study, [], failed=given.failed)
+            self._entries[number] = Entry(outcome.study, outcome.study, [], failed=outcome.failed)
 
     def begin(self, tasks: Sequence[Task]) -> None:
         """Start with the tasks."""
@@ -116,10 +116,10 @@ class BatchRecord:
             great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
             note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
         self._words[index].append(note.words)
-        if note.given is not None:
-            self._answers[task.number].append(note.given)
-            self.live_table.done(index, note.given)
-            self.stopped |= self.options.fail_fast and note.given.exit_code > 0
+        if note.outcome is not None:
+            self._outcomes[task.number].append(note.outcome)
+            self.live_table.done(index, note.outcome)
+            self.stopped |= self.options.fail_fast and note.outcome.exit_code > 0
         if index == self._first:
             self._say()
 
@@ -133,9 +133,9 @@ class BatchRecord:
         if end is None:
             if not self.stopped:
                 with redirect_stderr(io.StringIO()) as words:
-                    given = failure(self._tasks[index].label, _LOST, Path(), LostWorkerError(_KILLED))
+                    outcome = failure(self._tasks[index].label, _LOST, Path(), LostWorkerError(_KILLED))
                 self._words[index].append(words.getvalue())
-                self.missing(number, given)
+                self.missing(number, outcome)
         else:
             self._exit_code = max(self._exit_code, end.exit_code)
             self._left -= not end.interrupted
@@ -155,16 +155,16 @@ class BatchRecord:
         """Show the outcomes, write summary, JUnit file and index, and return the exit code."""
         options = self.options
         ended = [Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted")] if self.interrupted else []
-        answers = [*(given for study in self._answers for given in study), *ended]
-        lost = f"; {self._left} of {len(self._answers)} studies were not answered" if self.several else ""
+        outcomes = [*(outcome for study in self._outcomes for outcome in study), *ended]
+        lost = f"; {self._left} of {len(self._outcomes)} studies were not answered" if self.several else ""
         if self.interrupted:
             terminal.say(f"interrupted; what was finished is whole{lost}")
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
             self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.mark(options.junit))
-        table = summary.summary(answers)
-        if self.several and any(given.written for given in answers):
+        table = summary.summary(outcomes)
+        if self.several and any(outcome.written for outcome in outcomes):
             self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)
         terminal.show(table, as_json=options.json)
         if any(entry.link for entry in self._entries.values()):
@@ -173,21 +173,21 @@ class BatchRecord:
             path = self._root / pages.INDEX
             if self._file(path, index([entry for _, entry in sorted(self._entries.items())]), PAGE):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
-        told = [summary.in_brief(given) for given in answers if given.command and given.exit_code]
+        told = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
         if len(table) > 1 and told:
             terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
-        return max(self._exit_code, *(given.exit_code for given in answers))
+        return max(self._exit_code, *(outcome.exit_code for outcome in outcomes))
 
     def _with_left(self) -> Iterator[Outcome]:
         """Outcomes in the order of the studies, with those of questions that were not reached."""
         tasks = {task.number: task for task in self._tasks}
-        for number, (path, answers) in enumerate(zip(self._asked, self._answers, strict=True)):
-            yield from answers
-            told = {given.command for given in answers}
+        for number, (path, outcomes) in enumerate(zip(self._asked, self._outcomes, strict=True)):
+            yield from outcomes
+            told = {outcome.command for outcome in outcomes}
             if (task := tasks.get(number)) is not None:
                 left = [command for command, _ in task.questions if not {command, _LOST} & told]
             else:
-                left = [] if answers else ["check"]
+                left = [] if outcomes else ["check"]
             label = name_of(path) if task is None else task.label
             yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
 

@@ -299,31 +299,31 @@ def _journal(study: Study, command: str, directory: Path, options: Options) -> J
     return journal
 
 
-def tell(given: Outcome, study: Study, options: Options) -> None:
+def tell(outcome: Outcome, study: Study, options: Options) -> None:
     """Report an outcome on stderr and to GitHub; with --quiet only failures and requirements that are not met."""
-    who = f"{given.study}: {given.command}:"
-    for warning in given.warnings:
+    who = f"{outcome.study}: {outcome.command}:"
+    for warning in outcome.warnings:
         terminal.say(f"{who} warning: {warning} [{warning.kind}]", quiet=options.quiet)
-    for verdict in given.verdicts:
+    for verdict in outcome.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
-    if given.command == SWEEP.name and given.table is not None and (best := best_of(given.table)) is not None:
+    if outcome.command == SWEEP.name and outcome.table is not None and (best := best_of(outcome.table)) is not None:
         terminal.say(f"{who} {best}", quiet=options.quiet)
-    if given.failed:
+    if outcome.failed:
         from mechdesign.cli.docs import look_up
 
-        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}".rstrip("\n"))
-        annotate("error", of_error(AssemblyError(given.failed), "", study))
-    annotate("error", of_verdicts(study, given.command, given.verdicts))
-    annotate("warning", of_warnings(study, given.command, given.warnings))
-    if given.shard:
-        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        terminal.say(f"{who} {outcome.failed}\n{look_up(outcome.failed)}".rstrip("\n"))
+        annotate("error", of_error(AssemblyError(outcome.failed), "", study))
+    annotate("error", of_verdicts(study, outcome.command, outcome.verdicts))
+    annotate("warning", of_warnings(study, outcome.command, outcome.warnings))
+    if outcome.shard:
+        terminal.say(f"{who} {outcome.shard}", quiet=options.quiet)
         return
-    kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
+    kept = "; they are whole, and not computed again" if outcome.kept else ""
+    terminal.say(f"{who} {counted(outcome.rows, 'row')} in {outcome.directory}{kept}", quiet=options.quiet)
 
 
 def write_report(
-    directory: Path, study: Study, answers: Sequence[Outcome], options: Options, left: Sequence[str] = ()
+    directory: Path, study: Study, outcomes: Sequence[Outcome], options: Options, left: Sequence[str] = ()
 ) -> None:
     """Write a study's report from the files of its questions; `left` are questions that were not answered.
 
@@ -335,12 +335,14 @@ def write_report(
     from mechdesign.report.page import page
 
     told = []
-    for given in answers:
-        path = given.directory / pages.SECTION
-        part = json.loads(path.read_text(encoding="utf-8")) if given.written and path.exists() else None
-        told.append(page.Answered(given.command, given.word, given.exit_code, given.failed, given.verdicts, part))
+    for outcome in outcomes:
+        path = outcome.directory / pages.SECTION
+        part = json.loads(path.read_text(encoding="utf-8")) if outcome.written and path.exists() else None
+        told.append(
+            page.Answered(outcome.command, outcome.word, outcome.exit_code, outcome.failed, outcome.verdicts, part)
+        )
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
-    below = any(given.directory != directory for given in answers)
+    below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
@@ -360,17 +362,17 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
     directory = place(folder(study, command, options), options)
     with owned(directory):
         try:
-            given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
+            outcome = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
         except Interrupted as error:
             if options.report:
                 write_report(directory, study, [interrupted(study, command, directory, error)], options)
             raise
         if options.report:
-            write_report(directory, study, [given], options)
-    if given.shard:
-        tell(given, study, options)
-        return given
-    assert given.table is not None
-    terminal.show(given.table, as_json=options.json, rest=directory / f"{given.table.name}.csv")
-    tell(given, study, options)
-    return given
+            write_report(directory, study, [outcome], options)
+    if outcome.shard:
+        tell(outcome, study, options)
+        return outcome
+    assert outcome.table is not None
+    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv")
+    tell(outcome, study, options)
+    return outcome

@@ -104,10 +104,10 @@ class LiveTable:
         self._under_way[index] = since, how
         self.show()
 
-    def done(self, index: int, given: Outcome) -> None:
+    def done(self, index: int, outcome: Outcome) -> None:
         """Record the outcome of a study's question."""
         self._under_way.pop(index, None)
-        (self._failed if given.exit_code else self._last).append(given)
+        (self._failed if outcome.exit_code else self._last).append(outcome)
         self.show()
 
     def end(self, index: int) -> None:
@@ -157,14 +157,14 @@ class LiveTable:
         room = max(1, self._live.console.height - 3 - len(self._under_way))
         failed = self._failed[-room:]
         last = [*self._last][len(failed) - room :] if room > len(failed) else []
-        for given in (*failed, *last):
-            word = Text(given.word, style="red" if given.exit_code else "green")
-            grid.add_row(Text(given.study), given.command, word, f"{given.seconds:.1f}")
+        for outcome in (*failed, *last):
+            word = Text(outcome.word, style="red" if outcome.exit_code else "green")
+            grid.add_row(Text(outcome.study), outcome.command, word, f"{outcome.seconds:.1f}")
         for index, (since, how) in sorted(self._under_way.items()):
             bar = Grid.grid(padding=(0, 1))
             bar.add_row(how.stage, ProgressBar(how.total, min(how.done, how.total), width=_WIDTH))
-            outcome = bar if how.total else Text("under way", style="dim")
-            grid.add_row(Text(self._labels[index]), how.command, outcome, f"{time.monotonic() - since:.1f}")
+            state = bar if how.total else Text("under way", style="dim")
+            grid.add_row(Text(self._labels[index]), how.command, state, f"{time.monotonic() - since:.1f}")
         hidden = len(self._failed) - len(failed)
         told = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
         if self._failed:

@@ -88,21 +88,21 @@ def _as_typed(error: StudyError) -> StudyError:
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
-    given, label = None, name_of(path)
+    outcome, label = None, name_of(path)
     if options.junit is not None:
         check_marked(options.junit, mark(options.junit))
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
-        given = ask("sweep", path, replace(options, overrides=changes))
-        return given.exit_code
+        outcome = ask("sweep", path, replace(options, overrides=changes))
+        return outcome.exit_code
     except KeyboardInterrupt as stop:
         words = str(stop) or "interrupted"
-        given = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
+        outcome = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
         raise
     except Exception as wrong:
         error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
-        given = failure(label, "sweep", Path(), error)
-        return given.exit_code
+        outcome = failure(label, "sweep", Path(), error)
+        return outcome.exit_code
     finally:
-        if options.junit is not None and given is not None:
-            write_file(options.junit, junit([given]).encode(), mark(options.junit))
+        if options.junit is not None and outcome is not None:
+            write_file(options.junit, junit([outcome]).encode(), mark(options.junit))
