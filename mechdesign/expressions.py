@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from typing import Any, Literal
 
@@ -40,7 +41,7 @@ class ExpressionError(ValueError):
 
 @dataclass(frozen=True)
 class _Function:
-    """A function of the language, what it is, and its partial derivatives, on floats and arrays."""
+    """A function of the language: its meaning, its value and its partial derivatives, on floats and arrays."""
 
     meaning: str
     value: Callable[..., Any]
@@ -105,7 +106,7 @@ _FUNCTIONS: dict[str, _Function] = {
     "negate": _Function("negative", np.negative, lambda x: (-1.0,)),
 }
 _BINDING = {"+": 10, "-": 10, "*": 20, "/": 20, "**": 40}
-# Functions whose value repeats, and after how many turns.
+# Functions whose value has a period, in turns.
 _TURNS = {"atan2": 1.0, "atan": 0.5}
 _OF_TWO = frozenset(("atan2", "hypot", "min", "max", *_BINDING))
 _UNARY_BINDING = 30
@@ -115,7 +116,7 @@ FUNCTIONS = frozenset(name for name in _FUNCTIONS if name.isalnum() and name != 
 CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
 """Values and meanings of the constants that an expression may name."""
 RESERVED = FUNCTIONS | CONSTANTS.keys()
-"""Names that a parameter cannot bear."""
+"""Names that no parameter can have."""
 
 _Step = tuple[Literal["constant", "name", "call"], float | str]
 
@@ -126,8 +127,7 @@ class Expression:
 
     text: str
     program: tuple[_Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
-    angle_unit: float  # radians in one of the units that trigonometry takes and gives
-    names: frozenset[str]  # variables, dotted ones (``B.x``) included
+    angle_unit: float = 1.0  # radians in one of the units that trigonometry takes and gives
 
     @classmethod
     def parse(cls, text: str, angle_unit: float = 1.0) -> Expression:
@@ -136,11 +136,14 @@ class Expression:
         Raises
         ------
         ExpressionError
-            Where the text is not an expression; the message tells what is wrong with it.
+            If the text is no expression; the message says what is wrong.
         """
-        program = _Parser(text).parse()
-        names = frozenset(str(item) for kind, item in program if kind == "name")
-        return cls(text, program, angle_unit, names)
+        return cls(text, _Parser(text).parse(), angle_unit)
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names of the variables, dotted ones (``B.x``) included."""
+        return frozenset(str(item) for kind, item in self.program if kind == "name")
 
     def evaluate(self, env: Mapping[str, ArrayLike]) -> Number:
         """Value with the variables of `env`, which broadcast against each other.
@@ -149,7 +152,7 @@ class Expression:
         nan or inf there.
         """
         result: Number = self._run(float, lambda name: self._variable(env, name), self._apply)
-        # Where a variable is nan its own mistake has been reported.
+        # A variable that is nan has its own message already.
         if type(result) is float and not math.isfinite(result) and not any(np.isnan(env[n]).any() for n in self.names):
             raise ExpressionError(f"{self.text!r} has no finite value: a division by zero, or too large a power")
         return result
@@ -162,7 +165,7 @@ class Expression:
         return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
 
     def is_linear(self) -> bool:
-        """Whether the derivatives are the same everywhere, as the form shows."""
+        """Whether the expression is linear in its variables, judged by its form."""
 
         def degree(function: str, inner: list[int]) -> int:
             if function in ("+", "-", "negate"):
@@ -172,18 +175,18 @@ class Expression:
             # A quotient by a constant is linear; all else of a variable counts as not.
             return inner[0] if function == "/" and not inner[1] else 2 * max(inner)
 
-        found: int = self._run(lambda value: 0, lambda name: 1, degree)
-        return found <= 1
+        highest: int = self._run(lambda value: 0, lambda name: 1, degree)
+        return highest <= 1
 
     def is_angle(self, quantities: Mapping[str, str]) -> bool:
-        """Whether the value is an angle, by the quantities of variables: one, or a sum of whole multiples of some.
+        """Whether the value is an angle, by the quantities of the variables: a sum of whole multiples of angles.
 
-        Other variables are numbers. A bare number beside an angle is one in the same unit. Any other multiple may be
-        an arc as well.
+        Variables without a quantity are numbers. A number added to an angle is an angle in the same unit. Other
+        multiples of an angle may be arcs, and do not count.
         """
 
         def kind(function: str, inner: list[str]) -> str:
-            """``angle``, ``whole`` or other ``number``, or ``other``: nothing that may stand beside an angle."""
+            """``angle``, ``whole`` for a whole number, ``number``, or ``other``, which cannot be added to an angle."""
             if _FUNCTIONS[function].angles == "gives":
                 return "angle"
             if "angle" not in inner:
@@ -208,47 +211,39 @@ class Expression:
         return bool(self._run(constant, variable, kind) == "angle")
 
     def substituted(self, values: Mapping[str, Expression | float]) -> Expression:
-        """The expression with others, or numbers, in place of its variables; trigonometry has their angle unit."""
-        given = {name: value for name, value in values.items() if isinstance(value, Expression)}
-        parts: dict[str, tuple[_Step, ...]] = {
-            name: value.program if isinstance(value, Expression) else (("constant", value),)
-            for name, value in values.items()
-        }  # fmt: skip
-        program = tuple(
-            chain.from_iterable(parts[str(item)] if kind == "name" else ((kind, item),) for kind, item in self.program)
-        )
-        names = frozenset(str(item) for kind, item in program if kind == "name")
-        unit = next((each.angle_unit for each in given.values()), self.angle_unit)
-        return Expression(self.text, program, unit, names)
+        """The expression with expressions or numbers in place of its variables; it takes the angle unit of these."""
+        units = [value.angle_unit for value in values.values() if isinstance(value, Expression)]
+
+        def variable(name: str) -> tuple[_Step, ...]:
+            value = values[name]
+            return value.program if isinstance(value, Expression) else (("constant", value),)
+
+        program = self._run(_constant_step, variable, _call_steps)
+        return Expression(self.text, program, next(iter(units), self.angle_unit))
 
     def turning(self, name: str) -> tuple[Expression, dict[str, tuple[Expression, float]]]:
-        """The expression with variables in place of its arctangents, and these, each with the turn after it repeats.
+        """The expression with variables in place of its arctangents, and these with their periods in turns.
 
-        An arctangent jumps where a direction passes half a turn, or a line a quarter; as a variable it can be followed.
-        `name` begins the names of the variables.
+        `atan2` jumps at half a turn and `atan` at a quarter; as a variable the angle can be followed without jumps.
+        The names of the variables are `name:0`, `name:1` and so on.
         """
-        found: dict[str, tuple[Expression, float]] = {}
-        stack: list[tuple[_Step, ...]] = []
-        for step in self.program:
-            kind, item = step
-            if kind != "call":
-                stack.append((step,))
-                continue
-            count = arity(str(item))
-            program = (*chain.from_iterable(stack[-count:]), step)
-            if item in _TURNS:
-                variable = f"{name}:{len(found)}"
-                names = frozenset(str(part) for what, part in program if what == "name")
-                found[variable] = Expression(self.text, program, self.angle_unit, names), _TURNS[str(item)]
-                program = (("name", variable),)
-            stack[-count:] = [program]
-        names = frozenset(str(part) for what, part in stack[0] if what == "name")
-        return Expression(self.text, stack[0], self.angle_unit, names), found
+        arctangents: dict[str, tuple[Expression, float]] = {}
+
+        def call(function: str, inner: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+            program = _call_steps(function, inner)
+            if function not in _TURNS:
+                return program
+            variable = f"{name}:{len(arctangents)}"
+            arctangents[variable] = replace(self, program=program), _TURNS[function]
+            return (("name", variable),)
+
+        program = self._run(_constant_step, lambda variable: (("name", variable),), call)
+        return replace(self, program=program), arctangents
 
     def _run(
         self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]
     ) -> Any:
-        """What the program leaves on the stack, where constants, variables and calls mean these."""
+        """Result of the program, with the meanings of constants, variables and calls that are passed."""
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
@@ -297,16 +292,25 @@ class Expression:
         return inner, outer
 
 
+def _constant_step(value: float) -> tuple[_Step, ...]:
+    return (("constant", value),)
+
+
+def _call_steps(function: str, arguments: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+    """The program of a call from those of its arguments."""
+    return (*chain.from_iterable(arguments), ("call", function))
+
+
 def meanings() -> dict[str, tuple[str, str]]:
-    """Functions, operators and constants by name: how each is written, and what it is."""
-    found = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
+    """Functions, operators and constants by name: how each is written, and its meaning."""
+    entries = {name: (name, meaning) for name, (_, meaning) in CONSTANTS.items()}
     turn = {"takes": "; the angle is in the study's unit", "gives": ", in the study's unit", "": ""}
     for name, function in _FUNCTIONS.items():
         call = "(y, x)" if name == "atan2" else "(x, y)" if arity(name) == 2 else "(x)"
         written = f"{name}{call}" if name in FUNCTIONS else f"x {name} y"
         if name != "negate":
-            found[name] = (written, function.meaning + turn[function.angles])
-    return found
+            entries[name] = (written, function.meaning + turn[function.angles])
+    return entries
 
 
 def arity(name: str) -> int:
@@ -407,8 +411,8 @@ class _Parser:
 
     def _call(self, name: str) -> None:
         if name not in FUNCTIONS:
-            known = ", ".join(sorted(FUNCTIONS))
-            raise ExpressionError(f"unknown function {name!r}; the functions are {known}")
+            names = ", ".join(sorted(FUNCTIONS))
+            raise ExpressionError(f"unknown function {name!r}; the functions are {names}")
         self._operand_chain(0)
         count = 1
         while self._take(","):
@@ -421,9 +425,9 @@ class _Parser:
             if count == 1:
                 raise ExpressionError(f"{name} compares two numbers or more")
             return
-        wanted = arity(name)
-        if count != wanted:
-            raise ExpressionError(f"{name} takes {wanted} number{'s' * (wanted > 1)}, not {count}")
+        arguments = arity(name)
+        if count != arguments:
+            raise ExpressionError(f"{name} takes {arguments} number{'s' * (arguments > 1)}, not {count}")
         self.program.append(("call", name))
 
     def _close(self) -> None:

@@ -1,4 +1,4 @@
-"""Columns of results by name, and the rows that count: what requirements, goals and conditions judge."""
+"""Columns of results by name, and which rows of them count: what requirements, goals and conditions judge."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ HELP_PAGE = "reference/study/requirements"
 
 # Number of a column's values that a message names.
 MOST_VALUES = 12
-# In the meaning of a column whose rows have units of their own: they stand in the table's column `unit`.
+# Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.
 IN_UNIT = "in `unit`"
 # Number of rows that a message names.
 MOST_ROWS = 8
 
 
 class UnknownColumnError(Exception):
-    """A column that the result has not, one of words, or of rows that cannot be compared with each other."""
+    """A column that the result does not have, that holds words, or whose rows have different units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,21 +37,21 @@ class Chosen:
     column: str
     values: Floats  # all rows; absolute values where these are judged
     counts: Flags  # which rows count
-    missing: str = ""  # where none counts because the table never has what was asked for: what it has instead
-    statistic: str = ""  # what is told of them, a word of `STATISTICS`
-    part: Part = ()  # where columns lie in the part of a motion that counts
+    missing: str = ""  # where the table never has the rows that `where` names: why, and which it has
+    statistic: str = ""  # number that is taken of the rows, a word of `STATISTICS`; empty for the one row itself
+    part: Part = ()  # part of a motion that counts: columns, and the interval in which each lies
     name: str = ""  # as the study may name it: command, table and row, without the statistic
-    picked: bool = False  # whether rows are picked by the values of columns, so that what is between them is not meant
+    picked: bool = False  # whether `where` picks single rows: then the motion between the rows does not count
 
     @property
     def unit(self) -> str:
-        """Unit of the rows that count, or of what is told of them."""
+        """Unit of the rows that count, or of their statistic."""
         pure = self.statistic and STATISTICS[self.statistic].pure
         return "" if pure else unit_of(self.table, self.column, self.counts)
 
     @property
     def parts(self) -> tuple[Chosen, ...]:
-        """What it is of, as of a sum."""
+        """The columns that it is made from: itself. A `Sum` has one for each term."""
         return (self,)
 
     @cached_property
@@ -62,11 +62,11 @@ class Chosen:
 
     @property
     def asked(self) -> Asked:
-        """What is asked of the column between the rows."""
+        """What has to be known of the column between the rows."""
         return Asked(self.column, self.part, bool(self.statistic) and STATISTICS[self.statistic].integral)
 
     def shaped(self, designs: int, *, assembled: bool = False) -> tuple[Floats, Flags]:
-        """Values, and which of them count (of those alone that are assembled), of several designs: (designs, rows)."""
+        """Values of several designs, shape (designs, rows), and which count; `assembled`: only assembled poses do."""
         shape, counts = (designs, len(self.values) // designs), self.counts
         if assembled and "valid" in self.table:
             counts = counts & self.table["valid"].astype(bool)
@@ -75,8 +75,8 @@ class Chosen:
     def numbers(self, designs: int = 1, *, assembled: bool = False) -> Floats:
         """The one number of each design, shape (designs,): its statistic, or the row that counts.
 
-        Along a motion that is followed the statistic is that of the motion between the rows, too. It is nan where none
-        counts, and where a row that counts has no value.
+        Along a motion that is followed the statistic is that of the whole motion, not of its rows alone. It is nan
+        where no row counts, and where a row that counts has no value.
 
         Raises
         ------
@@ -119,15 +119,15 @@ class Span(Protocol):
     """Values from one to another, such as `mechdesign.study.schema.optimize.Span`."""
 
     def interval(self, unit: str) -> Interval:
-        """The values in a unit of a table; raises ValueError where it is of another kind."""
+        """The values in a unit of a table; raises ValueError if it is another kind of quantity."""
 
 
 @runtime_checkable
 class Measured(Protocol):
-    """A number with a unit of its own, such as `mechdesign.study.text.units.Amount`."""
+    """A number with a unit, such as `mechdesign.study.text.units.Amount`."""
 
     def within(self, unit: str) -> float:
-        """The number in a unit of a table; raises ValueError where it is of another kind."""
+        """The number in a unit of a table; raises ValueError if it is another kind of quantity."""
 
 
 def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: bool = False) -> Chosen:
@@ -156,17 +156,17 @@ def choose(result: Result, path: str, where: Mapping[str, Any], *, absolute: boo
             f"column {column!r} of {table.name} holds words, which cannot be compared with a number"
         )
     where, part = dict(where), list[tuple[str, Interval]]()
-    for name, wanted in where.items():
+    for name, value in where.items():
         if name not in table:
-            several = isinstance(wanted, Span) and table.name == "extremes"
-            told = "; name what is told of a column itself, as in kinematics.C.x.range" * several
-            raise UnknownColumnError(_unknown("where", name, table.names) + told)
-        if isinstance(wanted, Span):
-            part.append((name, _interval(wanted, table, name, counts)))
+            several = isinstance(value, Span) and table.name == "extremes"
+            hint = "; name what is told of a column itself, as in kinematics.C.x.range" * several
+            raise UnknownColumnError(_unknown("where", name, table.names) + hint)
+        if isinstance(value, Span):
+            part.append((name, _interval(value, table, name, counts)))
             counts = counts & part[-1][1].holds(table[name].astype(float))
             continue
-        if table.column(name).numeric and isinstance(wanted, Measured):
-            where[name] = in_unit(wanted, table, name, counts)
+        if table.column(name).numeric and isinstance(value, Measured):
+            where[name] = in_unit(value, table, name, counts)
         counts = counts & _equal(table[name], where[name])
     _one_unit(table, column, counts)
     numbers = values.astype(float)
@@ -196,14 +196,14 @@ def named(result: Result, path: str) -> tuple[str, str]:
 
 
 def unit_of(table: Table, name: str, rows: Flags) -> str:
-    """Unit of a column in some rows, which have one: their own, where the column's meaning says so."""
+    """Unit of a column in some rows, all of one unit: that of the column, or where its meaning says so, of the rows."""
     column = table.column(name)
     own = IN_UNIT in column.meaning and "unit" in table and rows.any()
     return str(table["unit"][rows.argmax()]) if own else column.unit
 
 
 def in_unit(value: Any, table: Table, name: str, rows: Flags | None = None) -> float:
-    """A number in the unit of a column in some rows, or all; a bare one is in it already.
+    """A number in the unit that a column has in some rows, or in all; a bare number is in that unit already.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def in_unit(value: Any, table: Table, name: str, rows: Flags | None = None) -> f
 
 
 def amount_in(value: Any, what: str, unit: str) -> float:
-    """A number in a unit; a bare one is in it already. Raises UnknownColumnError if it is of another kind."""
+    """A number in a unit, which a bare number has already; raises UnknownColumnError if the kinds differ."""
     try:
         return value.within(unit) if isinstance(value, Measured) else float(value)
     except ValueError as error:
@@ -225,7 +225,7 @@ def amount_in(value: Any, what: str, unit: str) -> float:
 
 
 def _interval(span: Span, table: Table, name: str, rows: Flags) -> Interval:
-    """A span in the unit of a column in some rows, which must have one."""
+    """A span in the unit that a column has in some rows, the same in all of them."""
     if not table.column(name).numeric:
         raise UnknownColumnError(f"where: column {name!r} of {table.name} holds words, which have no range")
     _one_unit(table, name, rows)
@@ -236,17 +236,17 @@ def _interval(span: Span, table: Table, name: str, rows: Flags) -> Interval:
 
 
 def _one_unit(table: Table, column: str, counts: Flags) -> None:
-    """Check that the rows that count can be compared: that they are not millimetres and degrees."""
+    """Check that the rows that count have one unit, not millimetres and degrees."""
     if IN_UNIT not in table.column(column).meaning or "unit" not in table:
         return
     units = np.asarray(table["unit"])[counts]
     if len(set(units.tolist())) < 2:
         return
-    named = [each for each in table.columns if not each.numeric and each.name != "unit"]
-    pairs = {each.name: dict.fromkeys(zip(each.values[counts].tolist(), units.tolist(), strict=True)) for each in named}
+    named = [other for other in table.columns if not other.numeric and other.name != "unit"]
+    pairs = {other.name: dict.fromkeys(zip(other.values[counts], units.tolist(), strict=True)) for other in named}
     # The column of words that distinguishes the rows of one unit from those of another.
-    telling = [name for name, found in pairs.items() if len({word for word, _ in found}) == len(found)]
-    words = telling[0] if telling else named[0].name
+    distinct = [name for name, own in pairs.items() if len({word for word, _ in own}) == len(own)]
+    words = distinct[0] if distinct else named[0].name
     rows = [f"{word} ({unit or 'no unit'})" for word, unit in pairs[words]]
     listed = ", ".join(rows[:MOST_ROWS]) + ", ..." * (len(rows) > MOST_ROWS)
     raise UnknownColumnError(
@@ -256,21 +256,22 @@ def _one_unit(table: Table, column: str, counts: Flags) -> None:
 
 
 def located(result: Result, path: str) -> tuple[Table, str, Flags]:
-    """The table and the column that a path names, and which rows; see `choose`."""
-    if (found := _found(result, path)) is not None:
-        return found
+    """The table, the column and the rows that a path names; see `choose`."""
+    if (place := _found(result, path)) is not None:
+        return place
     for absent in result.absent:
         if absent in path.split("."):
             raise UnknownColumnError(_why_absent(result, absent))
-    known = [column for table in result.tables.values() for column in table.names]
-    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, known))
+    names = [column for table in result.tables.values() for column in table.names]
+    raise UnknownColumnError(_unknown(f"the result of {result.command}", path, names))
 
 
 def _found(result: Result, path: str) -> tuple[Table, str, Flags] | None:
     """What `located` gives; None where there is no such column."""
     name, _, rest = path.partition(".")
     named = result.tables.get(name)
-    for table, column in (*((each, path) for each in result.tables.values()), *([(named, rest)] if named else [])):
+    places = [(table, path) for table in result.tables.values()] + ([(named, rest)] if named else [])
+    for table, column in places:
         if column in table:
             return table, column, np.ones(len(table), dtype=bool)
     if named is not None:
@@ -286,42 +287,42 @@ def _why_absent(result: Result, name: str) -> str:
     return f"{result.command} has no {name}: {result.absent[name]}"
 
 
-def _unknown(where: str, name: str, known: Iterable[str]) -> str:
-    names = list(dict.fromkeys(known))
+def _unknown(where: str, name: str, columns: Iterable[str]) -> str:
+    names = list(dict.fromkeys(columns))
     hint = suggestion(name, names) or f"; it has {', '.join(names)}"
     return f"{where}: no column {name!r}{hint}"
 
 
 def _missing(table: Table, rows: Flags, where: Mapping[str, Any]) -> str:
-    """Why none of some rows is one of `where`; nothing where that only hangs on how it came out (valid or not)."""
-    named = {name: wanted for name, wanted in where.items() if table[name].dtype.kind != "b"}
+    """Why no row has the values of `where`; empty where a row might have them in another run, such as a valid pose."""
+    stated = {name: value for name, value in where.items() if table[name].dtype.kind != "b"}
     together = rows
-    for name, wanted in named.items() if rows.any() else ():
-        equal = _equal(table[name], wanted)
+    for name, value in stated.items() if rows.any() else ():
+        equal = _equal(table[name], value)
         if not (rows & equal).any():
-            return f"no row of {table.name} has {name} {wanted}; {_present(table[name][rows], wanted)}"
+            return f"no row of {table.name} has {name} {value}; {_present(table[name][rows], value)}"
         together = together & equal
-    words = ", ".join(f"{name} {wanted}" for name, wanted in named.items())
+    words = ", ".join(f"{name} {value}" for name, value in stated.items())
     return f"no row of {table.name} has {words} at once" if rows.any() and not together.any() else ""
 
 
-def _present(values: NDArray[Any], wanted: object) -> str:
-    """The values of a column in words: all of few, the ends and the nearest of many numbers."""
+def _present(values: NDArray[Any], stated: object) -> str:
+    """The values of a column in words: all of them, or of many numbers the smallest, the largest and the nearest."""
     number = values.dtype.kind in "fiub"
-    known = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
-    if not number and (close := nearest(str(wanted), known)):
+    present = list(dict.fromkeys((values[np.isfinite(values)] if number else values).tolist()))
+    if not number and (close := nearest(str(stated), present)):
         return f"did you mean {close!r}?"
-    if number and len(known) > MOST_VALUES and isinstance(wanted, (int, float)):
-        beside = min(known, key=lambda value: abs(value - wanted))
-        return f"there are {min(known):.12g} to {max(known):.12g}, {beside:.12g} the nearest"
-    shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in known[:MOST_VALUES]]
-    rest = ", ..." * (len(known) > MOST_VALUES)
-    return f"there {'is' if len(known) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"
+    if number and len(present) > MOST_VALUES and isinstance(stated, (int, float)):
+        beside = min(present, key=lambda value: abs(value - stated))
+        return f"there are {min(present):.12g} to {max(present):.12g}, {beside:.12g} the nearest"
+    shown = [f"{value:.12g}" if isinstance(value, float) else str(value) for value in present[:MOST_VALUES]]
+    rest = ", ..." * (len(present) > MOST_VALUES)
+    return f"there {'is' if len(present) == 1 else 'are'} {', '.join(shown) or 'none'}{rest}"
 
 
-def _equal(values: NDArray[Any], wanted: object) -> Flags:
-    if values.dtype.kind in "fiub" and isinstance(wanted, (int, float)):
-        return np.asarray(np.isclose(values.astype(float), float(wanted), rtol=1e-9, atol=1e-12))
+def _equal(values: NDArray[Any], stated: object) -> Flags:
+    if values.dtype.kind in "fiub" and isinstance(stated, (int, float)):
+        return np.asarray(np.isclose(values.astype(float), float(stated), rtol=1e-9, atol=1e-12))
     if values.dtype.kind == "U":
-        return np.asarray(values == str(wanted))
-    return np.array([str(value) == str(wanted) for value in values.tolist()], dtype=bool)
+        return np.asarray(values == str(stated))
+    return np.array([str(value) == str(stated) for value in values.tolist()], dtype=bool)

@@ -1,4 +1,4 @@
-"""What is told of a quantity in one number, over the rows of a table or along a motion, and the part that counts."""
+"""Statistics of a quantity, over the rows of a table or along a motion or a part of it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
 
-# Values of rows so far beyond an end of an interval, as a part of the end (or of a turn), are at it.
+# Values this little beyond an end of an interval, as a part of the end (or of a turn), count as inside.
 AT_END = 1e-9
 
 
@@ -28,7 +28,7 @@ class Spread(Protocol):
 
 
 class Statistic(NamedTuple):
-    """A number that is told of values.
+    """A number that describes many values, such as their mean.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class Statistic(NamedTuple):
     of : callable
         The number of each design.
     pure : bool
-        Whether it has no unit; else that of the values.
+        Whether it has no unit; else it has that of the values.
     integral : bool
-        Whether it has a mean in it.
+        Whether it contains a mean, which is an integral along a motion.
     """
 
     meaning: str
@@ -61,13 +61,13 @@ STATISTICS: Mapping[str, Statistic] = {
     "peak": Statistic("largest absolute value", lambda values: np.maximum(values.end(1), -values.end(-1))),
     "evenness": Statistic("1 less the range over the mean absolute value", _evenness, pure=True, integral=True),
 }
-"""What is told of a column, by the word behind its name.
+"""Statistics by the word behind the name of a column.
 
-The evenness is 1 less the coefficient of fluctuation, which of a speed is its range over its mean (Norton, Design of
-Machinery; Shigley's Mechanical Engineering Design, both in the chapter on flywheels). Of what changes its sign the mean
-of the absolute values stands below, as the mean may be zero.
+The evenness is 1 less the coefficient of fluctuation, the range of a speed over its mean (Norton, Design of Machinery;
+Shigley's Mechanical Engineering Design, both in the chapter on flywheels). The divisor is the mean of the absolute
+values, as the mean of a quantity that changes its sign may be zero.
 """
-# Which statistic is the worst value where the largest one is, and where the smallest one is.
+# Statistics that are the worst value where larger is worse (True), and where smaller is worse (False).
 WORST: Mapping[bool, frozenset[str]] = {True: frozenset(("", "max", "peak")), False: frozenset(("", "min"))}
 
 
@@ -103,22 +103,22 @@ class RowSpread:
 
 
 def worst(values: Floats, counts: Flags, *, largest: bool) -> Floats:
-    """The smallest or largest of the rows that count, along the last axis; nan where one is nan or none counts."""
+    """The smallest or largest of the rows that count, along the last axis; nan if one is nan or none counts."""
     none = -np.inf if largest else np.inf
     inside = np.where(counts, values, none)
-    found = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
-    return np.where(counts.any(axis=-1), found, np.nan)
+    value = inside.max(axis=-1, initial=none) if largest else inside.min(axis=-1, initial=none)
+    return np.where(counts.any(axis=-1), value, np.nan)
 
 
 class Interval(NamedTuple):
-    """Values from one to another, in the unit of a column; of an angle whole turns aside, where `turn` is not 0."""
+    """Values from `low` to `high` in the unit of a column; whole turns do not count for an angle with a `turn`."""
 
     low: float = -np.inf
     high: float = np.inf
     turn: float = 0.0
 
     def holds(self, values: Floats) -> Flags:
-        """Which values lie in it, but for rounding; nan does not."""
+        """Which values lie in it, within rounding; nan does not."""
         if self.turn:
             slack = AT_END * self.turn
             return np.asarray((values - self.low + slack) % self.turn <= (self.high - self.low) % self.turn + 2 * slack)
@@ -126,19 +126,19 @@ class Interval(NamedTuple):
         return np.asarray((values >= low) & (values <= high))
 
     def over(self, values: Floats) -> list[Floats]:
-        """Functions of the values that cross zero where they pass an end of it."""
+        """Functions of the values that cross zero where the values pass an end of the interval."""
         ends = [end for end in (self.low, self.high) if np.isfinite(end)]
         return [np.sin(np.pi * (values - end) / self.turn) if self.turn else values - end for end in ends]
 
 
-# Columns of a motion, and where these lie in a part of it.
+# A part of a motion: columns, and the interval in which each lies there.
 Part = tuple[tuple[str, Interval], ...]
 
 
 class Asked(NamedTuple):
-    """What is asked of a column along a motion: of which part of it, and whether its means are.
+    """A column along a part of a motion, and whether its mean is needed (`integral`).
 
-    `end` is 1 where its largest value alone is asked, -1 where its smallest is, else 0.
+    `end` is 1 if only its largest value is needed, -1 if only its smallest, else 0.
     """
 
     column: str
@@ -148,7 +148,7 @@ class Asked(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The column, and those that bound the part."""
+        """The column, and the columns that bound the part."""
         return (self.column, *(name for name, _ in self.part))
 
 
@@ -169,7 +169,7 @@ class Course(Spread, Protocol):
         """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
 
     def shown(self, place: float) -> str:
-        """A place of the motion of the first design in words."""
+        """A place of the first design's motion in words."""
 
     def of(self, design: int) -> Course | None:
         """The column along the motion of one of the designs; None where it is not followed."""

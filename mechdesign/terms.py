@@ -1,4 +1,4 @@
-"""Results by name, and sums of them: what is judged of a command's answer."""
+"""Results by name, and sums of them, which requirements and goals judge."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Sum:
 
     @property
     def parts(self) -> tuple[Chosen, ...]:
-        """What it is of."""
+        """The columns that it is made from, one for each term."""
         return (*self.terms.values(),)
 
     @property
     def missing(self) -> str:
-        """Why a term has no rows, where it never has."""
+        """Why a term never has rows; empty where all may have."""
         return next(filter(None, (term.missing for term in self.parts)), "")
 
     def numbers(self, designs: int = 1, *, assembled: bool = False) -> Floats:
@@ -86,7 +86,7 @@ def sum_of(text: str) -> Expression | None:
 
 
 def terms_of(result: Result, path: str, where: Mapping[str, Any]) -> Chosen | Sum:
-    """What a path names: one column, or a sum of numbers of several.
+    """The column that a path names, or the sum of numbers of several columns.
 
     Raises
     ------

@@ -149,7 +149,7 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
         return options
     folders = [root, *sorted(each for each in root.glob("*") if each.is_dir())]
     parts = [path for directory in folders for path in shards.found(directory)]
-    origins = [shards.origin_of(parts[0])] if parts else filter(None, map(manifest.read, folders))
+    origins = [shards.head_of(parts[0])["origin"]] if parts else filter(None, map(manifest.read, folders))
     for origin in origins:
         changes, seed = origin.get("overrides"), origin.get("seed")
         if isinstance(changes, list) and isinstance(seed, int):
@@ -165,11 +165,11 @@ def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tupl
     if options.command != MERGE:
         return found
     if alone := shards.found(root):
-        return ((shards.command_of(alone[0]), root),)
+        return ((shards.head_of(alone[0])["command"], root),)
     if (done := manifest.read(root)) is not None and done.get("command") in QUESTIONS:
         return ((done["command"], root),)
     begun = tuple((command, directory) for command, directory in found if shards.found(directory))
-    given = {shards.command_of(path) for _, directory in begun for path in shards.found(directory)}
+    given = {shards.head_of(path)["command"] for _, directory in begun for path in shards.found(directory)}
     return found if not begun or "run" in given else begun
 
 

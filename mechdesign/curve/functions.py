@@ -18,19 +18,19 @@ from mechdesign.curve.series import EXACT, Series
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Floats, Ints, Lanes
 
-# A function is infinite where its divisor is zero and the product of both is more than this part of its size.
+# A quotient is infinite where its divisor is zero and its numerator is more than this part of its largest value.
 POLE = 1e-9
-# Where its divisor is this part of its size or less, at the end of a piece, it is zero.
+# At the end of a piece a divisor of this part of its largest value or less is zero.
 ZERO = 1e-8
-# At a dead centre, whose place is known to the root of rounding, links lie in line.
+# The same at a dead centre, whose place has half the digits.
 ZERO_AT_FOLD = 1e-4
-# An extreme so near to a pose (in rows) may be that pose.
+# An extreme this near to a pose (in rows) may be at that pose.
 BESIDE_ROW = 1e-4
-# A value of a series that is farther than this part of the function's size from the function is not one of it.
+# A value of the function counts if it is within this part of the function's size from the series.
 TRUE = 1e-7
-# From the first to behind the last of some in order.
+# Sides of `searchsorted`: to the first of equal values, and behind the last.
 _SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
-# A function without a divisor that grows by this factor over its halvings, and goes on to, is infinite.
+# A function without a divisor is infinite if it reaches this multiple of its median on the smallest pieces.
 ENDLESS = 1e4
 
 
@@ -38,7 +38,7 @@ ENDLESS = 1e4
 class Extremes:
     """The smallest and the largest values of functions on each line, arrays of shape (2, functions, lines).
 
-    They are nan where there is none. The places are along the line, in rows.
+    nan where a function has no values. The places are along the line, in rows.
     """
 
     value: Floats
@@ -55,12 +55,12 @@ class Zeros(Lanes):
 
 
 class Functions(Series):
-    """Functions along the motions of a curve; see `Series` of what they are made from."""
+    """Functions along the motions of a curve; see `Series` for the parameters."""
 
     def at_ends(self, names: Sequence[str], line: Ints, place: Floats, x: Ints) -> Floats:
         """Values of functions at ends of motions, shape (names, n): of the pieces that end (`x` 1) or begin (-1) there.
 
-        They are nan where no piece does.
+        nan where no piece does.
         """
         pieces = self.pieces
         piece = np.full(len(line), -1)
@@ -79,12 +79,12 @@ class Functions(Series):
                 np.einsum("fnk,kn->fn", chebyshev.series(table[rows[:, None], piece]), end)
                 for table in (self._table, self._divisor)
             )
-            found = above / below
+            limits = above / below
         places = self.curve.inside(line[lanes], place[lanes])
         shape = len(rows), len(lanes)
         own, which = (part.ravel() for part in np.broadcast_arrays(rows[:, None], line[lanes]))
         table = self.at(line[lanes], places)[rows]
-        values[:, lanes] = self._true(own, which, table.ravel(), found.ravel()).reshape(shape)
+        values[:, lanes] = self._true(own, which, table.ravel(), limits.ravel()).reshape(shape)
         return values
 
     def _rows(self, names: Sequence[str]) -> Ints:
@@ -108,7 +108,7 @@ class Functions(Series):
             return np.asarray(sums / np.where(total > 0, total, np.nan))
 
     def _sizes_of(self, values: Floats, pace: Floats | float, sizes: Floats) -> Floats:
-        """Integrals of absolute values over each piece; `sizes` are those where they do not change their sign."""
+        """Integrals of absolute values over each piece; `sizes` are those of pieces without a change of sign."""
         series = chebyshev.series(values)
         piece, x = chebyshev.zeros(series, chebyshev.turning_points(series))
         of, low, high = between_marks(piece, x, np.unique(piece))
@@ -135,15 +135,15 @@ class Functions(Series):
         return before[piece] - before[first] + part, float(np.sum(chebyshev.remainder(series)))
 
     def extremes(self, names: Sequence[str], still: Floats) -> Extremes:
-        """Smallest and largest values of some functions, the first along the line of those within rounding.
+        """Smallest and largest values of some functions; of equal ones the first along the line.
 
         Parameters
         ----------
         still : ndarray, shape (functions, lines)
-            Their rounding.
+            Values are equal within this difference.
         """
         rows, lines = self._rows(names), self.curve.lines
-        found = np.full((2, 2 * len(rows) * lines), np.nan)
+        table = np.full((2, 2 * len(rows) * lines), np.nan)
         if len(self.pieces.line) and len(rows):
             rows, sign = np.tile(rows, 2), np.repeat([-1.0, 1.0], len(rows))
             still = np.tile(still, (2, 1))
@@ -158,16 +158,16 @@ class Functions(Series):
             lanes, first = np.unique(lane[tie], return_index=True)
             chosen = tie[first]
             own, sign, still = rows[lanes // lines], sign[lanes // lines], still.ravel()[lanes]
-            found[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
-        value, place = found.reshape(2, 2, len(names), lines)
+            table[:, lanes] = self._settled(own, sign, line[chosen], place[chosen], value[chosen], still)
+        value, place = table.reshape(2, 2, len(names), lines)
         return Extremes(value, place)
 
     def _settled(
         self, rows: Ints, sign: Floats, line: Ints, place: Floats, value: Floats, still: Floats
     ) -> tuple[Floats, Floats]:  # fmt: skip
-        """Values and places of extremes by the functions themselves; `value` are those of their series times a sign."""
+        """Values and places of extremes from the functions themselves; `value`: of the series, times the sign."""
         place = self.curve.inside(line, place)
-        # An extreme is flat: a pose that is as good as the place beside it is that place.
+        # A function is flat at an extreme: a pose beside it with the same value is the place.
         row = np.round(place)
         near = np.abs(row - place) <= BESIDE_ROW
         beside = np.flatnonzero(near & self.curve.holds(line, row, INSET * self.curve.poses.end))
@@ -182,23 +182,23 @@ class Functions(Series):
         return exact, place
 
     def _true(self, rows: Ints, line: Ints, values: Floats, series: Floats) -> Floats:
-        """Values of the functions themselves, or where these have lost digits those of their series."""
+        """Values of the functions themselves, or of their series where the functions have lost digits."""
         size = np.maximum(self._scale, self._sizes[:, None])[rows, line]
         with np.errstate(invalid="ignore"):
             near = np.abs(values - series) <= TRUE * np.where(self._poled[rows], np.abs(series), size)
         return np.where(near & np.isfinite(series), values, series)
 
     def _tops(self, rows: Ints, sign: Floats, still: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-        """Local maxima of functions times a sign that may be their largest: lane, piece, place in it, value.
+        """Local maxima of functions times a sign that may be the largest of a line: lane, piece, place in it, value.
 
-        The smallest and the largest value of a function are neighbouring lanes, half of them all apart.
+        The lanes are the smallest values of all functions, then their largest values.
         """
         line, poled, half = self.pieces.line, self._poled[rows], len(rows) // 2
-        known = self._table[rows[:half]]
-        known = np.where(np.isnan(known) | poled[:half, None, None], -np.inf, known)
+        values = self._table[rows[:half]]
+        values = np.where(np.isnan(values) | poled[:half, None, None], -np.inf, values)
         with np.errstate(invalid="ignore"):
-            steps = np.nan_to_num(np.abs(np.diff(known, axis=2)), nan=np.inf).max(axis=2)
-        nodes = np.concatenate([np.where(np.isinf(known), -np.inf, -known).max(axis=2), known.max(axis=2)])
+            steps = np.nan_to_num(np.abs(np.diff(values, axis=2)), nan=np.inf).max(axis=2)
+        nodes = np.concatenate([np.where(np.isinf(values), -np.inf, -values).max(axis=2), values.max(axis=2)])
         best = np.full((len(rows), self.curve.lines), -np.inf)
         largest(best, line, nodes)
         # Between its nodes a function is larger than there by less than it moves from one to the next.
@@ -213,7 +213,7 @@ class Functions(Series):
             below = self._divisor[rows[lane[quotient]], piece[quotient]]
             product, divisor = table[quotient], chebyshev.at_places(chebyshev.series(below))
             table[quotient] /= divisor
-            # Where both are zero the quotient says nothing, and at a pole it has no sign.
+            # Where both are zero the quotient has no meaning, and at a pole it has no sign.
             lost = np.where(quotient[:, None], ~np.isfinite(table), np.isnan(table))
             sizes = (scale[rows[lane], owner][quotient, None] for scale in (self._scale, self._divisor_scale))
             lost[quotient] |= (np.abs(product) > POLE * next(sizes)) & (np.abs(divisor) <= ZERO * next(sizes))
@@ -222,20 +222,20 @@ class Functions(Series):
             top = np.ones(table.shape, dtype=bool)
             top[:, 1:] = table[:, 1:] >= table[:, :-1]
             top[:, :-1] &= table[:, :-1] >= table[:, 1:]
-            # What does not move has both ends at its first place.
+            # A constant function has both extremes at its first place.
             top &= np.tile(best[:half] + best[half:] > still[:half], (2, 1))[lane, owner][:, None]
             bend = np.abs(np.nan_to_num(table[:, 2:] - 2 * table[:, 1:-1] + table[:, :-2], posinf=0, neginf=0))
         bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
-        # The first place of a line counts with what is as large but for rounding.
+        # The first place of a line counts if it is as large within rounding.
         top[first[piece], 0] = True
         top &= np.isfinite(table) & (table + bend >= (best - still)[lane, owner][:, None])
         which, m = np.nonzero(top)
         lane, piece = lane[which], piece[which]
         x, value = self._refined(rows[lane], sign[lane], piece, m, table[which, m])
         corner, where = np.nonzero(rough & (nodes >= best[:, line]) & np.isfinite(nodes))
-        found = self._corners(rows[corner], sign[corner], where)
+        corners = self._corners(rows[corner], sign[corner], where)
         return tuple(
-            np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *found), strict=True)
+            np.concatenate(pair) for pair in zip((lane, piece, x, value), (corner, where, *corners), strict=True)
         )  # type: ignore[return-value]
 
     def _refined(self, rows: Ints, sign: Floats, piece: Ints, m: Ints, value: Floats) -> tuple[Floats, Floats]:
@@ -245,7 +245,7 @@ class Functions(Series):
         bends, divisor_bends = chebyshev.slope_series(slope), chebyshev.slope_series(divisor_slope)
 
         def rise(some: Ints, at: Floats) -> tuple[Floats, Floats]:
-            """What has the sign of the slope, and its own slope."""
+            """A function with the sign of the slope, and its derivative."""
             basis = chebyshev.basis(at)
             first, second = chebyshev.total(slope[some], basis), chebyshev.total(bends[some], basis)
             apart = np.flatnonzero(self._poled[rows[some]])
@@ -270,7 +270,7 @@ class Functions(Series):
         return x, value
 
     def _corners(self, rows: Ints, sign: Floats, piece: Ints) -> tuple[Floats, Floats]:
-        """Place and value of the largest node of functions with a corner in a piece: their values are what is known."""
+        """Place and value of the largest node, for functions with a corner in a piece, whose series are not exact."""
         nodes = self._table[rows, piece]
         nodes = np.where(np.isnan(nodes), -np.inf, sign[:, None] * nodes)
         k = nodes.argmax(axis=1)
@@ -282,8 +282,8 @@ class Functions(Series):
         return chebyshev.NODES[k], tops
 
     def _poles(self, rows: Ints, sign: Floats) -> tuple[Ints, Ints, Floats, Floats]:
-        """Places at which functions times a sign run to plus infinity: lane, piece, place in it, infinity."""
-        found: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
+        """Places at which functions times a sign go to plus infinity: lane, piece, place in it, infinity."""
+        poles: list[tuple[Ints, Ints, Floats]] = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp), np.empty(0))]
         for k in np.flatnonzero(self._poled[rows]).tolist():
             product, divisor = (chebyshev.series(table[rows[k]]) for table in (self._table, self._divisor))
             sizes = self._scale[rows[k], self.pieces.line], self._divisor_scale[rows[k], self.pieces.line]
@@ -302,12 +302,12 @@ class Functions(Series):
             beside = np.stack([x - 1e-4, x + 1e-4])
             by = np.stack([chebyshev.value(divisor[piece], np.clip(at, -1, 1)) for at in beside])
             up = ((sign[k] * height * by > 0) & (np.abs(beside) <= 1)).any(axis=0) & real
-            found.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
-        lane, piece, x = (np.concatenate(part) for part in zip(*found, strict=True))
+            poles.append((np.full(np.count_nonzero(up), k), piece[up], x[up]))
+        lane, piece, x = (np.concatenate(part) for part in zip(*poles, strict=True))
         return lane, piece, x, np.full(len(x), np.inf)
 
     def zeros(self, names: Sequence[str], touching: float) -> Zeros:
-        """Places at which some functions cross zero, or come nearer to it than `touching` and turn back or end."""
+        """Places at which functions cross zero, or turn back or end nearer to zero than `touching`."""
         rows = self._rows(names)
         count = len(self.pieces.line)
         series = chebyshev.series(self._table[rows]).reshape(-1, chebyshev.COUNT)
@@ -317,7 +317,7 @@ class Functions(Series):
         rims = np.stack([np.append(False, goes_on), np.append(goes_on, False)], axis=1)[:count]
         rims = np.tile(np.where(rims, EXACT, touching), (len(rows), 1))
         rim, side = np.nonzero(np.abs(table[:, [0, -1]]) <= rims)
-        # Between its places a series moves by less than it does elsewhere.
+        # Only a series that comes near to zero at one of its places can cross or touch it.
         near = np.abs(table).min(axis=1, initial=np.inf) <= np.abs(np.diff(table, axis=1)).max(axis=1) + touching
         some = np.flatnonzero(near)
         turned, place, least = turning = chebyshev.turning_points(series[some])
@@ -329,7 +329,7 @@ class Functions(Series):
             return Zeros(which, which, x)
         function, piece = which // count, which % count
         places = self.pieces.take(piece).places(x)
-        # Where a function only touches zero a pose that is as near to zero as the place beside it is that place.
+        # A function is flat where it touches zero: a pose beside it that is as near to zero is the place.
         flat = np.arange(len(x)) >= len(x) - len(rim) - np.count_nonzero(touched)
         row = np.round(places)
         lanes = np.flatnonzero(flat & (np.abs(row - places) <= BESIDE_ROW))

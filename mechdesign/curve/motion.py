@@ -25,28 +25,27 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-# Nodes at which a motion is looked at, at most.
+# Largest number of nodes at which a motion is evaluated.
 BUDGET = 1 << 18
 # Poses solved at once: their arrays stay within some megabytes.
 AT_ONCE = 65536
-# What is given moves at most this far in a piece to begin with: an angle, and a length as a part of the mechanism's
-# size.
+# Largest change of a given angle, and of a given length as a part of the mechanism's size, in one of the first pieces.
 FIRST_TURN, FIRST_LENGTH = np.pi / 4, 0.25
-# Poses of a motion from which groups without a closed form are continued.
+# Largest number of poses of a motion from which groups without a closed form are continued.
 ANCHORS = 721
-# So far beyond the first and the last pose, as a part of the motion, it must go on: else its end is a limit. What ends
-# it is looked for as far beyond other ends.
+# A motion ends at its first or last pose if it cannot go on this far beyond, as a part of the motion. The causes of
+# other ends are evaluated as far beyond these.
 BEYOND = 1e-9
-# An angle this near to the cut at half a turn begins above it, whatever rounding says (radians).
+# An angle that begins within this distance of half a turn (radians) is half a turn, not minus half a turn.
 ON_THE_CUT = 1e-9
-# Links that come into line are looked for within so many last digits of a dead centre.
+# Number of neighbouring floating-point numbers around a dead centre among which the last valid pose is sought.
 STRAIGHT = 128
-# A place at an end of a motion is taken so far inside, as a part of the motion.
+# Distance inside a motion at which its ends are evaluated, as a part of the motion.
 INSET = 1e-9
 
 
 def units_of(study: Study, coordinates: Sequence[Coordinate]) -> list[float]:
-    """What one of the study's units of each coordinate is in the core's."""
+    """The study's unit of each coordinate, in radians or as 1 for a length."""
     return [study.units.angle_factor if c.quantity == "angle" else 1.0 for c in coordinates]
 
 
@@ -56,9 +55,9 @@ class Curve:
     Parameters
     ----------
     angles : sequence of Coordinate
-        Angles that are followed: those that no pose gives and whose turns count.
+        Angles whose turns are counted along the motion, as no pose gives them.
     turning : bool
-        Whether limits count the turns of angles that are given or followed; else each turn is judged alike.
+        Whether limits count the turns of given and followed angles; else an angle and the same with a turn are alike.
 
     Attributes
     ----------
@@ -110,7 +109,7 @@ class Curve:
         return poses, configuration
 
     def with_turns(self, line: Ints, s: Floats, configuration: Configuration) -> Configuration:
-        """Solved poses, their angles in the turn of the motion."""
+        """Solved poses with their angles in the turns that they have along the motion."""
         near: dict[str, Value] = dict(zip((angle.name for angle in self.angles), self.beside(line, s), strict=True))
         if not self._turning:
             near |= self.mechanism.drawn_angles() | self.mechanism.turns({})
@@ -129,7 +128,7 @@ class Curve:
         return np.array(values).reshape(len(self.angles), len(s))
 
     def beside(self, line: Ints, s: Floats) -> Floats:
-        """The same at nodes near to the places: from there the angles turn by less than half of what tells turns."""
+        """The same angles at the nodes nearest to the places, less than half a turn away: they tell the turns."""
         if not len(self._closed.line):
             return np.full((len(self.angles), len(s)), np.nan)
         k, x = self._within(line, s)
@@ -137,12 +136,12 @@ class Curve:
         return np.asarray(self._turns_at_nodes[:, k, chebyshev.nearest_node(x)] * scale[:, None])
 
     def _within(self, line: Ints, s: Floats) -> tuple[Ints, Floats]:
-        """The pieces on which the mechanism assembles at places of lines, and the places in these."""
+        """The piece of each place of a line on which the mechanism assembles, and the place within it."""
         k = self.piece_at(line, s, self._closed)
         return k, self._closed.take(k).within(s)
 
     def piece_at(self, line: Ints, s: Floats, pieces: Pieces | None = None) -> Ints:
-        """The piece of each place, or the nearest before it; the line's first where there is none before."""
+        """The piece that contains each place, else the one before it, else the first of the line."""
         pieces = self.pieces if pieces is None else pieces
         span = self.poses.end + 2.0
         k = np.searchsorted(pieces.line * span + pieces.begin, line * span + s, side="right") - 1
@@ -150,7 +149,7 @@ class Curve:
         return np.clip(np.maximum(k, first), 0, len(pieces.line) - 1)
 
     def holds(self, line: Ints, s: Floats, beyond: float = 0.0) -> Flags:
-        """Whether places of lines lie in the pieces, in which the mechanism can move, or so far beyond."""
+        """Whether places of lines lie in a piece, or at most `beyond` outside."""
         if not len(self.pieces.line):
             return np.zeros(len(s), dtype=bool)
         k = self.piece_at(line, s + beyond)
@@ -158,10 +157,10 @@ class Curve:
         return np.asarray((self.pieces.line[k] == line) & (s >= begin) & (s <= end))
 
     def inside(self, line: Ints, s: Floats) -> Floats:
-        """Places of lines at which poses assemble: those at ends of motions or beyond are taken a little inside.
+        """Places of lines at which poses assemble: places at the end of a motion or beyond are moved inside a little.
 
-        At a dead centre it is the place at which links lie straight, as far as rounding forgives: nearer to the motion
-        poses have half of the digits, for positions change as the root of what is left.
+        At a dead centre it is the last place at which rounding lets the links assemble. Positions change there as the
+        root of the distance, so that a place a little inside would lose half of the digits.
         """
         pieces, k = self.pieces, self.piece_at(line, s)
         after = np.minimum(k + 1, len(pieces.line) - 1)
@@ -176,7 +175,7 @@ class Curve:
         return places
 
     def _straight(self, line: Ints, s: Floats, fold: Ints) -> Floats:
-        """Dead centres of pieces as far as rounding forgives."""
+        """The outermost places at dead centres of pieces at which poses are valid."""
         steps = (
             np.arange(-STRAIGHT // 2, STRAIGHT // 2) * np.spacing(np.maximum(np.abs(s), 1e-3 * self.poses.end))[:, None]
         )
@@ -187,7 +186,7 @@ class Curve:
         return np.where(valid.any(axis=1), places[np.arange(len(s)), last], inset)
 
     def _begin(self) -> Pieces:
-        """Lines divided at their corners, and so that what is given moves little in each piece."""
+        """Pieces between the corners of each line, so short that given coordinates change little in each."""
         poses, end = self.poses, float(self.poses.end)
         if not end > 0:
             return Pieces.of(*(np.empty(0, dtype=kind) for kind in (np.intp, float, float)))
@@ -224,7 +223,7 @@ class Curve:
 
     @cached_property
     def _anchors(self) -> Configuration | None:
-        """Poses that groups without a closed form are continued from: some of each line, and one of the sketch."""
+        """Poses from which groups without a closed form are continued: some of each line, then the sketches."""
         if not self.plan.iterative:
             return None
         rows = evenly(self.poses.line, ANCHORS)
@@ -238,7 +237,7 @@ class Curve:
         own = [np.broadcast_to(np.arange(sketch.shape[0]), (self.lines,))]
         sketch = sketch.take(own[0])
         places = {name: np.concatenate([v, v[:: len(rows)]]) for name, v in poses.places.items()}
-        # Of another plan a pose has other closures.
+        # The sketch was solved by another plan, whose closures are others.
         parts = [replace(part, closures=()) for part in (solved, sketch)]
         anchors = joined(parts, (len(line) + self.lines,), self.mechanism.geometry.vectors(places), places)
         near = {
@@ -246,7 +245,7 @@ class Curve:
             for angle in self.plan.angles
         }
         anchors = replace(anchors, near=near)
-        # By line and anchor the nearest that is valid; where none is, the sketch.
+        # For each line and anchor the nearest valid anchor, or the sketch if the line has none.
         valid = np.asarray(solved.valid).reshape(self.lines, -1)
         numbers = np.arange(valid.shape[1])
         away = np.where(valid[:, None, :], np.abs(numbers[:, None] - numbers), len(numbers))
@@ -274,7 +273,7 @@ class Curve:
         return np.concatenate(margins, axis=1), np.concatenate(angles, axis=1)
 
     def _angles_of(self, configuration: Configuration) -> Floats:
-        """Angles in parts of their turn, times a whole turn."""
+        """Followed angles, scaled so that each repeats after 2 pi."""
         values = [
             np.broadcast_to(configuration.value(angle) * (TURN / angle.turn), configuration.shape)
             for angle in self.angles
@@ -287,13 +286,13 @@ class Curve:
             some = slice(k, k + AT_ONCE)
             configuration = self.solve(line[some], s[some], judged=False)[1]
             lost = configuration.reason != Reason.OK
-            # At the very end of a piece rounding may leave a pose open.
+            # At the end of a piece rounding may keep a pose from closing.
             parts.append(np.where(lost, np.nan, self.margins.of_limits(configuration)))
         return np.concatenate(parts, axis=1), np.empty((0, len(s)))
 
     @cached_property
     def _turns(self) -> Floats:
-        """Series of the angles followed on the pieces, shape (angles, pieces, nodes), one after the other."""
+        """Series of the followed angles on the pieces, without jumps between these, shape (angles, pieces, nodes)."""
         pieces, values = self._closed, np.unwrap(self._seen, axis=2)
         jumps = values[:, 1:, 0] - values[:, :-1, -1]
         new = np.append(True, pieces.line[1:] != pieces.line[:-1])
@@ -331,12 +330,12 @@ class Curve:
             row[:, 0] += TURN * turns[rank]
 
     def _fold(self, line: int, good: float, bad: float) -> float | None:
-        """Where a group without a closed form turns back between a place at which it closes and one where not."""
+        """Place at which a group without a closed form turns back, between `good`, where it closes, and `bad`."""
         fold = self.turning_point(line, good, abs(bad - good))
         return None if fold is None else fold[0]
 
     def turning_point(self, line: int, place: float, reach: float) -> tuple[float, Configuration, int] | None:
-        """Where a group without a closed form turns back near to a place; see there."""
+        """Fold of a group without a closed form near a place; see `mechdesign.mechanism.margins.turning_point`."""
 
         def given(s: float) -> list[float]:
             return [float(v[0]) for v in self.given(np.array([line]), np.array([s]))[1]]
@@ -356,7 +355,7 @@ class Curve:
 def drive_turns(
     mechanism: Mechanism, drive: str, begin: Floats, least: Floats, most: Floats, sizes: Mapping[str, Value]
 ) -> Floats:
-    """Whole turns that take motions of a drive near to where it was drawn, or within its limits.
+    """Whole turns to add to a drive's angle, so that its motion is within its limits, or begins near the sketch.
 
     Parameters
     ----------
@@ -371,7 +370,7 @@ def drive_turns(
         low, high = bound.ends({**mechanism.nominal, **sizes})
         own = bound.drive and bound.of_angle and bound.coordinate.name == drive
         if own and low is not None and high is not None:
-            # All of the motion where it fits, or else its begin.
+            # The whole motion where it fits within the limits, or else its begin.
             for smallest, largest in ((begin, begin), (least, most)):
                 fewest, greatest = np.ceil((low - smallest) / TURN), np.floor((high - largest) / TURN)
                 turns = np.where(fewest <= greatest, np.clip(turns, fewest, greatest), turns)

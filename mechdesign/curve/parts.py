@@ -1,4 +1,4 @@
-"""Parts of motions: where columns lie in intervals, from the very places at which they pass the ends of these."""
+"""Parts of motions in which columns lie in intervals, from the exact places at which they pass the ends of these."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from mechdesign.statistics import Interval
 
 
 def within(curve: Curve, intervals: Sequence[Interval], evaluate: Evaluate) -> Curve:
-    """The parts of motions on which every function of some lies in its interval, as motions.
+    """The parts of motions on which each function lies in its interval, as a curve of its own.
 
     Parameters
     ----------
     evaluate : callable
-        As many functions as there are intervals.
+        Values of as many functions as there are intervals.
     """
 
     def passing(line: Ints, s: Floats) -> tuple[Floats, Floats]:

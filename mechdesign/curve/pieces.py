@@ -12,23 +12,23 @@ from mechdesign.mechanism.margins import Cause
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints, Lanes
 
-# A piece is halved so often at most: a function that has a corner or jumps there is as good as it gets.
+# Largest number of halvings of a piece; a function that still has a corner or a jump in it stays as it is.
 MOST_HALVINGS = 40
-# Series of margins that leave less than this part of the margin's size are resolved.
+# A margin is resolved if the truncation error of its series is less than this part of its size.
 RESOLVED = 1e-12
-# What these leave at any place is at most this part of it.
+# Bound of that error at any place, as a part of the margin's size.
 UNRESOLVED = 2 * chebyshev.COUNT * RESOLVED
-# A margin that falls below zero by less than this part of its size, which is rounding, touches it.
+# A margin that falls below zero by less than this part of its size, which is rounding, only touches zero.
 ROUNDING = 1e-13
-# A zero so near to an end of a piece is that end: where the piece is straight, and at a dead centre.
+# A zero this near to an end of a piece is at the end: at an ordinary end, and at a dead centre.
 AT_END, AT_FOLD = 1e-12, 1e-6
-# Zeros that a series alone has beside a dead centre are no farther from it in a piece.
+# Largest distance from a dead centre, in a piece, of zeros that only the error of a series makes.
 NEAR_FOLD = 1e-2
-# Zeros of a margin that touches zero, by rounding, lie so near to where it does in a piece.
+# Largest distance, in a piece, of zeros that rounding makes from the place where a margin touches zero.
 BESIDE = 1e-5
-# A closure without this part of its size as slope, over a piece, touches zero.
+# A closure whose slope over a piece is less than this part of its size touches zero there.
 STEEP = 1e-6
-# What an angle may turn between neighbouring nodes so that the way round is certain (radians).
+# Largest turn of an angle between neighbouring nodes, so that its sense is certain (radians).
 SURE_TURN = np.pi / 2
 
 
@@ -87,7 +87,7 @@ class Pieces(Lanes):
         return Pieces.joined([first, Pieces(self.line, middle, self.end, np.maximum(self.fold, 0), self.depth + 1)])
 
     def divided(self, owner: Ints, marks: Floats) -> Pieces:
-        """The pieces in order, each divided at the places in it that are marked, shape (n,): its number, and where."""
+        """The pieces in order, divided at marks, shape (n,): the number of the piece, and the place in it."""
         of, low, high = between_marks(owner, marks, np.arange(len(self.line)))
         nowhere = np.zeros(len(of), dtype=bool)
         parts = _parts(self.take(of), low, high, nowhere, nowhere)
@@ -100,7 +100,7 @@ class Pieces(Lanes):
 
 
 def largest(best: Floats, line: Ints, values: Floats) -> None:
-    """Raise the largest values of lines, shape (n, lines), by those of some pieces, shape (n, pieces)."""
+    """Update the largest values of lines, shape (n, lines), with those of pieces, shape (n, pieces)."""
     lanes = np.arange(len(best))[:, None] * best.shape[1] + line
     np.maximum.at(best.reshape(-1), lanes.ravel(), values.ravel())
 
@@ -108,7 +108,7 @@ def largest(best: Floats, line: Ints, values: Floats) -> None:
 # Margins of shape (causes, n), nan where an earlier one is negative, and angles of shape (angles, n), at places s of
 # some lines.
 Look = Callable[[Ints, Floats], tuple[Floats, Floats]]
-# Where a group without a closed form turns back between a place at which it closes and one at which it does not.
+# Place on a line at which a group without a closed form turns back, between one where it closes and one where not.
 Fold = Callable[[int, float, float], float | None]
 
 
@@ -116,8 +116,8 @@ Fold = Callable[[int, float, float], float | None]
 class Search:
     """Finds the pieces of lines in which every margin is positive.
 
-    A line for which more than `budget` nodes would have to be looked at is `spent`: nothing of it is known. Where
-    `crossing`, a closure that touches zero divides the motion, for links may go on with a corner there.
+    A line that needs more than `budget` nodes is `spent` and gets no pieces. With `crossing`, a closure that touches
+    zero divides the motion, as links may move with a corner there.
     """
 
     look: Look
@@ -160,9 +160,9 @@ class Search:
             which = np.flatnonzero(left)
             values, scale = table[which], size[pieces.line[which]]
             if cause.role == "limit":
-                # What has no value is not limited.
+                # A quantity without a value is within its limits.
                 values = np.where(np.isnan(values), scale[:, None] + 1.0, values)
-            # Slides cross each other either way round.
+            # Slides may cross in either sense.
             positive = (values >= 0) | (cause.role == "across")
             last = pieces.depth[which] >= MOST_HALVINGS
             alike = np.isfinite(values).all(axis=1) & (positive.all(axis=1) | ~positive.any(axis=1))
@@ -176,7 +176,7 @@ class Search:
                 coefficients = chebyshev.series(values)
                 rest = chebyshev.remainder(coefficients)
                 smooth = rest <= RESOLVED * scale
-                # Of a margin that is far from zero nothing more has to be known.
+                # A margin that is far from zero need not be resolved.
                 sure = smooth | (alike & (np.abs(values).min(axis=1) > 4 * chebyshev.COUNT * rest))
                 own = np.flatnonzero(smooth & ~last)
                 some, divided = self._cut(pieces.take(which[own]), coefficients[own], number, scale[own])
@@ -190,7 +190,7 @@ class Search:
         return left, halved, parts
 
     def _folded(self, pieces: Pieces, positive: Flags, alike: Flags) -> list[Pieces | None]:
-        """The part of each piece up to where a group without a closed form turns back; None where that is not known."""
+        """The part of each piece up to the place where a group without a closed form turns back; None if not found."""
         parts: list[Pieces | None] = [None] * len(alike)
         for k in np.flatnonzero(~alike & (np.count_nonzero(np.diff(positive, axis=1), axis=1) == 1)).tolist():
             piece, node = pieces.take(np.array([k])), int(np.flatnonzero(np.diff(positive[k]))[0])
@@ -207,7 +207,7 @@ class Search:
     def _cut(
         self, pieces: Pieces, coefficients: Floats, number: int, scale: Floats
     ) -> tuple[Ints, list[Pieces]]:  # fmt: skip
-        """Pieces with zeros of a margin inside, or with a dead centre at an end, and the positive parts of these."""
+        """Pieces with zeros of a margin inside or a dead centre at an end, and their parts with a positive margin."""
         role = self.causes[number].role
         table = chebyshev.at_places(coefficients)
         suspect = np.flatnonzero(table.min(axis=1) <= np.abs(np.diff(table, axis=1)).max(axis=1) + TOUCHING * scale)
@@ -220,11 +220,11 @@ class Search:
             flat, level = np.nonzero(~steep)
             touched, place = np.concatenate([touched, level]), np.concatenate([place, 2.0 * flat - 1.0])
             value = np.concatenate([value, table[suspect][level, -flat]])
-            # A limit that is passed by no more than what is forgiven is touched.
+            # A limit that is exceeded by rounding is only touched.
             below, reach = (ROUNDING, BESIDE) if role == "closure" else (TOUCHING, NEAR_FOLD)
             near = (value >= -below * scale[touched]) & (value <= TOUCHING * scale[touched])
             touched, place = touched[near], place[near]
-            # Zeros that rounding alone makes where a margin touches zero.
+            # Where a margin touches zero rounding makes zeros, which are left out.
             apart = ~((which[:, None] == touched) & (np.abs(x[:, None] - place) < reach)).any(axis=1)
             owner, marks, dead = which[apart], x[apart], dead[apart]
         if role == "closure":
@@ -234,7 +234,7 @@ class Search:
                 dead = np.concatenate([dead, np.zeros(np.count_nonzero(inner), dtype=bool)])
         rims = np.where(np.stack([some.fold == -1, some.fold == 1]), AT_FOLD, AT_END)
         inside = (marks > -1.0 + rims[0, owner]) & (marks < 1.0 - rims[1, owner])
-        # Beside a dead centre a closure is smaller than what its series leaves: what lies between is no gap.
+        # Beside a dead centre a closure is smaller than the error of its series, whose zeros there are left out.
         fold = some.fold[owner]
         between = np.abs(chebyshev.value(coefficients[owner], (marks + fold) / 2))
         inside &= (fold == 0) | (np.abs(marks - fold) > NEAR_FOLD) | (between > UNRESOLVED * scale[owner])
@@ -255,7 +255,7 @@ class Search:
         return suspect[cut], [_parts(some.take(of), low, high, *ends)] if len(cut) else []
 
     def _polished(self, pieces: Pieces, x: Floats, coefficients: Floats, number: int) -> Floats:
-        """Zeros of a margin's series brought to those of the margin itself, by a step of Newton's method."""
+        """Zeros of a margin itself from those of its series, by a step of Newton's method."""
         if not len(x):
             return x
         value = self.look(pieces.line, pieces.places(x))[0][number]
@@ -265,7 +265,7 @@ class Search:
 
 
 def between_marks(owner: Ints, marks: Floats, some: Ints) -> tuple[Ints, Floats, Floats]:
-    """Intervals of some pieces from -1 to 1 between the places in them that are marked: the piece, both ends."""
+    """Intervals between the marks in some pieces and their ends -1 and 1: the piece, the lower and the upper end."""
     owners, places = np.concatenate([owner, some, some]), np.concatenate([marks, 0.0 * some - 1.0, 0.0 * some + 1.0])
     order = np.lexsort((places, owners))
     owners, places = owners[order], places[order]
@@ -274,7 +274,7 @@ def between_marks(owner: Ints, marks: Floats, some: Ints) -> tuple[Ints, Floats,
 
 
 def _parts(pieces: Pieces, low: Floats, high: Floats, dead_low: Flags, dead_high: Flags) -> Pieces:
-    """Parts of pieces between places of these, at which dead centres may lie; one between two of them is halved."""
+    """Parts of pieces from `low` to `high`, where dead centres may lie; a part with two dead centres is halved."""
     dead_low, dead_high = (
         dead_low | ((low == -1.0) & (pieces.fold == -1)),
         dead_high | ((high == 1.0) & (pieces.fold == 1)),

@@ -15,12 +15,12 @@ from mechdesign.curve.pieces import MOST_HALVINGS, Pieces, largest
 from mechdesign.numerics import chebyshev
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Series that leave less than this part of a function's size are exact; near a singularity, where fewer digits are
-# known, as many times more as one is to the conditioning.
+# A series is exact if its truncation error is less than this part of the function's size; near a singularity, where
+# functions have fewer digits, less than this part over the conditioning.
 EXACT = 2e-15
-# Means are known to this part of a function's size.
+# Error of means, as a part of the function's size.
 MEAN_ERROR = 1e-10
-# Nodes of a piece at which a quotient may have no value.
+# Largest number of nodes of a piece at which a quotient may have no value.
 MOST_LOST = 4
 
 # Values of shape (functions, n) at places of lines, and the conditioning of the poses, shape (n,).
@@ -35,13 +35,13 @@ class Series:
     names : sequence of str
         The functions that `evaluate` gives, in its order.
     sizes : sequence of float
-        What rounding of each is judged by, at least.
+        Least size of each function, by which its rounding is judged.
     divisors : mapping of str to sequence of (str, int)
-        Of functions with poles: others, whose zeros these are, and of which order.
+        For each function with poles: the functions that are zero there, and the order of the poles.
     extremes, means, zeros : sequence of str
-        Functions of which these are wanted; the others are evaluated only.
+        Functions of which extremes, means and zeros are needed; the others are only evaluated.
     ends : mapping of str to int
-        Of functions of which one extreme is wanted: 1 for the largest value, -1 for the smallest, 0 for both.
+        Which extreme of a function is needed: 1 for the largest value, -1 for the smallest, 0 for both.
     """
 
     def __init__(
@@ -57,10 +57,8 @@ class Series:
             for name, by_what in (divisors or {}).items()
         }
         self._poled = np.array([k in self._divisors for k in range(len(names))], dtype=bool)
-        self._means, self._zeros = (
-            np.array([name in wanted for name in names], dtype=bool) for wanted in (means, zeros)
-        )
-        # Whether the largest, and the smallest, values are wanted.
+        self._means, self._zeros = (np.array([name in group for name in names], dtype=bool) for group in (means, zeros))
+        # Whether the largest and the smallest value of each function are needed.
         self._extremes = np.array(
             [[name in extremes and ends.get(name, 0) != -sign for name in names] for sign in (1, -1)], dtype=bool
         )
@@ -89,7 +87,7 @@ class Series:
                 divisors[k] *= values[by] ** power
         with np.errstate(invalid="ignore", over="ignore"):
             products = np.where(self._poled[:, None, None], values * divisors, values)
-        # At a pole itself a quotient has no value: its product goes on through the other nodes.
+        # At a pole a quotient has no value: its numerator is interpolated from the other nodes.
         lost = ~np.isfinite(products) & self._poled[:, None, None]
         number = np.count_nonzero(lost, axis=2)
         for k, piece in np.argwhere((number > 0) & (number <= MOST_LOST)).tolist():
@@ -98,7 +96,7 @@ class Series:
         return products, divisors, EXACT / np.clip(least, 1e-6, 1.0)
 
     def _follow(self) -> None:
-        """Halve pieces until every function is known where it matters."""
+        """Halve pieces until every series is exact where extremes, means or zeros depend on it."""
         lines, spent = self.curve.lines, np.zeros(self.curve.lines)
         pieces = pending = self.curve.pieces
         values, divisors, exact = self._sampled(pieces)
@@ -112,20 +110,20 @@ class Series:
             finite = np.isfinite(values)
             largest(self._scale, pending.line, np.where(finite, np.abs(values), 0.0).max(axis=2))
             largest(self._divisor_scale, pending.line, np.abs(np.nan_to_num(divisors)).max(axis=2))
-            known = np.where(finite & ~self._poled[:, None, None], values, np.nan)
-            missing = np.isnan(known)
-            ends = [np.where(missing, -np.inf, sign * known).max(axis=2) for sign in (1.0, -1.0)]
+            finite_values = np.where(finite & ~self._poled[:, None, None], values, np.nan)
+            missing = np.isnan(finite_values)
+            ends = [np.where(missing, -np.inf, sign * finite_values).max(axis=2) for sign in (1.0, -1.0)]
             for end, top in zip(ends, best, strict=True):
                 largest(top, pending.line, end)
             scale = np.maximum(self._scale, self._sizes[:, None])[:, pending.line]
             rest = chebyshev.remainder(chebyshev.series(values))
             rough = ~(rest <= exact * scale) & finite.any(axis=2)
             with np.errstate(invalid="ignore"):
-                steps = np.abs(np.diff(known, axis=2))
+                steps = np.abs(np.diff(finite_values, axis=2))
                 steps = np.where(missing[..., 1:] != missing[..., :-1], np.inf, np.nan_to_num(steps)).max(axis=2)
                 above = [
-                    wanted[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
-                    for end, top, wanted in zip(ends, best, self._extremes, strict=True)
+                    is_sought[:, None] & (end + 2 * steps >= top[:, pending.line] - exact * scale)
+                    for end, top, is_sought in zip(ends, best, self._extremes, strict=True)
                 ]
             mean = np.zeros_like(rough)
             if self._means.any():

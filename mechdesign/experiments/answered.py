@@ -1,4 +1,4 @@
-"""What came of some cases, kept as numbers: texts that stand for all of them are of the first or the worst."""
+"""Answers of some cases, kept as numbers; only the first warning of a kind and the worst verdicts are kept as texts."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.schema.optimize import Requirement
 
-# Exit code of a case of which a requirement is not met, or that has a warning that must not be.
+# Exit code of a case that misses a requirement, or has a warning that the study forbids.
 NOT_MET = 1
-# Exit code of a case that the mechanism, or what the case says of it, makes impossible.
+# Exit code of a case that has no answer.
 IMPOSSIBLE = 3
 
 
 @dataclass
 class Worst:
-    """The worst verdict on a requirement over cases, and how many of them do not meet it."""
+    """The worst verdict on a requirement over cases, its case, and the number and the first of those that miss it."""
 
     case: int
     verdict: Verdict
     unmet: int = 0
-    first: int = 0  #: of those that do not meet it
+    first: int = 0
 
 
 @dataclass
 class Warned:
-    """The first case with warnings of a kind, the first of these with its command, and how many cases have some."""
+    """The first case with warnings of a kind, its first warning, and the number of cases with such warnings."""
 
     case: int
     message: str
@@ -47,22 +47,22 @@ class Warned:
 
 @dataclass(frozen=True, eq=False)
 class Answered:
-    """What came of some cases, in their order.
+    """Answers of some cases, in their order.
 
     Parameters
     ----------
     table : ndarray, shape (cases, 3 + results + 2 * requirements)
-        Exit code (0 done; 1 a requirement is not met; 3 it is impossible; 4 a numerical failure), number of warnings,
-        number of the reason; what was wanted, nan where there is none; of each requirement the worst value, and 1
-        where it is met.
+        Exit code (0 done; 1 a requirement is not met; 3 impossible; 4 a numerical failure), number of warnings, number
+        of the reason; the wanted numbers, nan where there is none; of each requirement the worst value, and 1 where it
+        is met.
     reasons : tuple of str
-        Why cases, or parts of them, could not be answered; empty where they were.
+        Reasons why cases, or parts of them, have no answer; the first is empty, for cases that have one.
     units : tuple of str
-        Of what was wanted and of each requirement; empty where none was found.
+        Units of the wanted numbers and of the requirements; empty where there is none.
     warned : mapping of str to Warned
-        By the kind of warning, in the order of their first cases.
+        Warnings by their kind, in the order of their first cases.
     worst : tuple of Worst
-        Of each requirement.
+        The worst case of each requirement.
     """
 
     table: Floats
@@ -73,7 +73,7 @@ class Answered:
 
 
 class Sheet:
-    """What is found of some cases, command by command."""
+    """Collects the answers of some cases, command by command."""
 
     def __init__(self, study: Study, wanted: Sequence[Wanted], count: int) -> None:
         self._required, self._wanted, self._mobility = study.requirements, wanted, study.mechanism.mobility
@@ -84,19 +84,19 @@ class Sheet:
         self._units = [""] * (len(wanted) + len(self._required))
         self._reasons: list[dict[str, int]] = [{} for _ in range(count)]
         self._warnings = np.zeros(count, dtype=np.intp)
-        # Of each kind, by the row: the first warning, and how many there are.
+        # By the kind of warning and the row: the first warning, and the number of warnings.
         self._warned: dict[str, dict[int, tuple[str, int]]] = {}
-        # Of each requirement the row of the worst case so far, and the verdict on it.
+        # By requirement: the row of the worst case so far, and its verdict.
         self._verdicts: dict[int, tuple[int, Verdict]] = {}
 
     def failed(self, row: int, command: str, error: Exception) -> None:
-        """Note why a command has no answer, or a case no study."""
+        """Note why a command has no answer for a case, or why a case makes no study."""
         code, message = explain(error)
         why = "; ".join(message.splitlines())
         self._reasons[row][f"{command}: {why}" if command else why] = max(code, IMPOSSIBLE)
 
     def note(self, rows: Ints, designs: Designs, group: Group) -> None:
-        """Take up the answers of a group of designs, which are the cases of some rows."""
+        """Add the answers of a group of designs, which are the cases `rows`."""
         command = group.result.command
         for row, end in zip(rows.tolist(), group.ends, strict=True):
             if end.error is not None:
@@ -105,21 +105,21 @@ class Sheet:
                 self._reasons[row][f"{command}: {end.failed}"] = IMPOSSIBLE
             self._warnings[row] += len(end.warnings)
             for warning in end.warnings:
-                told = f"{command}: {warning}"
+                message = f"{command}: {warning}"
                 rows_of_kind = self._warned.setdefault(warning.kind, {})
-                first, number = rows_of_kind.get(row, (told, 0))
+                first, number = rows_of_kind.get(row, (message, 0))
                 rows_of_kind[row] = first, number + 1
                 if fails(warning, self._fail_on):
-                    self._reasons[row].setdefault(told, NOT_MET)
+                    self._reasons[row].setdefault(message, NOT_MET)
         self._read(rows, designs, group)
 
     def _read(self, rows: Ints, designs: Designs, group: Group) -> None:
-        """Read numbers and verdicts of a group; where designs cannot be read at once, of each alone."""
+        """Read the numbers and verdicts of a group, design by design where they cannot be read together."""
         command, good = group.result.command, np.array([end.error is None for end in group.ends])
         try:
-            for k, each in enumerate(self._wanted if good.any() else ()):
-                if each.command == command:
-                    values, unit = each.find(group)
+            for k, number in enumerate(self._wanted if good.any() else ()):
+                if number.command == command:
+                    values, unit = number.find(group)
                     self._numbers[rows[good], k] = values[good]
                     self._units[k] = unit
             for k, requirement in enumerate(self._required):
@@ -138,7 +138,7 @@ class Sheet:
         """Judge designs by a requirement."""
         good = np.array([end.error is None for end in group.ends])
         if good.any():
-            follows = any(getattr(each, "expression", None) for each in (requirement.at_least, requirement.at_most))
+            follows = any(getattr(bound, "expression", None) for bound in (requirement.at_least, requirement.at_most))
             own = group.rows.tolist() if follows else group.rows[:1].tolist()
             found = judged(group, [designs.required(row)[k] for row in own])
             self._units[len(self._wanted) + k] = found.unit
@@ -156,7 +156,7 @@ class Sheet:
         self._verdicts[k] = row, verdict
 
     def answered(self) -> Answered:
-        """All that was found."""
+        """The answers of all cases."""
         codes = np.array([max(reason.values(), default=0) for reason in self._reasons], dtype=float)
         codes = np.maximum(codes, ~self._met.all(axis=1))
         reasons: dict[str, int] = {"": 0}
@@ -179,15 +179,16 @@ class Sheet:
         known, verdict = self._verdicts.get(k, (-1, None))
         unmet = np.flatnonzero(~self._met[:, k])
         first = int(unmet[0]) if len(unmet) else 0
-        told = verdict if verdict is not None and known == row else _unanswered(self._required[k])
-        return Worst(row, told, len(unmet), first)
+        if verdict is None or known != row:
+            verdict = _unanswered(self._required[k])
+        return Worst(row, verdict, len(unmet), first)
 
 
 def _unanswered(requirement: Requirement) -> Verdict:
-    """The verdict on a case that has no answer."""
+    """The verdict on a case without an answer."""
     return Verdict(requirements.in_words(requirement), met=False, worst=float("nan"))
 
 
 def _ordered(margins: Floats) -> Floats:
-    """Margins of which one that is not known is the least."""
+    """Margins with the lowest value where one is not known."""
     return np.where(np.isnan(margins), -np.inf, margins)

@@ -18,17 +18,17 @@ from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.poses import Poses
 
-# Commands whose answers are found for many designs at once.
+# Functions of the commands that answer many designs at once.
 TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {
     "kinematics": kinematics.answers, "stiffness": stiffness.answers
 }  # fmt: skip
 
 
 def answers(designs: Designs, command: str) -> Answers:
-    """A command's answer for each design, or why it has none."""
+    """A command's answer for each design, or the error of a design that has none."""
     found: list[Group] = []
     if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
-        # What is wrong with some of them is found alone.
+        # Where a group has an error, its designs are answered one by one.
         for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
             with suppress(MechdesignError):
                 groups = TOGETHER[command](study, poses).groups

@@ -1,4 +1,4 @@
-"""Cases that differ in numbers alone, as designs of one study: a parameter stands in place of each number."""
+"""Cases that differ only in numbers, as designs of one study that has a parameter in place of each number."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import KeyPath, has
+from mechdesign.study.text.document import value_at
 from mechdesign.study.text.units import QUANTITY, QuantityError
 from mechdesign.study.variants import Changes, with_entries
 
-# Forms of cases that are kept.
+# Most forms that are kept.
 _MOST_FORMS = 64
 _FORMS: dict[bytes, Form | None] = {}
 
 
 def form_of(changes: Changes) -> str:
-    """What cases that differ in numbers alone have in common."""
+    """A text that is the same for cases that differ only in numbers."""
     return json.dumps([[name, None if is_number(value) else value] for name, value in changes])
 
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """A study with a parameter in place of each number that cases of it have of their own."""
+    """A study with a parameter in place of each number that cases change; `parameters` are by the names of entries."""
 
     study: Study
-    parameters: Mapping[str, str]  # by the entry
+    parameters: Mapping[str, str]
 
     def designs(self, cases: Sequence[Changes]) -> Designs | None:
         """Cases as designs of the study; None where a quantity has another unit than its entry."""
@@ -49,9 +49,9 @@ class Form:
 
 
 def compiled(study: Study, changes: Changes, first: Changes) -> Form | None:
-    """The form of cases that have words and numbers as `changes`; None where a number decides how it is put together.
+    """The form of cases that differ from `changes` only in numbers; None where a number decides the structure.
 
-    Numbers of the form are the study's own, or where it has none there those of the `first` case of all.
+    The form has the study's own numbers, or those of the `first` case where the study has none.
     """
     key = hashlib.sha256(json.dumps([study.resolved, form_of(changes), first, study.seed]).encode()).digest()
     if key not in _FORMS:
@@ -81,7 +81,7 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
         while parameter in known:
             parameter += "_"
         own[name] = parameter
-        raw = _raw(study, keys)
+        raw = value_at(study.resolved, keys)
         added[parameter] = first[name] if raw is None else raw
         written.append((name, parameter))
     try:
@@ -90,14 +90,6 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
         return None
     moved = Designs(form.study, dict.fromkeys(own.values(), np.zeros(1)))
     return form if own and moved.alike else None
-
-
-def _raw(study: Study, keys: KeyPath) -> Any:
-    """What stands at a path of the data; None where nothing does."""
-    data: Any = study.resolved
-    for key in keys:
-        data = data[key] if has(data, key) else None
-    return data
 
 
 def is_number(value: Any) -> bool:

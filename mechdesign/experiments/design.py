@@ -1,10 +1,10 @@
-"""Designs of experiments: which cases a matrix asks for, made one by one when they are needed."""
+"""Designs of experiments: the cases of a matrix, each made when it is needed."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, overload
 
@@ -12,42 +12,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
-from mechdesign.experiments.cases import Case
-from mechdesign.numerics.arrays import Floats
+from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.schema.matrix import GRID, Values
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
-from mechdesign.study.variants import faults
+from mechdesign.study.variants import Changes, faults
 
 
-class Design(Sequence[Case]):
-    """The cases of a matrix in their order."""
+class Design(Sequence[Changes]):
+    """The cases of a matrix in their order; each gives every varied entry (`names`) a value."""
 
     names: tuple[str, ...]
 
     @abstractmethod
-    def row(self, k: int) -> tuple[Any, ...]:
-        """The values of a case."""
+    def value(self, k: int, place: int) -> Any:
+        """The value of an entry in case `k`."""
 
     @abstractmethod
     def distinct(self, place: int) -> Iterable[Any]:
-        """The values that an entry takes, each at least once."""
+        """The values of an entry over all cases, each at least once."""
 
-    @abstractmethod
     def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        """What an entry is in the first cases, as an array that `convert` makes of values."""
+        """The values of an entry in the first `count` cases, as the array that `convert` makes of them."""
+        return convert([self.value(k, place) for k in range(count)])
 
     @overload
-    def __getitem__(self, k: int) -> Case: ...
+    def __getitem__(self, k: int) -> Changes: ...
     @overload
-    def __getitem__(self, k: slice) -> list[Case]: ...
-    def __getitem__(self, k: int | slice) -> Case | list[Case]:
+    def __getitem__(self, k: slice) -> list[Changes]: ...
+    def __getitem__(self, k: int | slice) -> Changes | list[Changes]:
         if isinstance(k, slice):
-            return [self[each] for each in range(*k.indices(len(self)))]
+            return [self[case] for case in range(*k.indices(len(self)))]
         if not 0 <= k < len(self):
             raise IndexError(k)
-        return Case(tuple(zip(self.names, self.row(k), strict=True)))
+        return tuple((name, self.value(k, place)) for place, name in enumerate(self.names))
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,46 +59,38 @@ class Grid(Design):
     def __len__(self) -> int:
         return math.prod(map(len, self.values))
 
-    def row(self, k: int) -> tuple[Any, ...]:
-        found = []
-        for values in reversed(self.values):
-            k, place = divmod(k, len(values))
-            found.append(values[place])
-        return tuple(reversed(found))
+    def value(self, k: int, place: int) -> Any:
+        return self.values[place][self._index(k, place)]
 
     def distinct(self, place: int) -> Iterable[Any]:
         return self.values[place]
 
     def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        each = math.prod(map(len, self.values[place + 1 :]))
-        return convert(self.values[place])[np.arange(count) // each % len(self.values[place])]
+        index: Ints = self._index(np.arange(count), place)
+        return convert(self.values[place])[index]
+
+    def _index(self, k: Any, place: int) -> Any:
+        """Which of the entry's values case `k` has, a number or an array of them."""
+        return k // math.prod(map(len, self.values[place + 1 :])) % len(self.values[place])
 
 
 @dataclass(frozen=True, eq=False)
 class Spread(Design):
     """Values at points of the unit cube, shape (cases, entries)."""
 
-    vary: Mapping[str, Values]
+    names: tuple[str, ...]
+    values: tuple[Values, ...]
     cube: Floats
-
-    @property
-    def names(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The entries that vary."""
-        return tuple(self.vary)
 
     def __len__(self) -> int:
         return len(self.cube)
 
-    def row(self, k: int) -> tuple[Any, ...]:
-        return tuple(values.at(share) for values, share in zip(self.vary.values(), self.cube[k].tolist(), strict=True))
+    def value(self, k: int, place: int) -> Any:
+        return self.values[place].at(float(self.cube[k, place]))
 
     def distinct(self, place: int) -> Iterable[Any]:
-        values = [*self.vary.values()][place]
+        values = self.values[place]
         return values.values if values.values is not None else (values.from_, values.to)
-
-    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        values = [*self.vary.values()][place]
-        return convert([values.at(share) for share in self.cube[:count, place].tolist()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,14 +103,11 @@ class Listed(Design):
     def __len__(self) -> int:
         return len(self.rows)
 
-    def row(self, k: int) -> tuple[Any, ...]:
-        return self.rows[k]
+    def value(self, k: int, place: int) -> Any:
+        return self.rows[k][place]
 
     def distinct(self, place: int) -> Iterable[Any]:
         return (row[place] for row in self.rows)
-
-    def column(self, place: int, count: int, convert: Callable[[Sequence[Any]], NDArray[Any]]) -> NDArray[Any]:
-        return convert([row[place] for row in self.rows[:count]])
 
 
 def cases_of(study: Study) -> Design:
@@ -139,9 +127,10 @@ def cases_of(study: Study) -> Design:
         design = Grid(tuple(matrix.vary), tuple(values.on_grid() for values in matrix.vary.values()))
     else:
         assert matrix.samples is not None
-        design = Spread(matrix.vary, _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed))
+        cube = _cube(matrix.method, len(matrix.vary), matrix.samples, study.seed)
+        design = Spread(tuple(matrix.vary), tuple(matrix.vary.values()), cube)
     for place, name in enumerate(design.names):
-        # Quantities as they are written, for their units must fit.
+        # Quantities are tried as they are written: the units must fit the entry.
         written = study.resolved["matrix"]["vary"][name] if matrix.vary is not None else ()
         _try(study, name, [*design.distinct(place), *_parts(written)])
     return design
@@ -165,21 +154,21 @@ def _cube(method: str, dimensions: int, samples: int, seed: int) -> Floats:
     random = np.random.default_rng(seed)
     if method == "latin_hypercube":
         return np.asarray(qmc.LatinHypercube(dimensions, rng=random).random(samples))
-    # Any number of points may be drawn of a power of two.
+    # The sequence is even over powers of two: the next larger one is drawn, and its first points are used.
     sobol = qmc.Sobol(dimensions, scramble=True, rng=random)
     return np.asarray(sobol.random_base2((samples - 1).bit_length()))[:samples]
 
 
 def _try(study: Study, name: str, values: Sequence[Any]) -> None:
-    """Load the study with each word or structure that an entry takes in some case, alone.
+    """Load the study with each word or structure that an entry takes in some case, the other entries as they are.
 
     Raises
     ------
     StudyError
-        Where the entry itself is wrong then; what is wrong only together with others is found in its case.
+        Where the entry itself is wrong. A mistake that needs several entries is reported by its case.
     """
     words = [value for value in values if not isinstance(value, int | float) or isinstance(value, bool)]
-    # Of quantities one of each unit.
+    # One quantity of each unit is tried.
     tried = [*{(QUANTITY.fullmatch(str(value)) or {"unit": in_yaml(value)})["unit"]: value for value in words}.values()]
     keys = ("matrix", "vary", name) if study.matrix and study.matrix.vary is not None else ("matrix", "cases")
     problems = [

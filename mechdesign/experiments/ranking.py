@@ -17,13 +17,13 @@ from mechdesign.results import Column
 from mechdesign.study.schema.matrix import Best
 from mechdesign.terms import path_of, terms_of
 
-# Numbers of a result that are the same to this part of the largest are equal: as many digits as tables have.
+# Differences up to this part of the largest number count as none, the precision of tables.
 _RESOLUTION = 1e-12
 
 
 @dataclass(frozen=True)
 class Goal(Wanted):
-    """A number of a case that is to be large or small; of a motion of which a part is missing there is none."""
+    """A number of a case that is maximised or minimised; nan where a part of the motion is missing."""
 
     def find(self, group: Group) -> Numbers:
         """The number of each design; see `Wanted.find`."""
@@ -34,7 +34,7 @@ class Goal(Wanted):
 
 
 def goals_of(best: Best | None) -> dict[Goal, int]:
-    """What is to be large, with the sign -1, or small, with the sign 1."""
+    """The goals, with the sign -1 where they are maximised and 1 where they are minimised."""
     chosen = [] if best is None else [("maximize", -1, best.maximize), ("minimize", 1, best.minimize)]
     return {
         Goal(result.result, tuple(result.where.items()), ("matrix", "best", key, k)): sign
@@ -50,10 +50,9 @@ class Ranking:
     Parameters
     ----------
     rank : ndarray of float
-        1 is the best; cases that are equally good have the same, and as many numbers are left out behind them. nan of
-        cases that have no rank.
+        1 is the best. Equally good cases share a rank, and the next ranks are left out. nan of cases without a rank.
     front : ndarray of bool
-        Cases that no other with a rank surpasses: none is as good in every goal and better in one.
+        The Pareto front: cases for which no ranked one is as good in every goal and better in one.
     """
 
     rank: Floats
@@ -61,15 +60,15 @@ class Ranking:
 
     @classmethod
     def of(cls, goals: Mapping[str, int], columns: Mapping[str, Floats], admitted: Flags) -> Ranking:
-        """Rank the cases that are admitted and have a number for each goal.
+        """Rank the admitted cases that have a number for each goal.
 
-        One goal ranks by itself, several by the sum of what part of each goal's range over these cases lies between a
-        case and the best one: the order of equal weights of an optimisation [S1, eqs. 27, 28].
+        Cases are ranked by the sum over the goals of the distance from the best case, as a part of the goal's range
+        over these cases: the order of an optimisation with equal weights [S1, eqs. 27, 28].
 
         Parameters
         ----------
         goals : dict of str to int
-            Results with 1 where they are to be small, -1 where they are to be large.
+            1 for a minimised result, -1 for a maximised one.
         columns : dict of str to ndarray
             Values of each case; nan where there is none.
         admitted : ndarray of bool

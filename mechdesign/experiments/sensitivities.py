@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from pydantic_core import PydanticCustomError
@@ -14,7 +13,7 @@ from mechdesign.cautions import Caution
 from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
-from mechdesign.experiments.cases import Case, answers, foresee, seeded
+from mechdesign.experiments.cases import answers, foresee, seeded
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
@@ -24,17 +23,18 @@ from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.schema.sensitivities import Changed
 from mechdesign.study.schema.study_file import entry
-from mechdesign.study.text.document import dotted, has
+from mechdesign.study.text.document import dotted, value_at
 from mechdesign.study.text.fields import Context, read_number, shown
 from mechdesign.study.text.units import Amount, QuantityError, Units
-from mechdesign.study.variants import entry_unit
+from mechdesign.study.variants import Changes, entry_unit
 from mechdesign.work.threads import one_thread
 
 HELP_PAGE = "howto/sensitivities"
 
 # Largest change where the study names none, as a part of the value.
 _PART = 0.01
-# A derivative is told as uncertain from this relative error on, unless so little of the result hangs on it.
+# Relative error from which on a derivative is uncertain, unless the change over a step is less than this part of the
+# result.
 _UNCERTAIN, _NOTHING = 0.01, 1e-9
 
 
@@ -42,20 +42,20 @@ _UNCERTAIN, _NOTHING = 0.01, 1e-9
 class Changing:
     """A number of the study that changes."""
 
-    given: str  # as the study names it
-    name: str  # of the entry
+    given: str  # the name in the section
+    name: str  # the name of the entry
     value: float
-    step: float  # the largest
+    step: float  # the largest step
     unit: str
 
-    def cases(self) -> Iterator[Case]:
+    def cases(self) -> Iterator[Changes]:
         """Cases with the number reduced by each step, then with it increased by each step."""
         for sign in (-1, 1):
-            yield from (Case.of({self.name: self.value + sign * step}) for step in (self.step * STEPS).tolist())
+            yield from (((self.name, self.value + sign * step),) for step in (self.step * STEPS).tolist())
 
 
 def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
-    """The results and the numbers that change; nothing is computed but a look at the study.
+    """The wanted results and the numbers that change, checked by a short look at the study's results.
 
     Raises
     ------
@@ -84,12 +84,10 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
     return wanted, found
 
 
-def _changing(study: Study, each: Changed) -> Changing:
-    given = each.parameter
+def _changing(study: Study, changed: Changed) -> Changing:
+    given = changed.parameter
     path = entry(study.resolved, f"mechanism.parameters.{given}" if given in study.parameters.nominal else given)
-    raw: Any = study.resolved
-    for key in path:
-        raw = raw[key] if has(raw, key) else None
+    raw = value_at(study.resolved, path)
     if raw is None:
         raise StudyError(f"{given} is left to its default; give it a value in the study first")
     try:
@@ -98,12 +96,12 @@ def _changing(study: Study, each: Changed) -> Changing:
         raise StudyError(f"{given} is {shown(raw)}, and only a number can change a little") from None
     if number.expression is not None:
         raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
-    if each.step is None and not number:
+    if changed.step is None and not number:
         raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
     name = dotted(path)
     unit = entry_unit(study, name)
     try:
-        given_step = Amount.of(each.step or 0.0)
+        given_step = Amount.of(changed.step or 0.0)
         step = (given_step.within(unit) if unit else given_step) or _PART * abs(number)
     except QuantityError as error:
         raise StudyError(f"{given}: {error}") from None
@@ -117,7 +115,7 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     wanted, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
-    cases = [Case(()), *(case for number in numbers for case in number.cases())]
+    cases: list[Changes] = [(), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
     tally = Tally(cases, len(wanted), 0)
     for answered in answers(plain, cases, wanted, jobs=jobs):
@@ -127,15 +125,15 @@ def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1
     table = _table(rows, [tally.result(k)[1] for k in range(len(wanted))], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
     failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
-    told = [
+    warnings = [
         Caution("unconverged", f"{row.result} by {row.parameter}: {row.doubt}", table.name, k)
         for k, row in enumerate(rows)
         if row.doubt
     ]
     for kind, warned in tally.warned.items():
         words = f"{warned.cases} of {counted(len(tally), 'case')} have warnings; the first: {warned.message}"
-        told.append(Caution(kind, words))
-    return Result(SENSITIVITIES.name, {table.name: table}, told, counts, failed)
+        warnings.append(Caution(kind, words))
+    return Result(SENSITIVITIES.name, {table.name: table}, warnings, counts, failed)
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ class Row:
     error: float
     below: float
     above: float
-    doubt: str  # why it is not known, or not well
+    doubt: str  # why it is unknown or uncertain; empty if it is neither
 
     @property
     def elasticity(self) -> float:
@@ -175,7 +173,7 @@ def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -
             elif math.isnan(value):
                 doubt = f"is not known near {number.value:g}: {reason or tally.reason(0) or 'it is nan there'}"
             elif error > max(_UNCERTAIN * abs(value), scale):
-                # Roughness wants longer steps, a curve that bends within them shorter ones.
+                # Noise needs longer steps, strong curvature shorter ones.
                 other = number.step * 10 if number.step <= _PART * abs(number.value) else number.step / 10
                 doubt = (
                     f"differences do not agree: {value:.4g} with an error of {error:.2g}; it may jump here or be rough "

@@ -34,28 +34,28 @@ _SECTION = "matrix"
 
 
 def prepared(study: Study) -> tuple[Design, list[Wanted]]:
-    """The cases of a study and what is wanted of each; nothing is computed but a look at the study itself.
+    """The cases of a study and the numbers wanted of each, checked by a short look at the study's results.
 
     Raises
     ------
     StudyError
-        If there is no matrix, nothing to be found of a case, or a name that is unknown.
+        If there is no matrix, no result or requirement, or an unknown name.
     """
     matrix = study.matrix
     if matrix is None:
         raise StudyError(
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
-    goals = {each.title: each for each in goals_of(matrix.best)}
-    wanted = [*({each.title: each for each in wanted_in(_SECTION, matrix.results)} | goals).values()]
+    goals = {number.title: number for number in goals_of(matrix.best)}
+    wanted = [*({number.title: number for number in wanted_in(_SECTION, matrix.results)} | goals).values()]
     if not commands_of(study, wanted):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
     foresee(study, wanted)
-    # What is required has its column.
+    # A number with a requirement has a column already.
     required = requirement_names(study)
-    return cases, [each for each in wanted if each.title not in required]
+    return cases, [number for number in wanted if number.title not in required]
 
 
 @one_thread()
@@ -88,13 +88,13 @@ def sweep(
 
 
 def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Result:
-    """The table of the cases that were answered."""
+    """The result with the table of the answered cases."""
     count, asked, failed = len(tally), len(cases), tally.failed
     counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
-    told = ""
+    message = ""
     if failed:
         first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
-        told = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
+        message = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
     part = f"{count} of {asked} cases were answered; this is what they are" if count < asked else ""
     table = SWEEP.table(_columns(study, cases, tally, wanted))
     ranked = None
@@ -105,28 +105,28 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
         if study.matrix and study.matrix.best and study.matrix.best.sort:
             table = table.take(np.argsort(ranking.rank, kind="stable"))
     return Result(
-        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, told, interrupted=part,
+        "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, message, interrupted=part,
         drawn=_drawn(study, tally, wanted),
     )  # fmt: skip
 
 
 def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, Any]:
-    """What pictures show: the entries that vary, the results with what is required of them, and which are goals."""
+    """Data of the pictures: the entries that vary, the results with their limits, and the goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
-    results = limits | {each.title: (None, None) for each in wanted}
-    entries = [name for name, _ in tally.cases[0].changes]
+    results = limits | {number.title: (None, None) for number in wanted}
+    entries = [name for name, _ in tally.cases[0]]
     return {"cases": tally, "entries": entries, "results": results, "goals": _goals(study)}
 
 
 def _goals(study: Study) -> dict[str, int]:
-    """Columns of the goals: 1 where one is to be small, -1 where it is to be large."""
+    """Goals by their columns: 1 for a minimised, -1 for a maximised one."""
     best = study.matrix.best if study.matrix is not None else None
-    return {each.title: sign for each, sign in goals_of(best).items()}
+    return {number.title: sign for number, sign in goals_of(best).items()}
 
 
 def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
-    """The number of the case and how it ended, what varies, the requirements, the results, and why it failed."""
+    """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
     yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
     for place, name in enumerate(cases.names):
@@ -137,8 +137,8 @@ def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]
         limit = str(tally.worst[k].verdict.requirement)
         yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
         yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
-    for k, each in enumerate(wanted):
-        yield SWEEP["<result>"].column(*tally.result(k), result=each.title)
+    for k, number in enumerate(wanted):
+        yield SWEEP["<result>"].column(*tally.result(k), result=number.title)
     reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
     yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
 

@@ -1,4 +1,4 @@
-"""What becomes of many cases, kept as numbers: cases by the million are counted, not held."""
+"""Answers of many cases, kept as rows of numbers, so that millions of cases fit in memory."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from typing import Any
 import numpy as np
 
 from mechdesign.experiments.answered import IMPOSSIBLE, Answered, Warned, Worst
-from mechdesign.experiments.cases import Case
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.cases import changes_in_words
 from mechdesign.report.requirements import Verdict, over_cases
+from mechdesign.study.variants import Changes
 from mechdesign.work.journal import Journal, digest
 
-# Cases after which, and seconds, a journal gets those that are finished.
+# Number of cases, or seconds, after which finished cases are written to a journal.
 _BLOCK, _SECONDS = 1024, 5.0
 
 
 class Tally:
-    """What came of the first cases of a design; the texts that stand for all of them are of the first or the worst.
+    """Answers of the first cases of a design; only the first warning of a kind and the worst verdicts are texts.
 
     Parameters
     ----------
-    cases : sequence of Case
-        All of them.
+    cases : sequence of Changes
+        All cases.
     results, requirements : int
-        Numbers that are wanted of each, and verdicts on it.
+        Number of wanted numbers of each case, and number of requirements.
     """
 
-    def __init__(self, cases: Sequence[Case], results: int, requirements: int) -> None:
+    def __init__(self, cases: Sequence[Changes], results: int, requirements: int) -> None:
         self.cases = cases
         self._results, self._requirements = results, requirements
         self.width = 3 + results + 2 * requirements
@@ -49,7 +49,7 @@ class Tally:
         return len(self._rows) // self.width
 
     def add(self, answered: Answered) -> None:
-        """Take up the next cases."""
+        """Add the answers of the next cases."""
         begin, table = len(self), answered.table.copy()
         numbers = [self.reasons.setdefault(reason, len(self.reasons)) for reason in answered.reasons]
         table[:, 2] = np.array(numbers)[table[:, 2].astype(np.intp)]
@@ -58,12 +58,12 @@ class Tally:
         for kind, warned in answered.warned.items():
             before = self.warned.setdefault(kind, replace(warned, case=begin + warned.case, cases=0))
             before.cases += warned.cases
-        new = [replace(each, case=begin + each.case, first=begin + each.first) for each in answered.worst]
-        for worst, each in zip(self.worst, new, strict=bool(self.worst)):
-            if _margin(each.verdict) < _margin(worst.verdict):
-                worst.case, worst.verdict = each.case, each.verdict
-            worst.first = worst.first if worst.unmet else each.first
-            worst.unmet += each.unmet
+        new = [replace(other, case=begin + other.case, first=begin + other.first) for other in answered.worst]
+        for worst, other in zip(self.worst, new, strict=bool(self.worst)):
+            if _margin(other.verdict) < _margin(worst.verdict):
+                worst.case, worst.verdict = other.case, other.verdict
+            worst.first = worst.first if worst.unmet else other.first
+            worst.unmet += other.unmet
         self.worst = self.worst or new
 
     @property
@@ -84,7 +84,7 @@ class Tally:
 
     @property
     def failed(self) -> list[int]:
-        """Cases that have no answer."""
+        """Numbers of the cases without an answer."""
         return np.flatnonzero(self.table[:, 0] >= IMPOSSIBLE).tolist()
 
     def reason(self, k: int) -> str:
@@ -95,15 +95,16 @@ class Tally:
     def verdicts(self) -> tuple[Verdict, ...]:
         """The worst verdict on each requirement over the cases, and how many do not meet it."""
         return tuple(
-            over_cases(each.verdict, self.named(each.case), each.unmet, len(self), each.first) for each in self.worst
+            over_cases(worst.verdict, self.named(worst.case), worst.unmet, len(self), worst.first)
+            for worst in self.worst
         )
 
     def named(self, k: int) -> str:
         """A case in words: its number, from 1, and its values."""
-        return f"case {k + 1} ({changes_in_words(self.cases[k].changes)})"
+        return f"case {k + 1} ({changes_in_words(self.cases[k])})"
 
     def note(self, journal: Journal, *, last: bool = False) -> None:
-        """Let a journal have the cases that it has not, if they are many or it is time, or they are the last."""
+        """Write new cases to a journal, if they are many, some seconds have passed, or they are the last."""
         begin = sum(self._sizes)
         few = len(self) - begin < _BLOCK and time.monotonic() - self._noted < _SECONDS
         if begin == len(self) or (few and not last):
@@ -113,7 +114,7 @@ class Tally:
         self._noted = time.monotonic()
 
     def recall(self, journal: Journal) -> None:
-        """Take up what a journal has of these cases."""
+        """Read the first cases from a journal."""
         state = json.loads(journal.words[0]) if journal.words else {"sizes": []}
         blocks: dict[bytes, Floats] = {}
         begin = 0
@@ -133,13 +134,13 @@ class Tally:
         self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
         self._units = state["units"]
         self.warned = {kind: Warned(**each) for kind, each in state["warned"].items()}
-        self.worst = [Worst(**each | {"verdict": Verdict(**each["verdict"])}) for each in state["worst"]]
+        self.worst = [Worst(**worst | {"verdict": Verdict(**worst["verdict"])}) for worst in state["worst"]]
 
     def _state(self) -> Mapping[str, Any]:
         return {
             "sizes": self._sizes, "reasons": [*self.reasons], "units": self._units,
-            "warned": {kind: asdict(each) for kind, each in self.warned.items()},
-            "worst": [asdict(each) for each in self.worst],
+            "warned": {kind: asdict(warned) for kind, warned in self.warned.items()},
+            "worst": [asdict(worst) for worst in self.worst],
         }  # fmt: skip
 
     def _key(self, begin: int, end: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Numbers of cases by the names of results, and how far they are from what is required: of many cases at once."""
+"""Numbers of cases by the names of results, and their margins from requirements, of many cases at once."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class Wanted:
     Parameters
     ----------
     name : str
-        ``COMMAND.COLUMN``, ``COMMAND.TABLE.COLUMN`` or ``COMMAND.TABLE.ROW.COLUMN`` as requirements have it, or a
-        number of the workspace alone (``GII``); of several rows followed by one of `mechdesign.statistics.STATISTICS`;
-        or a sum of such numbers.
+        ``COMMAND.COLUMN``, ``COMMAND.TABLE.COLUMN`` or ``COMMAND.TABLE.ROW.COLUMN``, as in requirements, or a number of
+        the workspace alone (``GII``). Of several rows one of `mechdesign.statistics.STATISTICS` follows. A sum of such
+        numbers is a number, too.
     where : tuple of (str, value)
         Only rows whose columns have these values count.
     keys : tuple
@@ -63,7 +63,7 @@ class Wanted:
 
     @property
     def command(self) -> str:
-        """The command whose result it is of."""
+        """The command that computes it."""
         return command_named(self.name) or "workspace"
 
     def find(self, group: Group) -> Numbers:
@@ -72,27 +72,27 @@ class Wanted:
         Raises
         ------
         UnknownColumnError
-            If there is no such column or row, or several rows count and no statistic is named; also where designs have
-            not as many rows each, and have to be asked one by one.
+            If there is no such column or row, or several rows count and no statistic is named; also where designs
+            differ in their number of rows, so that each has to be read by itself.
         """
         terms = _terms(group, path_of(self.name), dict(self.where))
         return Numbers(terms.numbers(len(group.ends)), terms.unit)
 
 
 def wanted_in(section: str, results: Iterable[Named]) -> list[Wanted]:
-    """What a section of the study names as its results."""
+    """The numbers that a section of the study lists as its results."""
     return [
         Wanted(result.result, tuple(result.where.items()), (section, "results", k)) for k, result in enumerate(results)
     ]  # fmt: skip
 
 
 def judged(group: Group, required: Sequence[Requirement]) -> Judged:
-    """The worst value of each design that a requirement judges, as `mechdesign.report.requirements.judge` finds it.
+    """Worst value and margin of each design by a requirement, as in `mechdesign.report.requirements.judge`.
 
     Parameters
     ----------
     required : sequence of Requirement
-        That of each design where its limits follow what changes; else a single one for all.
+        The requirement of each design where its limits follow parameters; else a single one for all.
 
     Raises
     ------
@@ -100,12 +100,12 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
         See `Wanted.find`.
     """
     (one, *_), found = required, []
-    limits = zip(*(bounds_of(each) for each in required), strict=True)
+    limits = zip(*(bounds_of(requirement) for requirement in required), strict=True)
     for own in limits:
         goal = own[0]
         terms = _terms(group, goal.column, dict(goal.where))
         values = goal.judge(group.result, len(group.ends)).values
-        beyond = values - np.array([terms.bound(each.bound) for each in own])
+        beyond = values - np.array([terms.bound(goal.bound) for goal in own])
         found.append((values, -beyond if goal.smallest else beyond))
     values, margins = (np.stack(part) for part in zip(*found, strict=True))
     nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
@@ -115,7 +115,7 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
 
 
 def _terms(group: Group, path: str, where: dict[str, Any]) -> Chosen | Sum:
-    """What a path names, of which each design has as many rows and at least one that counts."""
+    """The rows that a path names, of which each design has the same number, and at least one that counts."""
     terms, designs = terms_of(group.result, path, where), len(group.ends)
     if designs == 1 and terms.missing:
         raise UnknownColumnError(terms.missing)

@@ -12,7 +12,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, Ints
 
 # A number or an array that broadcasts against the batch; numbers stay numbers, which keeps constants cheap.
 Value = float | NDArray[np.floating]
-# The same of plane vectors; a real one lies along x, as the plain 0 and 1 do.
+# The same for plane vectors; a real number is a vector along x.
 Vector = Value | complex | NDArray[np.complexfloating]
 Either = TypeVar("Either", Value, Vector)
 
@@ -23,16 +23,16 @@ quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
 
 
 def picked(value: Either, index: Ints | int | slice) -> Either:
-    """Those of some poses of a flat batch; a value that is the same for all stays a number."""
+    """Values of some poses of a flat batch; a value that is the same for all poses stays a number."""
     return value[index] if isinstance(value, np.ndarray) and value.ndim else value
 
 
 def largest(values: Iterable[Value], least: float = 0.0) -> Value:
-    """The largest size of several values, at least `least`."""
-    found: Value = least
+    """The largest absolute value, at least `least`."""
+    size: Value = least
     for value in values:
-        found = np.maximum(found, np.abs(value))
-    return found
+        size = np.maximum(size, np.abs(value))
+    return size
 
 
 def norm2(z: Vector) -> Value:
@@ -51,7 +51,7 @@ def dot(a: Vector, b: Vector) -> Value:
 
 
 def plus(total: Either, sign: int, term: Either) -> Either:
-    """``total + sign * term`` without a pass over an array where one of them is nothing."""
+    """``total + sign * term``; an array is not copied where the other is the number 0."""
     if isinstance(term, float | complex) and term == 0:
         return total
     if isinstance(total, float | complex) and total == 0:
@@ -60,7 +60,7 @@ def plus(total: Either, sign: int, term: Either) -> Either:
 
 
 def times(a: Value, b: Either) -> Either:
-    """Product without a pass over an array where one factor is plainly 0 or 1."""
+    """Product; an array is not copied where the other factor is the number 0 or 1."""
     for one, other in ((a, b), (b, a)):
         if isinstance(one, float) and one in (0.0, 1.0):
             return 0.0 if one == 0.0 else other
@@ -73,11 +73,10 @@ def vector(x: Floats, y: Floats) -> Complexes: ...
 def vector(x: Value, y: Value) -> Vector: ...
 def vector(x: Value, y: Value) -> Vector:
     """Complex number x + i y without the temporaries of ``x + 1j * y``."""
-    shape = np.broadcast_shapes(np.shape(x), np.shape(y))
-    if not shape:
+    if not np.ndim(x) and not np.ndim(y):
         # A NumPy scalar, not Python's: it divides by zero without raising.
         return np.complex128(complex(x, y))
-    z = np.empty(shape, dtype=complex)
+    z = np.empty(np.broadcast_shapes(np.shape(x), np.shape(y)), dtype=complex)
     z.real = x
     z.imag = y
     return z
@@ -86,7 +85,7 @@ def vector(x: Value, y: Value) -> Vector:
 def rotation(angle: Value) -> Vector:
     """Unit vector at `angle` (radians).
 
-    By the tangent of half the angle, which NumPy finds in a third of the time of a sine and a cosine.
+    By the tangent of half the angle, which takes NumPy a third of the time of a sine and a cosine.
     """
     t = np.tan(0.5 * np.asarray(angle))
     square = t * t
@@ -106,5 +105,5 @@ def wrap(angle: Value) -> Value:
 
 
 def nearest(angle: Value, near: Value, turn: float = TURN) -> Value:
-    """An angle in the turn in which it lies within half a turn of `near`; `turn` is after what it repeats."""
+    """An angle with whole turns added so that it lies within half a turn of `near`; `turn` is its period."""
     return angle + turn * np.round((near - angle) / turn)

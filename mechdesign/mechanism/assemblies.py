@@ -16,9 +16,9 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import SKETCH, deciding_joints
 
-# Assemblies that are listed and followed at most.
+# Largest number of assemblies.
 MAX_ASSEMBLIES = 256
-# The assemblies of a group without a closed form are found by Newton's method from so many starts, in so many steps.
+# Newton's method finds the assemblies of a group without a closed form from this many starts, in this many steps.
 SEARCH_STARTS = 512
 SEARCH_STEPS = 40
 # Solutions nearer than this (radians, or parts of the mechanism's size) are the same.
@@ -40,9 +40,8 @@ class Assembly:
 def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, ...]:
     """Every assembly mode of the plan of given coordinates, the sketch's first.
 
-    Groups with a closed form have two modes each, whether or not they close at the sketch. Those of a group without
-    one are searched at the sketch's values of the given coordinates by Newton's method from many starts: all that were
-    found are followed, and there may be more.
+    Groups with a closed form have two modes each, whether or not they close at the sketch. For a group without one,
+    Newton's method searches from many starts at the sketch's values of the given coordinates; it may miss some.
 
     Raises
     ------
@@ -56,7 +55,7 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
             f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes; leave --all-modes out",
             "mechanism.sketch",
         )
-    found: list[Assembly] = []
+    listed: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
         modes = list(plan.modes)
         for index, sign in zip(choosing, signs, strict=True):
@@ -67,14 +66,14 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
         ]
         drawn = modes == list(plan.modes)
         if not plan.iterative:
-            found.append(Assembly(" ".join(names) or "only", _variant(mechanism, plan, modes, None), drawn))
+            listed.append(Assembly(" ".join(names) or "only", _variant(mechanism, plan, modes, None), drawn))
             continue
         for number, configuration in enumerate(_solutions(plan, modes, drawn), 1):
             label = " ".join([*names, f"#{number}"])
-            found.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
-            if len(found) > MAX_ASSEMBLIES:
+            listed.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
+            if len(listed) > MAX_ASSEMBLIES:
                 raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out", SKETCH)
-    return tuple(found)
+    return tuple(listed)
 
 
 def _variant(
@@ -95,7 +94,7 @@ def _variant(
 
 
 def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configuration]:
-    """Assembled poses at the sketch's values for some modes of the closed forms; the sketch first, if it is one."""
+    """Assembled poses at the sketch's values for given modes of the closed forms; the sketch first if `drawn`."""
     sketch = plan.core.sketch_configuration
     given = [np.asarray(sketch.value(coordinate), dtype=float) for coordinate in plan.structure.given]
     random = np.random.default_rng(0)
@@ -110,15 +109,15 @@ def _solutions(plan: Plan, modes: Sequence[int], drawn: bool) -> list[Configurat
     every = plan.configuration(state, (SEARCH_STARTS,), {}, state.solved((SEARCH_STARTS,)))
     good = every.valid
     for slide in plan.core.graph.telescopic:
-        # A leg without length has no direction: whatever its angle, it is no assembly.
+        # A leg of length zero closes at any angle, and is no assembly.
         with np.errstate(invalid="ignore"):
             good = good & (np.asarray(every.slides[slide]) > SAME_ASSEMBLY * size)
-    found = [sketch] if drawn else []
+    solutions = [sketch] if drawn else []
     for lane in np.flatnonzero(good):
         one = every.take(int(lane))
-        if not any(_same(one, other, size) for other in found):
-            found.append(one)
-    return found
+        if not any(_same(one, other, size) for other in solutions):
+            solutions.append(one)
+    return solutions
 
 
 def _same(one: Configuration, other: Configuration, size: float) -> bool:

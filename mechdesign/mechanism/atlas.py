@@ -1,6 +1,6 @@
-"""Solved poses all over a region of the plane, from which others are continued where there is no closed form.
+"""Solved poses on a lattice over the workspace, from which groups without a closed form are continued to other poses.
 
-From the sketch every pose would be a long way, and places out of reach would be tried again and again.
+The way from the sketch would be long for most poses, and poses out of reach would be tried again and again.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ if TYPE_CHECKING:
 
 # Distance of neighbouring poses, as a part of the mechanism's size.
 SPACING = 0.03
-# Beyond this many spacings from the nearest solved pose nothing is inside.
+# A pose farther than this many spacings from the nearest solved one is out of reach.
 REACH = 1.6
-# Most poses of a design.
+# Largest number of poses of a design.
 MAX_POSES = 20_000
-# Poses outside the study's limits are passed through over this many spacings: there may be another piece beyond.
+# The lattice grows through poses outside the study's limits over this many spacings, as there may be others beyond.
 LIMIT_GAP = 15
 # Step of finite differences, as a part of the mechanism's size.
 DIFFERENCE_STEP = 1e-6
-# Steps in which dimensions are changed.
+# Number of steps in which dimensions are changed.
 STAGES = 8
-# Steps in which held coordinates are brought from their values in the sketch to others.
+# Number of steps in which held coordinates are changed from their values in the sketch.
 HELD_STAGES = 16
-# Of the nominal poses, those at every so many-th place of the lattice are brought to other dimensions.
+# Every third node of the lattice along x and y is continued to other dimensions; the rest grows from these.
 SEED_EVERY = 3
-# Poses of all designs that are kept for later calls.
+# Number of poses, of all designs, that are kept for later calls.
 KEPT_POSES = 500_000
-# Newton's corrections of a pose predicted by slopes.
+# Newton steps for a pose that was predicted by slopes.
 CORRECTIONS = 5
-# Newton's corrections near a fold, made one at a time.
+# Newton steps near a fold, made one at a time.
 SINGLE_CORRECTIONS = 30
-# A correction that leaves less of the determinant than this leads towards a fold (at the fold itself: a half).
+# A Newton step that leaves less than this part of the determinant leads towards a fold (at a fold one half is left).
 NEAR_FOLD = 0.8
-# Steps to the neighbours of a place of the lattice.
+# Steps to the neighbours of a node of the lattice.
 NEIGHBOURS = np.array([1, 1j, -1, -1j])
 
 # Dimensions of each pose that differ from the nominal ones.
@@ -56,8 +56,9 @@ Sizes = Mapping[str, Floats]
 class _Poses:
     """Solved poses of one design on a lattice.
 
-    Places of the point as a tree, and in spacings from the sketch's; a table of the unknowns of the groups without a
-    closed form, shape (unknowns, poses), and their slopes by the point's x and y, shape (2, unknowns, poses).
+    `tree` and `lattice` have the places of the point, the latter in spacings from its place in the sketch. `table` has
+    the unknowns of the groups without a closed form, shape (unknowns, poses), and `slopes` their derivatives by the
+    point's x and y, shape (2, unknowns, poses).
     """
 
     tree: cKDTree
@@ -68,10 +69,11 @@ class _Poses:
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """Poses of a mechanism all over its region, for the nominal dimensions, and for others when they are needed.
+    """Solved poses of a mechanism over its workspace, of the nominal dimensions and of others that have been asked for.
 
-    `held` are the values of the plan's coordinates after the point's x and y, `signs` those of the determinants of the
-    groups without a closed form, shape (groups, 1) (others are other assemblies), `origin` the point in the sketch.
+    `held` are the values of the plan's coordinates after the point's x and y. `signs` are the signs of the determinants
+    of the groups without a closed form, shape (groups, 1); other signs mean another assembly. `origin` is the point in
+    the sketch, and `known` has the poses by dimensions.
     """
 
     plan: Plan
@@ -82,10 +84,10 @@ class Atlas:
 
     @staticmethod
     def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
-        """Poses of the nominal mechanism, grown from the sketch's place until nothing more is reached.
+        """The atlas of the nominal mechanism, grown from the sketch until no more poses are reached.
 
-        Where the held values cannot be had there, all poses with those of the sketch are brought to them step by step.
-        There are none where that does not lead to them either.
+        Where the point in the sketch cannot have the held values, the atlas for the values in the sketch is continued
+        to them step by step. It is empty if that fails.
         """
         sketch, coordinates = plan.core.sketch_configuration, plan.structure.given
         origin = complex(*(float(sketch.value(c)) for c in coordinates[:2]))
@@ -94,8 +96,8 @@ class Atlas:
             given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, values)]
             first = plan.solve(given, limits=False)
             start = plan.start(first)
-            found = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
-            return found, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
+            grown = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
+            return grown, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
 
         atlas, table = begun(held)
         lattice = np.zeros(table.shape[1], dtype=complex)
@@ -116,7 +118,7 @@ class Atlas:
 
     @property
     def empty(self) -> bool:
-        """Whether the held values cannot be had at the point's place in the sketch, where poses would grow from."""
+        """Whether no pose with the held values was reached."""
         return not self.known[b""].tree.n
 
     @property
@@ -127,8 +129,8 @@ class Atlas:
     def solve(self, z: Complexes, places: Mapping[str, Value], *, beyond: bool = False) -> tuple[Configuration, Floats]:
         """The mechanism with its point at `z`, and how far it is from where two of its assemblies meet (a fold).
 
-        Links that do not depend on a leg out of reach stay finite, as where all groups have a closed form. Where the
-        nearest solved pose is far and a leg does not reach either, the pose is that of a place on the way from there.
+        Links that do not depend on a leg out of reach stay finite, as with closed forms. Where the nearest solved pose
+        is far and a leg does not reach, the pose is that of a place on the way from the nearest one.
 
         Parameters
         ----------
@@ -140,10 +142,10 @@ class Atlas:
         Returns
         -------
         configuration : Configuration
-            nan where nothing is reached.
+            nan where no pose is reached.
         fold_distance : ndarray
             The product of the squared determinants, linear in the distance to a fold and negative beyond it; nan
-            where nothing is known.
+            where no solved pose is near.
         """
         shape = np.broadcast_shapes(z.shape, *(np.shape(value) for value in places.values()))
         flat = np.broadcast_to(z, shape).ravel()
@@ -165,10 +167,10 @@ class Atlas:
     def _solved(
         self, z: Complexes, sizes: Sizes, table: Floats, ahead: Value, within: Complexes, beyond: bool = False
     ) -> tuple[State, Floats]:
-        """The mechanism near known poses, and its distances from a fold (see `solve`).
+        """The mechanism near solved poses, and its distances from a fold (see `solve`).
 
-        `table` has the unknowns of the known poses, `ahead` the change expected from there. Where a pose is not solved
-        at once, that with the point at `within` is found instead of `z`.
+        `table` has the unknowns of the solved poses, `ahead` their predicted change. Where Newton's method fails at
+        once, the pose is solved with the point at `within`, and `z` is overwritten.
         """
         # Near a fold the unknowns change too fast for a prediction by their slopes.
         scale = scale_of(self.plan.structure, self.plan.core.size, table)
@@ -178,23 +180,23 @@ class Atlas:
         rows = np.flatnonzero(~state.solved(z.shape, self.signs.tolist()))
         if not len(rows):
             return state, fold_distance
-        found = table_of(state.unknowns, z.shape)
+        solved = table_of(state.unknowns, z.shape)
         own = {name: value[rows] for name, value in sizes.items()}
-        found[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
+        solved[:, rows], fold_distance[rows] = self._beside_fold(within[rows], own, table[:, rows])
         z[rows] = within[rows]
-        return self._run(z, sizes, found, 0, beyond), fold_distance
+        return self._run(z, sizes, solved, 0, beyond), fold_distance
 
     def _beside_fold(self, z: Complexes, sizes: Sizes, table: Floats) -> tuple[Floats, Floats]:
         """Unknowns and distances from a fold, by single corrections until a pose is solved or seen to be beyond.
 
-        Towards a fold the equations are those of a parabola: from one side of it corrections never pass to the other,
-        where the determinant has the other sign, unless there is no solution. The squared determinant of the solution
-        is g = D0 (2 D1 - D0), with D0 and D1 before and after a correction, also where it is negative: so far beyond.
-        Corrections alone would only halve D each time; a longer one ends at the root of g, or beside the fold.
+        Near a fold the equations are a parabola: Newton steps from one side pass to the other, where the determinant
+        has the other sign, only if there is no solution. With the determinants D0 and D1 before and after a step, the
+        squared determinant of the solution is g = D0 (2 D1 - D0); it is negative beyond the fold. Newton steps alone
+        would halve D each time; a longer one ends where D squared is g, or beside the fold.
         """
         fold_distance, left = np.full(z.shape, np.nan), np.arange(len(z))
-        found, guess = table.copy(), table
-        # The last place, the determinants there, and whether a correction led from there.
+        unknowns, guess = table.copy(), table
+        # The last unknowns, their determinants, and whether a Newton step led from there.
         last, before, led = guess, np.full((len(self.signs), len(z)), np.nan), np.zeros(len(z), dtype=bool)
         for _ in range(SINGLE_CORRECTIONS):
             own = {name: value[left] for name, value in sizes.items()}
@@ -204,13 +206,13 @@ class Atlas:
             crossed = np.sign(now) != self.signs
             beyond = crossed.any(axis=0)
             solved = ~beyond & state.solved(left.shape)
-            found[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
-            # Beyond the fold: the pose at the fold.
+            unknowns[:, left[solved]], fold_distance[left[solved]] = new[:, solved], np.prod(now**2, axis=0)[solved]
+            # Beyond the fold the pose is that at the fold.
             share = np.where(crossed & led, before / (before - now), 1.0).min(axis=0)
-            found[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
+            unknowns[:, left[beyond]] = (last + share * (guess - last))[:, beyond]
             squared = np.where(crossed & led, squares, now**2)
             fold_distance[left[beyond]] = -np.abs(np.prod(squared, axis=0))[beyond]
-            # The group that is nearest to its fold says how much longer the correction should have been.
+            # The group nearest to its fold tells how much longer the step should have been.
             nearest = np.argmin(np.where(led, now / before, 1.0), axis=0)[None]
             d0, d1, g = (np.take_along_axis(v, nearest, axis=0)[0] for v in (before, now, squares))
             goal = np.copysign(np.where(g > 0, 1.0, 0.5) * np.sqrt(np.abs(g)), d0)
@@ -221,15 +223,15 @@ class Atlas:
             led = ~longer[moving]
             if not len(left):
                 break
-        return found, fold_distance
+        return unknowns, fold_distance
 
     def _run(self, z: Complexes, sizes: Sizes, table: Floats, steps: int, beyond: bool = False) -> State:
-        """The whole mechanism after some of Newton's corrections."""
+        """The whole mechanism after at most `steps` Newton steps."""
         vectors = self.plan.core.geometry.vectors(sizes)
         return self.plan.run([z.real, z.imag, *self.held], vectors, table, steps=steps, beyond=beyond)
 
     def _nearest(self, z: Complexes, sizes: Sizes) -> tuple[Complexes, Floats, Floats]:
-        """Places of the nearest solved poses (nan where there is none), their unknowns and slopes."""
+        """Places of the nearest solved poses, nan where there are none, with their unknowns and slopes."""
         if not sizes or self.empty:
             return _pick(self.known[b""], z)
         rows, which = np.unique(np.stack(list(sizes.values()), axis=-1), axis=0, return_inverse=True)
@@ -251,7 +253,7 @@ class Atlas:
         return near, table, slopes
 
     def _designs(self, sizes: Sizes, count: int) -> list[_Poses]:
-        """Poses of several designs: some of the nominal ones are brought to their dimensions and grow from there."""
+        """Poses of several designs: some nominal ones are continued to their dimensions and grow from there."""
         nominal = self.known[b""]
         coarse = np.flatnonzero((nominal.lattice.real % SEED_EVERY == 0) & (nominal.lattice.imag % SEED_EVERY == 0))
         design, seed = np.repeat(np.arange(count), len(coarse)), np.tile(coarse, count)
@@ -269,18 +271,18 @@ class Atlas:
         return self._grown(sizes, design, lattice, table)
 
     def _grown(self, sizes: Sizes, design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
-        """Poses of all designs, from solved ones to their neighbours on the lattice until nothing more closes."""
+        """Poses of several designs, grown from solved ones to neighbours on the lattice until no more are reached."""
         count = max((len(value) for value in sizes.values()), default=1)
         seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
         layers = [(design[:0], lattice[:0], table[:, :0])]
-        # Spacings since a pose was within the limits.
+        # Number of spacings since the last pose within the limits.
         outside = np.zeros(len(design), dtype=int)
         while len(design):
             z = self.origin + self.spacing * lattice
             own = {name: value[design] for name, value in sizes.items()}
             state, fold_distance = self._solved(z, own, table, 0.0, z)
             table, reached = table_of(state.unknowns, z.shape), fold_distance > 0
-            # Poses just outside, where a leg does not reach, are kept, but nothing grows from them.
+            # Poses at which a leg does not reach are kept, but nothing grows from them.
             outside = np.where(self._within(state, own, z.shape), 0, outside + 1)
             closed = np.flatnonzero(reached & ~self._open(state, z.shape) & (outside < LIMIT_GAP))
             layers.append((design[reached], lattice[reached], table[:, reached]))
@@ -301,16 +303,16 @@ class Atlas:
 
         design, lattice, table = (np.concatenate(parts, axis=-1) for parts in zip(*layers, strict=True))
         slopes = self._slopes(lattice, {name: value[design] for name, value in sizes.items()}, table)
-        found = []
+        designs = []
         for k in range(count):
             lanes = np.flatnonzero(design == k)
             z = self.origin + self.spacing * lattice[lanes]
             tree = cKDTree(np.stack([z.real, z.imag], axis=-1))
-            found.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
-        return found
+            designs.append(_Poses(tree, lattice[lanes], table[:, lanes], slopes[:, :, lanes]))
+        return designs
 
     def _slopes(self, lattice: Complexes, sizes: Sizes, table: Floats) -> Floats:
-        """Derivatives of the unknowns by the point's x and y; 0 where they have none."""
+        """Derivatives of the unknowns by the point's x and y; 0 where these are not finite."""
         h = DIFFERENCE_STEP * self.plan.core.size
         z = self.origin + self.spacing * lattice
         beside = [table_of(self._run(z + step, sizes, table, 1).unknowns, z.shape) for step in (h, 1j * h)]
@@ -319,13 +321,13 @@ class Atlas:
 
     def _within(self, state: State, sizes: Sizes, shape: tuple[int, ...]) -> Flags:
         """Which poses are within the study's limits."""
-        found = np.ones(shape, dtype=bool)
+        within = np.ones(shape, dtype=bool)
         for _, margin in self.plan.core.margins(self._configuration(state, sizes, np.zeros(shape, dtype=bool))):
-            found &= np.asarray(margin) >= 0
-        return found
+            within &= np.asarray(margin) >= 0
+        return within
 
     def _configuration(self, state: State, places: Mapping[str, Value], lost: Flags) -> Configuration:
-        """A flat batch of states in the shape of `lost`, nan where that is true."""
+        """The poses of a flat state in the shape of `lost`, nan where `lost`."""
         graph, shape = self.plan.core.graph, lost.shape
 
         def shaped(values: Sequence[Value]) -> list[Value]:
@@ -340,12 +342,12 @@ class Atlas:
         )  # fmt: skip
 
     def _open(self, state: State, shape: tuple[int, ...]) -> Flags:
-        """Where a leg does not reach, or has no length."""
+        """Whether a leg does not reach, or has no length, in each pose."""
         lengths = [state.slides[slide] for slide in self.plan.core.graph.telescopic]
-        found = np.zeros(shape, dtype=bool)
+        open_ = np.zeros(shape, dtype=bool)
         for margin in (*state.closures, *lengths):
-            found |= ~(np.asarray(margin) > 0)
-        return found
+            open_ |= ~(np.asarray(margin) > 0)
+        return open_
 
 
 def _pick(poses: _Poses, z: Complexes) -> tuple[Complexes, Floats, Floats]:

@@ -15,9 +15,9 @@ from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Floats
 from mechdesign.numerics.roots import lowest
 
-# A closure that falls below this part of its largest value touches zero: it is a difference of squared lengths.
+# A closure, a difference of squared lengths, touches zero where it is below this part of its largest value.
 TOUCHING = 1e-10
-# Values of the coordinate at which closures are looked at, in a turn, or in a travel of the mechanism's size.
+# Number of values of the coordinate at which closures are sampled, in a turn or in a travel of the mechanism's size.
 SAMPLES_PER_TURN = 720
 
 
@@ -54,13 +54,13 @@ class ChangePoints:
         return self._parity(np.asarray(values, dtype=float), len(self._places))
 
     def cover(self, values: Value) -> None:
-        """Search the range of some values, if it has not been searched."""
+        """Search the range of these values unless that has been done."""
         finite = np.asarray(values, dtype=float)[np.isfinite(values)]
         low, high = (float(end(finite, initial=self.sketch)) for end in (np.min, np.max))
         begin, end = self._range
         if begin <= low and high <= end:
             return
-        # At least a turn to each side at once, so that few calls search at all.
+        # A turn or more to each side at once, so that later calls rarely have to search.
         low = min(begin, low, self.sketch - self._period)
         high = max(end, high, self.sketch + self._period)
         count = int(np.ceil((high - low) / self._period * SAMPLES_PER_TURN)) + 1
@@ -76,14 +76,14 @@ class ChangePoints:
         self._range = (low, high)
 
     def _parity(self, values: Floats, groups: int) -> list[Value]:
-        """Modes of the first groups; the others as drawn."""
-        found: list[Value] = list(self._modes)
+        """Modes of the first `groups` groups at values of the coordinate; those of the others are as drawn."""
+        modes: list[Value] = list(self._modes)
         for index in range(groups):
             places = self._places[index]
             if len(places):
                 passed = np.searchsorted(places, values) - np.searchsorted(places, self.sketch)
-                found[index] = found[index] * np.where(passed % 2, -1, 1)
-        return found
+                modes[index] = modes[index] * np.where(passed % 2, -1, 1)
+        return modes
 
     def _closures(self, index: int, values: Floats) -> Floats:
         modes = self._parity(values, index)[: index + 1]

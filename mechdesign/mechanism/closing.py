@@ -1,4 +1,4 @@
-"""Why a sketch cannot be assembled at its own drive values: which joints cannot meet, and by how much."""
+"""Messages for a sketch that cannot be assembled at its own drive values: which joints cannot meet, and by how much."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from mechdesign.mechanism.solve import State
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
 
-# Poses of a sweep for the range in which a mechanism closes.
+# Number of drive values in the search for the range in which a mechanism closes.
 SWEEP_POSES = 721
-# Halvings of a step of that sweep that find an end of the range.
+# Bisections between two of these values for an end of the range.
 END_HALVINGS = 40
-# Advice for most groups that do not close.
+# Advice for a group that does not close.
 CHECK_LENGTHS = "check the lengths"
-# Loops that stay open by less than this part of the mechanism's size nearly close, as they do in a singular pose.
+# Loops that stay open by less than this part of the mechanism's size nearly close, as near a singular pose.
 NEARLY = 0.01
 NEARLY_CLOSED = (
     "the sketch may be drawn in a singular pose, in which the drives do not hold it: draw it in another pose, the "
@@ -39,7 +39,7 @@ NEARLY_CLOSED = (
 def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[Coordinate, float]]) -> MechanismError:
     """Why a sketch cannot be assembled at its own drive values (radians or lengths), and what would mend it.
 
-    `state` is what the plan of the drives ended in.
+    `state` is the result of the plan of the drives.
     """
     unit, equations = core.description.angle_unit, core.equations
     values = ", ".join(f"{c.name} = {v / (unit if c.quantity == 'angle' else 1.0):.6g}" for c, v in given)
@@ -60,15 +60,15 @@ def cannot_assemble(core: Core, plan: Plan, state: State, given: Sequence[tuple[
             def valid(sweep: Floats, k: int = k) -> Flags:
                 return drawn.solve([sweep if j == k else v for j, (_, v) in enumerate(given)], limits=False).valid
 
-            found = closing_range(valid, coordinate, core.size, unit)
-            if found:
-                mend = f"{found}; draw it there, or {mend}"
+            ranges = closing_range(valid, coordinate, core.size, unit)
+            if ranges:
+                mend = f"{ranges}; draw it there, or {mend}"
                 break
     return MechanismError(f"{start}: {where}; {mend}", SKETCH)
 
 
 def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
-    """Check that the sketch, assembled by Newton's method, is not one of a chain that its drives do not hold at all.
+    """Check that the drives hold the sketch if it was assembled by Newton's method.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def check_regular(core: Core, plan: Plan, configuration: Configuration) -> None:
 
 
 def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> MechanismError | None:
-    """A group that closes, but not where Newton's method gets to from the sketch, or not in one place only."""
+    """The error for a mechanism that closes at the drive values, but is singular there or far from the sketch."""
     equations, graph, drives = core.equations, core.graph, plan.structure.given
     real, middle = equations.mobility(x)
     if real > len(drives):
@@ -95,19 +95,19 @@ def _closed_otherwise(core: Core, plan: Plan, x: Floats, start: str) -> Mechanis
         return MechanismError(
             f"the sketch is at a singular position: with its drives held, {free}; draw another", SKETCH
         )
-    found = equations.at(x)
-    if not plan.iterative or any(found.slides[slide] <= 0 for slide in graph.telescopic):
+    closed = equations.at(x)
+    if not plan.iterative or any(closed.slides[slide] <= 0 for slide in graph.telescopic):
         return None
     moving = [
         f"{point}: [{place.real:.6g}, {place.imag:.6g}]"
-        for point, place in zip(graph.nodes, found.nodes, strict=True)
+        for point, place in zip(graph.nodes, closed.nodes, strict=True)
         if ":" not in point and (GROUND, point) not in graph.points
     ]
     return MechanismError(f"{start} from where it is drawn; it closes at {{{', '.join(moving)}}}", SKETCH)
 
 
 def open_group(state: State, gaps: Complexes) -> tuple[str, str]:
-    """Why the first group that is open does not close, and what would mend it; `gaps` is what each edge misses."""
+    """Why the first open group does not close, and what would mend it; `gaps` by which each edge misses its head."""
     converged = iter(state.converged)
     for group in state.structure.groups:
         if group.form == "newton":
@@ -128,8 +128,8 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     if group.form == "two slides":
         one, two = slides
         return f"the slides '{one}' and '{two}' are parallel, which holds nothing along them", "change a direction"
-    known, vectors, directions = state.dyad(group)
-    # By the angle that they turn with: links with the distance of the joints that they hold apart, and these joints.
+    span, vectors, directions = state.dyad(group)
+    # By unknown angle: the links that turn with it and the distance between their joints; the nodes of these joints.
     links: dict[int, str] = {}
     ends: dict[int, list[int]] = {}
     for root, z in vectors.items():
@@ -144,7 +144,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     def points(nodes: Iterable[int]) -> str:
         return " and ".join(graph.nodes[node] for node in nodes if ":" not in graph.nodes[node])
 
-    gap = float(np.abs(known))
+    gap = float(np.abs(span))
     if group.form == "two angles":
         (one, two), (first, second) = links.values(), ends.values()
         inner = [node for node in first if node in second]
@@ -158,7 +158,7 @@ def _dyad(state: State, group: Group) -> tuple[str, str]:
     if group.form == "angle and fixed slide":
         on_line = {n for k in group.edges if edges[k].slide == slide for n in (edges[k].tail, edges[k].head)}
         pins = [node for node in ends[root] if node not in on_line] or ends[root]
-        off = abs(cross(directions[slide], known))
+        off = abs(cross(directions[slide], span))
         line = f"the line of '{name}' passes {points(pins[:1])} at a distance of {off:.5g}"
         return f"link {links[root]} is too short to reach its slide: {line}", CHECK_LENGTHS
     off = abs(cross(directions[slide], vectors[root]))
@@ -181,10 +181,10 @@ def _newton(state: State, group: Group, gaps: Complexes) -> str:
 
 
 def closing_range(valid: Callable[[Floats], Flags], coordinate: Coordinate, size: float, unit: float) -> str:
-    """For which values of one drive, the others held, a mechanism closes; empty where for none.
+    """The values of one drive for which a mechanism closes while the others are held; empty if there are none.
 
-    `valid` says so of an array of its values (radians or lengths); lengths are tried up to four times `size`, either
-    way. `unit` is the radians in one of the study's units of angle.
+    `valid` tells for an array of values (radians or lengths) where the mechanism closes; lengths are tried from -4 to 4
+    times `size`. `unit` is the study's unit of angle in radians.
     """
     angle = coordinate.quantity == "angle"
     values = np.linspace(0.0, 2 * np.pi, SWEEP_POSES) if angle else np.linspace(-4 * size, 4 * size, SWEEP_POSES)

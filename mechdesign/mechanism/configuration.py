@@ -55,9 +55,9 @@ class Configuration:
     closures: Sequence[Value]  # positive inside the range in which each group closes, zero at its limits
     reason: NDArray[np.int8]  # `Reason` of each pose, of this very shape
     places: Mapping[str, Value]  # dimensions that differ from the nominal ones
-    # By name, values within half a turn of which angles are reported; angles not named are in (-pi, pi].
+    # By name, values that angles are reported within half a turn of; other angles are in (-pi, pi].
     near: Mapping[str, Value] = field(default_factory=dict)
-    counted: frozenset[str] = frozenset()  # those of them whose turns count: given, or followed along a motion
+    counted: frozenset[str] = frozenset()  # names of angles whose turns count: given, or followed along a motion
 
     def __repr__(self) -> str:
         return (
@@ -86,7 +86,7 @@ class Configuration:
 
     @quiet
     def value(self, coordinate: Coordinate) -> Value:
-        """Value of a coordinate (angles in radians, within half a turn of what they are `near`)."""
+        """Value of a coordinate; angles in radians, in the turn that `near` tells."""
         if coordinate.kind == "x":
             return self.nodes[coordinate.node].real
         if coordinate.kind == "y":
@@ -118,39 +118,28 @@ class Configuration:
         }
 
     def beside(self, other: Configuration, coordinates: Iterable[Coordinate]) -> Configuration:
-        """The same poses, the angles of some coordinates on the branch of another configuration.
-
-        Where a turn is given it stays.
-        """
+        """The same poses with angles in the turns that they have in another configuration; turns that count stay."""
         near = {k: other.value(angle) for k, angle in angles_of(coordinates).items() if k not in self.counted}
         return replace(self, near={**self.near, **near})
 
     def take(self, index: Ints | int | tuple[int, ...] | tuple[Ints, ...]) -> Configuration:
         """Poses of a flat batch by index (shape (n,) or scalar)."""
 
-        reason = self.reason[index]
+        reason = np.asarray(self.reason[index])
 
         def pick(value: Either) -> Either:
-            if np.ndim(value) == 0 and reason.ndim == 0:
-                return value
-            return np.broadcast_to(np.asarray(value), self.shape)[index]
+            return np.broadcast_to(value, self.shape)[index] if np.ndim(value) else value
 
-        vectors = Vectors(
-            [pick(w) for w in self.vectors.w],
-            [pick(d) for d in self.vectors.d],
-            {body: v if isinstance(v, float) else pick(v) for body, v in self.vectors.offsets.items()},
-            {name: pick(v) for name, v in self.vectors.parameters.items()},
-        )
-        return Configuration(
-            self.graph, vectors, np.shape(reason), [pick(x) for x in self.nodes], [pick(u) for u in self.rotations],
-            [pick(s) for s in self.slides], [pick(c) for c in self.closures], np.asarray(reason),
-            {name: pick(v) for name, v in self.places.items()}, {key: pick(v) for key, v in self.near.items()},
-            self.counted,
+        return replace(
+            self, vectors=self.vectors.map(pick), shape=reason.shape, reason=reason,
+            nodes=[pick(x) for x in self.nodes], rotations=[pick(u) for u in self.rotations],
+            slides=[pick(s) for s in self.slides], closures=[pick(c) for c in self.closures],
+            places={name: pick(v) for name, v in self.places.items()}, near={k: pick(v) for k, v in self.near.items()},
         )  # fmt: skip
 
 
 def hide(value: Either, lost: Flags) -> Either:
-    """nan for poses that cannot be assembled; a value that is the same for every pose (the ground) stays one."""
+    """A value with nan for the poses that are `lost`."""
     whole: NDArray[Any] = np.asarray(value)
     if whole.ndim == 0 and not lost.all():
         whole = np.broadcast_to(whole, lost.shape)
@@ -163,15 +152,15 @@ def hide(value: Either, lost: Flags) -> Either:
 def joined(
     parts: Iterable[Configuration], shape: tuple[int, ...], vectors: Vectors, places: Mapping[str, Value]
 ) -> Configuration:
-    """Flat batches of one mechanism put together to one of a shape; its angles are in (-pi, pi]."""
+    """Flat batches of one mechanism joined to one batch of a shape; angles are in (-pi, pi]."""
     count, end, whole = int(np.prod(shape, dtype=np.int64)), 0, list[Any]()
     reason = np.empty(count, dtype=np.int8)
     for part in parts:
         some = slice(end, end := end + len(part.reason))
         reason[some] = part.reason
-        each: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
-        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in each]
-        for k, value in enumerate(each):
+        values: list[Any] = [*part.nodes, *part.rotations, *part.slides, *part.closures]
+        whole = whole or [value if np.ndim(value) == 0 else np.empty(count, dtype=value.dtype) for value in values]
+        for k, value in enumerate(values):
             if np.ndim(value) > np.ndim(whole[k]):
                 # What was the same for every pose so far is a single number.
                 whole[k] = np.full(count, whole[k], dtype=value.dtype)

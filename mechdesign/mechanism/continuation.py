@@ -19,12 +19,12 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 
 # Largest change of an unknown in one step: radians, or parts of the mechanism's size.
 MAX_CHANGE = 0.35
-# Change that steps are planned for, a little less so that few are refused.
+# Change for which steps are planned: a little less, so that few are refused.
 PLANNED = 0.8 * MAX_CHANGE
-# Largest turn of an angle in an expression in one step (radians): one more, and its way round would not be certain.
+# Largest turn of an angle in an expression in one step (radians): beyond half a turn its sense would be unknown.
 MAX_TURNED = 1.5
 SMALLEST_STEP = 2e-4
-# Rounds of steps: enough for ten turns.
+# Largest number of steps, enough for ten turns.
 MAX_ROUNDS = 250
 # Step that gives the first direction, as a part of the path.
 FIRST_STEP = 1e-6
@@ -34,7 +34,7 @@ FIRST_STEP = 1e-6
 class Start:
     """A solved pose to continue from: its given values, dimensions, unknowns, and signs of the determinants.
 
-    `turns` are angles in expressions that are given, whose turns count.
+    `turns` are the angles in given expressions, whose turns count.
     """
 
     given: Sequence[Value]
@@ -54,8 +54,8 @@ class Start:
         )
 
 
-# Solves all groups for given values, dimensions and a guess, with a bound of Newton's steps and angles near those that
-# are followed; also gives these.
+# Solves all groups from given values, dimensions, a guess, a number of Newton steps, and values near the followed
+# angles; returns the state and these angles.
 Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int, Floats], tuple[State, Floats]]
 
 
@@ -66,14 +66,14 @@ def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:
 
 def angle_rows(structure: Structure) -> Flags:
     """Which rows of a table are angles, shape (rows, 1)."""
-    found = [
+    flags = [
         np.arange(rows.stop - rows.start) < len(structure.groups[k].angles) for k, rows in structure.unknowns.items()
     ]
-    return np.concatenate(found)[:, None]
+    return np.concatenate(flags)[:, None]
 
 
 def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
-    """Units of changes: a radian, and the mechanism's size or a length beyond it."""
+    """Units of changes of the unknowns: a radian, and the mechanism's size or the length itself if that is larger."""
     return np.where(angle_rows(structure), 1.0, np.maximum(size, np.abs(table)))
 
 
@@ -108,12 +108,12 @@ def follow(
         return table_of(state.unknowns, rows.shape), state, angles_there
 
     def change(new: Floats, old: Floats) -> Floats:
-        """How far the unknowns moved, angles the short way round; nan where a step has no end."""
+        """Changes of the unknowns, angles the shorter way round; nan where a step failed."""
         with np.errstate(invalid="ignore"):
             return np.where(angles, wrap(new - old), new - old)
 
     def planned(slope: Floats, table: Floats) -> Floats:
-        """Step over which the unknowns change as much as is planned."""
+        """Step over which the unknowns change by `PLANNED`."""
         speed = (np.abs(slope) / scale_of(structure, size, table)).max(axis=0)
         with np.errstate(divide="ignore"):
             return np.asarray(np.minimum(1.0, PLANNED / speed))

@@ -21,9 +21,9 @@ class Coordinate:
 
     ``x``, ``y`` of a node; ``angle`` from the x axis of body `reference` to that of `body`; ``slide`` displacement (a
     telescopic leg's is its length); ``distance`` of nodes `node` and `other`; ``expression`` of coordinates `parts`, of
-    which a ``parameter`` is the same in every pose. `turn` is after what the value repeats, such as that of an angle
-    (radians); 0 where it does not. `links` are those whose ends of the pins at `node` and `other` are
-    meant; empty for the pin itself.
+    which a ``parameter`` is the same in every pose. `turn` is the period of the value, such as 2 pi of an angle, and 0
+    without one. Where `links` are named, the points are those of the links at the pins `node` and `other`, which differ
+    from the pins by clearances.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Coordinate:
 
     @property
     def ends(self) -> tuple[tuple[str, int], ...]:
-        """Points that it depends on itself, link and node of each."""
+        """Link and node of each point that the coordinate or a part of it is measured at."""
         nodes = {"x": (self.node,), "y": (self.node,), "distance": (self.node, self.other)}.get(self.kind, ())
         return (*zip(self.links, nodes, strict=False), *(end for part in self.parts for end in part.ends))
 
@@ -86,12 +86,12 @@ def resolve(name: str, description: Description, graph: Graph) -> Coordinate:
 
 def angles_of(coordinates: Iterable[Coordinate]) -> dict[str, Coordinate]:
     """The angles among coordinates and in their expressions, arctangents too, by name."""
-    found: dict[str, Coordinate] = {}
+    angles: dict[str, Coordinate] = {}
     for coordinate in coordinates:
         if coordinate.turn:
-            found[coordinate.name] = coordinate
-        found |= angles_of(coordinate.parts)
-    return found
+            angles[coordinate.name] = coordinate
+        angles |= angles_of(coordinate.parts)
+    return angles
 
 
 def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:
@@ -118,12 +118,12 @@ def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:
 
 def _expression(name: str, expression: Expression, parts: Mapping[str, Coordinate], turn: float = 0.0) -> Coordinate:
     """An expression of coordinates, its arctangents as coordinates of their own."""
-    known, outer = dict(parts), expression
+    coordinates, outer = dict(parts), expression
     if not turn:
         outer, arctangents = expression.turning(name)
         for variable, (inner, turns) in arctangents.items():
-            known[variable] = _expression(variable, inner, known, turns * TURN)
-    own = tuple(known[part] for part in sorted(outer.names))
+            coordinates[variable] = _expression(variable, inner, coordinates, turns * TURN)
+    own = tuple(coordinates[part] for part in sorted(outer.names))
     quantities = {part.name: part.quantity for part in own if part.kind != "parameter"}
     quantity: Quantity = "angle" if turn or outer.is_angle(quantities) else "none"
     return Coordinate(name, "expression", quantity, expression=outer, parts=own, turn=turn)

@@ -24,7 +24,7 @@ from mechdesign.mechanism.sketch import Sketch, locate
 
 @dataclass(frozen=True)
 class Bound:
-    """A limit with its coordinate looked up; `drive` where it is that of a drive, whose turns count."""
+    """A limit with its coordinate; `drive` says that this is a drive, whose turns count."""
 
     coordinate: Coordinate
     minimum: Term | None
@@ -33,7 +33,7 @@ class Bound:
     drive: bool = False
 
     def scale(self, size: float) -> float:
-        """What rounding in this limit's margins is measured by, for a mechanism of a given size."""
+        """Unit of rounding errors in this limit's margins, for a mechanism of a given size."""
         if self.coordinate.kind == "distance":
             return size**2
         return 2 * np.pi if self.coordinate.quantity == "angle" else size
@@ -71,27 +71,27 @@ class Bound:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)
                 return [(self.label, margin)]
-        found = []
+        margins = []
         if low is not None:
-            found.append((f"{self.label} min", value - low))
+            margins.append((f"{self.label} min", value - low))
         if high is not None:
-            found.append((f"{self.label} max", high - value))
-        return found
+            margins.append((f"{self.label} max", high - value))
+        return margins
 
     @property
     def of_angle(self) -> bool:
-        """Whether it bounds an angle on both sides, modulo a turn; an expression is judged as it is."""
+        """Whether it bounds an angle on both sides, so modulo a turn; an angle from an expression is not meant."""
         given = self.minimum is not None and self.maximum is not None
         return self.coordinate.kind == "angle" and given
 
     def counts(self, places: Mapping[str, Value]) -> bool:
-        """Whether it depends on the turns of an angle: in an expression, or between ends a turn apart or more."""
+        """Whether whole turns of an angle matter: in an expression, or if the ends are a turn or more apart."""
         low, high = self.ends(places)
         whole = low is not None and high is not None and bool(np.any(high - low >= TURN))
         return self.coordinate.kind == "expression" or (self.of_angle and whole)
 
     def ends(self, places: Mapping[str, Value]) -> tuple[Value | None, Value | None]:
-        """Smallest and largest value where the places have given values; None for a side that is left open."""
+        """Smallest and largest value for given values of the places; None for a side that is left open."""
         low, high = (places[end] if isinstance(end, str) else end for end in (self.minimum, self.maximum))
         return low, high
 
@@ -101,7 +101,7 @@ def _squared(value: Value | None) -> Value | None:
 
 
 class Core:
-    """Graph, geometry and limits of a mechanism; `sketch_configuration` is its sketch, once that is assembled."""
+    """Graph, geometry and limits of a mechanism; `sketch_configuration` is the assembled sketch."""
 
     sketch_configuration: Configuration
 
@@ -121,7 +121,7 @@ class Core:
 
     @property
     def equations(self) -> Equations:
-        """All equations at once, to tell what is wrong with a mechanism."""
+        """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
         return Equations(self.graph, self.geometry, self.size or 1.0)
 
     def coordinate(self, name: str) -> Coordinate:
@@ -140,7 +140,7 @@ class Core:
         return [margin for bound in self.bounds for margin in bound.margins(configuration, places, smooth=smooth)]
 
     def turns(self, places: Mapping[str, Value]) -> dict[str, Value]:
-        """Values that drives' angles lie within half a turn of, so that they lie within their limits."""
+        """By drive with limits of its angle, a value within half a turn of which the angle lies within these limits."""
         sizes = {**self.nominal, **places} if places else self.nominal
         near: dict[str, Value] = {}
         for bound in self.bounds:
@@ -152,10 +152,10 @@ class Core:
         return near
 
     def drawn_angles(self) -> dict[str, float]:
-        """Angles of drives and in measures and limits as the sketch has them (radians)."""
+        """Angles of drives, and angles in measures and limits, in the sketch (radians)."""
         named = [self.coordinate(name) for name in (*self.description.drives, *self.description.measures)]
-        found = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
-        return {name: float(self.sketch_configuration.value(angle)) for name, angle in found.items()}
+        angles = angles_of([*named, *(bound.coordinate for bound in self.bounds)])
+        return {name: float(self.sketch_configuration.value(angle)) for name, angle in angles.items()}
 
     @cached_property
     def counting(self) -> tuple[Coordinate, ...]:

@@ -11,7 +11,7 @@ a time derivative and x_z a derivative with respect to a dimension:
     e''_z rest = (s'' d_z + 2 i theta'_z s' d + 2 i theta' m'_z - 2 theta' theta'_z m + (i theta'' - theta'^2) m_z
                  + i theta_z (m'' + 2 i theta' m' + (i theta'' - theta'^2) m)) U
 
-The structure used is always that of the drives (their Assur groups), however the configuration was found.
+They are always computed in the Assur groups of the drives, whichever coordinates the configuration was solved from.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from mechdesign.mechanism.solve import solve_linear
 from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.numerics.arrays import Floats
 
-# Below this regularity a pose is at a singularity: at a dead centre the angle between links is known to the root of
-# rounding only, and rounding shows in all rates.
+# Below this regularity a pose is singular: at a dead centre the angle between links is accurate to the root of rounding
+# only, so that rates are mostly rounding.
 STALLED = 1e-6
 
 Entries = Sequence[Sequence[Value]]
@@ -71,7 +71,7 @@ class Linearization(Loops):
     @cached_property
     @quiet
     def conditionings(self) -> dict[int, Value]:
-        """Per group of the drives' structure, by its index, how far from a singularity: from -1 to 1, zero at one.
+        """By index of the drives' groups, their distance from a singularity: from -1 to 1, zero at a singularity.
 
         The determinant of its loop equations over the product of the lengths of its columns; for two links that meet
         it is the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
@@ -99,7 +99,7 @@ class Linearization(Loops):
     def _solve(
         self, given: Sequence[Value], rest: Sequence[Vector], offsets: Mapping[str, Value] | None = None
     ) -> Rates:
-        """Derivatives of all positions from those of the drives, the `rest` of each edge's, and of body offsets."""
+        """Derivatives of all positions from those of drives and body offsets, and the `rest` of each edge."""
         structure, offsets = self.structure, offsets or {}
         angles = [tied(tie, given, offsets) for tie in structure.ties]
         slides: list[Value] = [0.0] * len(self.slides)
@@ -176,18 +176,18 @@ class Linearization(Loops):
         none, edges = [0.0] * len(self.structure.given), self.structure.edges
         s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))
         rest: list[Vector] = []
-        known: list[tuple[Vector, ...]] = []
+        arms: list[tuple[Vector, ...]] = []
         for k, edge in enumerate(edges):
             (w_z, d_z), d, m = explicit[k], self.vectors.d[k], self.arm(k)
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             m_z, m1 = w_z + s[k] * d_z + s_z[k] * d, s1[k] * d
-            known.append((m, m_z, m1, d, d_z))
+            arms.append((m, m_z, m1, d, d_z))
             here = 1j * omega * m_z + s1[k] * d_z + 1j * turn_z * (m1 + 1j * omega * m)
             rest.append(self.turned(here, edge.frame))
         velocity_z = self._solve(none, rest)
         s1_z = self._along(velocity_z.slides)
         for k, edge in enumerate(edges):
-            m, m_z, m1, d, d_z = known[k]
+            m, m_z, m1, d, d_z = arms[k]
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             alpha, omega_z = acceleration.angles[edge.frame], velocity_z.angles[edge.frame]
             m1_z, bend = s1_z[k] * d + s1[k] * d_z, 1j * alpha - omega * omega
@@ -214,7 +214,7 @@ class Linearization(Loops):
         return [self.columns(group, loop.edges, edge_z, direction_z)[1] for loop in group.loops]
 
     def _rests(self, explicit: Sequence[tuple[Vector, Vector]]) -> list[Vector]:
-        """By edge, its derivatives with respect to dimensions without those of its angle and slide."""
+        """The `rest` of each edge's derivatives with respect to dimensions."""
         pairs = zip(explicit, self._along(self.slides), self.structure.edges, strict=True)
         return [self.turned(plus(w, 1, times(s, d)), edge.frame) for (w, d), s, edge in pairs]
 
@@ -235,11 +235,12 @@ class Linearization(Loops):
         drives = [coordinate.name for coordinate in self.structure.given]
         given = [lead([float(place == drive) for place in places]) for drive in drives]
         sizes = configuration.places
-        # Of nominal dimensions they are numbers, the same for every pose.
+        # Nominal vectors are numbers, the same for every pose.
         vectors = configuration.vectors if sizes else self.geometry.nominal
-        each = [self.geometry.derivatives(place, sizes, vectors) for place in places]
+        changes = [self.geometry.derivatives(place, sizes, vectors) for place in places]
         explicit = [
-            (lead([w[k] for w, _ in each]), lead([d[k] for _, d in each])) for k in range(len(self.structure.edges))
+            (lead([w[k] for w, _ in changes]), lead([d[k] for _, d in changes]))
+            for k in range(len(self.structure.edges))
         ]
         offsets = {
             body: lead([self.geometry.angle_derivative(turns, place, sizes) for place in places])
@@ -251,13 +252,13 @@ class Linearization(Loops):
 
 def determinants(linearization: Linearization) -> list[Value]:
     """Per group of the drives' structure, the determinant of its loop equations; zero at a forward singularity."""
-    found = []
+    values = []
     for index, group in enumerate(linearization.structure.groups):
         if group.form == "place":
             continue
         lines = linearization.loop_columns(index, group)
-        found.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
-    return found
+        values.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
+    return values
 
 
 def regularity(linearization: Linearization) -> Value:
@@ -275,9 +276,9 @@ def mixes(rows: Sequence[Coordinate], columns: Sequence[Coordinate]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Jacobian:
-    """Derivatives of coordinates (rows) by the drives (columns), broadcasting to the batch's shape, and their scalars.
+    """Derivatives of coordinates (rows) by the drives (columns), which broadcast to the batch's shape.
 
-    `entries` are per radian; `homogeneous` has angles as arcs of a characteristic length, or is `entries` without one.
+    `entries` are per radian; in `homogeneous` angles count as arcs of a characteristic length, if there is one.
     """
 
     entries: Entries
@@ -316,7 +317,13 @@ class Jacobian:
             return a * d - b * c
         matrix = _matrix(entries, self.shape)
         finite = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
-        return np.where(finite, np.linalg.det(np.where(finite[..., None, None], matrix, 0.0)), np.nan)
+        matrix = np.where(finite[..., None, None], matrix, 0.0)
+        determinant = np.asarray(np.linalg.det(matrix))
+        # Elimination may leave exactly 0 where entries are as large as at a forward singularity met to rounding: the
+        # product of the singular values stays large there, and 0 where the rates of the output vanish.
+        if (zero := finite & (determinant == 0)).any():
+            determinant[zero] = np.linalg.svd(matrix[zero], compute_uv=False).prod(axis=-1)
+        return np.where(finite, determinant, np.nan)
 
     @cached_property
     @quiet
@@ -326,7 +333,7 @@ class Jacobian:
             # ||J||_F^2 / |det J| is s = sigma_max/sigma_min and its inverse added [S1, eq. 8], 2 at isotropy.
             (a, b), (c, d) = self.homogeneous
             size = self.determinant if self.homogeneous is self.entries else self._determinant(self.homogeneous)
-            # What it has above 2, by the squares whose sum it is: it keeps its digits near isotropy.
+            # Its excess over 2 as a sum of squares, which keeps its digits near isotropy.
             more = np.where(size > 0, (a - d) ** 2 + (b + c) ** 2, (a + d) ** 2 + (b - c) ** 2) / np.abs(size)
             return 2 / (2 + more + np.sqrt(more * (more + 4)))
         least, largest = self.singular_values

@@ -1,4 +1,4 @@
-"""How a mechanism is understood and solved, in words for `mechdesign check`."""
+"""A mechanism and the order of its solution in words, for `mechdesign check`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.sketch import deciding_joints
 from mechdesign.mechanism.structure import Group, Structure
 
-# Stands for all bodies that are placed before a group.
+# In a chain: any body that is placed before the group.
 BASE = ""
-# Begins the name of a pin that slides in a slot.
+# Prefix of the name of a pin that slides in a slot.
 PIN_IN = "pin in "
 
 
@@ -44,7 +44,7 @@ class LinkWords(NamedTuple):
 
 
 def groups_in_words(mechanism: Mechanism) -> list[str]:
-    """What the drives place at once, and the groups in the order of their solution."""
+    """The links that the drives place directly, and the groups in the order of their solution."""
     description, graph, plan = mechanism.description, mechanism.graph, mechanism.forward
     placed = placed_before(graph, plan.structure)
     solved = [k for k, group in enumerate(plan.structure.groups) if group.form != "place"]
@@ -88,17 +88,17 @@ def describe(mechanism: Mechanism) -> str:
 
 def links_in_words(description: Description) -> list[LinkWords]:
     """Every link with its points, and its length where it has two ends."""
-    found = []
+    words = []
     for name, link in description.links.items():
         points = (*link.points, *(end for end in link.ends or () if end not in link.points))
         length = link.points[link.ends[1]][0] if link.ends is not None and not link.telescopic else None
         number = description.places[length].nominal if isinstance(length, str) else length
-        found.append(LinkWords(name, points, number, link.telescopic))
-    return found
+        words.append(LinkWords(name, points, number, link.telescopic))
+    return words
 
 
 def drives_in_words(description: Description) -> list[str]:
-    """Every drive and what it is: ``elbow (angle of lower from upper)``."""
+    """Every drive with its coordinate: ``elbow (angle of lower from upper)``."""
     return [
         f"{drive.name} ({drive.kind} of {drive.target}"
         f"{f' from {drive.reference}' if drive.kind == 'angle' and drive.reference != GROUND else ''})"
@@ -127,7 +127,7 @@ def _limit(mechanism: Mechanism, limit: Limit) -> str:
 
 
 def assemblies_in_words(mechanism: Mechanism) -> list[str]:
-    """How many assembly modes the drives leave, and which joints choose them."""
+    """The number of assembly modes for given drives, and the joints that choose them."""
     plan = mechanism.forward
     choosing = [group for group, mode in zip(plan.structure.groups, plan.modes, strict=True) if mode]
     joints = [" or ".join(deciding_joints(mechanism.graph, group)[:1]) for group in choosing]
@@ -142,15 +142,15 @@ def assemblies_in_words(mechanism: Mechanism) -> list[str]:
 
 
 def placed_before(graph: Graph, structure: Structure) -> list[set[str]]:
-    """Bodies whose places are known before each group is solved, and last those known in the end."""
+    """Bodies that are placed before each group is solved, and as last entry after all of them."""
     roots, nodes = {0}, {0} | {node for node, _, _ in structure.known_nodes}
-    found = []
+    placed = []
     for group in structure.groups:
-        found.append(_lying(graph, structure, roots, nodes))
+        placed.append(_lying(graph, structure, roots, nodes))
         roots |= set(group.angles)
         for k, _ in group.tree:
             nodes |= {structure.edges[k].tail, structure.edges[k].head}
-    return [*found, _lying(graph, structure, roots, nodes)]
+    return [*placed, _lying(graph, structure, roots, nodes)]
 
 
 def _lying(graph: Graph, structure: Structure, roots: set[int], nodes: set[int]) -> set[str]:
@@ -164,7 +164,7 @@ def _lying(graph: Graph, structure: Structure, roots: set[int], nodes: set[int])
 def chain_of(
     description: Description, graph: Graph, structure: Structure, group: Group, placed: set[str]
 ) -> GroupChain:
-    """Walk round a group's only loop."""
+    """The bodies and joints around the only loop of a group."""
     (loop,) = group.loops
     # Round the loop: bodies (str) and between them joints (letter, name); bodies placed already are the base.
     walk: list[str | tuple[str, str]] = []
@@ -193,7 +193,7 @@ def chain_of(
     if walk and walk[-1] != BASE:
         walk.append(("R", graph.nodes[loop.end]))
     if [step[0] for step in walk if isinstance(step, tuple)] in (["P", "R", "R"], ["P", "P", "R"]):
-        # Read from the pin on, as textbooks do.
+        # Read from the pin, as textbooks do.
         walk.reverse()
     joints = [step for step in walk if isinstance(step, tuple)]
     links = [step.removesuffix(":rod") for step in walk if isinstance(step, str) and step != BASE]
@@ -218,7 +218,7 @@ def chain_of(
 def _pinned(
     description: Description, graph: Graph, one: str, other: str, middle: list[str]
 ) -> tuple[str, str, str] | None:
-    """The link beyond one of two slides that is neither driven nor ground, its pin, and that slide."""
+    """A link at one of two slides that is neither driven nor ground and has a pin; the pin, and the slide."""
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)} | {GROUND}
     for slide in (one, other):
         for body in _slide_bodies(description, slide):
@@ -229,7 +229,7 @@ def _pinned(
 
 
 def _slide_bodies(description: Description, name: str) -> tuple[str, ...]:
-    """Bodies at the tail and head of a slide; the pin in a slot is a body of no size."""
+    """Bodies at the tail and at the head of a slide; the pin in a slot counts as a body."""
     joint = description.joints.get(name)
     return (name, rod_of(name)) if joint is None else (*joint.links, f"{PIN_IN}{name}")[:2]
 
@@ -241,7 +241,7 @@ def _clamped(description: Description, a: str, b: str, point: str) -> bool:
 
 
 def group_in_words(description: Description, graph: Graph, plan: Plan, index: int, placed: set[str]) -> str:
-    """One group with its joints, its unknowns and the side that the sketch chose."""
+    """A group with its joints, its unknowns and the assembly that the sketch chose."""
     structure = plan.structure
     group, mode = structure.groups[index], plan.modes[index]
     bodies = [

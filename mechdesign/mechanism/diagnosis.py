@@ -1,4 +1,4 @@
-"""What is wrong with a mechanism whose drives do not fit it, in words: which links and joints, and what mends it."""
+"""Messages for a mechanism whose drives do not fit: which links and joints are wrong, and what would mend them."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import numpy as np
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND, Graph
 from mechdesign.mechanism.model import Description, Fixed, Prismatic
 from mechdesign.mechanism.rigidity import Equations, null_space, separated
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Floats
 
 DRIVES = "mechanism.drives"
-# Joints and links that a message names at most.
+# Largest number of joints or links that a message names.
 MAX_NAMED = 12
-# Motions that a message names at most.
+# Largest number of motions that a message names.
 MAX_MOTIONS = 4
 
 
 def listed(names: Iterable[str], last: str = "and") -> str:
-    """Names in quotes as a phrase; of very many only the first."""
+    """Names in quotes as a phrase, ``'a', 'b' and 'c'``; of more than `MAX_NAMED` the number of the rest."""
     quoted = [f"'{name}'" for name in dict.fromkeys(names)]
     if len(quoted) > MAX_NAMED:
         quoted = [*quoted[:MAX_NAMED], f"{len(quoted) - MAX_NAMED} more"]
@@ -33,7 +33,7 @@ def listed(names: Iterable[str], last: str = "and") -> str:
 
 
 def joints_in_words(description: Description, graph: Graph) -> list[str]:
-    """Every joint with the links it joins."""
+    """A description of every joint with the links that it joins."""
     holders: dict[str, list[str]] = {}
     for body, point in graph.points:
         if ":" not in point:
@@ -41,20 +41,20 @@ def joints_in_words(description: Description, graph: Graph) -> list[str]:
             if link not in holders.setdefault(point, []):
                 holders[point].append(link)
     clamps = [joint.point for joint in description.joints.values() if isinstance(joint, Fixed)]
-    found = [
+    words = [
         f"revolute {point} ({', '.join(links)})"
         for point, links in holders.items()
         if len(links) - clamps.count(point) > 1
     ]
-    found += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
+    words += [f"telescopic {name}" for name, link in description.links.items() if link.telescopic]
     for name, joint in description.joints.items():
         parts = (*joint.links, joint.point)[:2]
-        found.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
-    return found
+        words.append(f"{type(joint).__name__.lower()} {name} ({', '.join(parts)})")
+    return words
 
 
 def near_singular(regularity: float) -> list[Caution]:
-    """A warning where a sketch has so small a regularity."""
+    """A warning where the regularity of the sketch is so small that it is singular."""
     if regularity >= STALLED:
         return []
     return [Caution(
@@ -67,7 +67,7 @@ def near_singular(regularity: float) -> list[Caution]:
 def wrong_count(
     description: Description, equations: Equations, sketch: Sketch, count: int, drives: Sequence[Coordinate]
 ) -> MechanismError:
-    """Why the number of drives is not that of the degrees of freedom by counting."""
+    """The error for a number of drives other than the mobility by counting: why, and what mends it."""
     still = _still(description, equations.graph, drives)
     if still is not None:
         return still
@@ -78,10 +78,10 @@ def wrong_count(
         real, x = equations.mobility(x)
         if real > max(count, 0):
             return over_constrained(description, equations, x, count, real, given)
-    found = joints_in_words(description, equations.graph)
-    more = f"; and {len(found) - MAX_NAMED} more" if len(found) > MAX_NAMED else ""
-    joints = f". Joints found: {'; '.join(found[:MAX_NAMED]) or 'none'}{more}"
-    # From here on special dimensions are not at fault: those of the sketch might only feign motions (a dead centre).
+    words = joints_in_words(description, equations.graph)
+    more = f"; and {len(words) - MAX_NAMED} more" if len(words) > MAX_NAMED else ""
+    joints = f". Joints found: {'; '.join(words[:MAX_NAMED]) or 'none'}{more}"
+    # The fault is not in special dimensions. Random ones avoid motions that exist only to first order (dead centres).
     jacobian = equations.generic(drives)
     if given < count:
         mend = _too_free(equations, jacobian, [c.name for c in drives], count - given) + _loose_ends(equations.graph)
@@ -95,7 +95,7 @@ def wrong_count(
 
 
 def _still(description: Description, graph: Graph, given: Sequence[Coordinate]) -> MechanismError | None:
-    """A given coordinate that never changes, whatever moves."""
+    """The error for a given coordinate that cannot change; None where all can."""
     fixed = {graph.node(point) for body, point in graph.points if body == GROUND}
     for coordinate in given:
         why = ""
@@ -114,7 +114,7 @@ def _still(description: Description, graph: Graph, given: Sequence[Coordinate]) 
 
 
 def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], missing: int) -> str:
-    """Too few drives: what moves while they are held."""
+    """Too few drives: which links still move while the drives are held, and which drives would hold them."""
     graph = equations.graph
     free = [_motion(graph, motion) for motion in _motions(equations, jacobian)]
     add = f"add {missing} drive{'s' if missing > 1 else ''}"
@@ -139,7 +139,7 @@ def _too_free(equations: Equations, jacobian: Floats, drives: Sequence[str], mis
 
 
 def _loose_ends(graph: Graph) -> str:
-    """Points on one link only whose names are so alike that one may be meant."""
+    """A hint at two points, on one link each, whose names differ by a slip so that one pin may be meant."""
     owners: dict[str, list[str]] = {}
     for body, point in graph.points:
         owners.setdefault(point, []).append(body.removesuffix(":rod"))
@@ -154,7 +154,7 @@ def _loose_ends(graph: Graph) -> str:
 
 
 def _alike(a: str, b: str) -> bool:
-    """Whether one name may be a slip for the other: another case, or one letter doubled or dropped."""
+    """Whether one name may be the other mistyped: in another case, or with a letter added or dropped."""
     a, b = sorted((a.lower(), b.lower()), key=len)
     return a == b or (len(b) == len(a) + 1 and any(b[:k] + b[k + 1 :] == a for k in range(len(b))))
 
@@ -162,7 +162,7 @@ def _alike(a: str, b: str) -> bool:
 def over_constrained(
     description: Description, equations: Equations, x: Floats, count: int, real: int, given: int
 ) -> MechanismError:
-    """A chain that moves although the count says it cannot: what repeats the work of the rest."""
+    """The error for a chain that moves although by counting it cannot: which links or joints are redundant."""
     start = (
         f"the count gives mobility {count}, yet with these dimensions it moves with {real} degree"
         f"{'s' if real > 1 else ''} of freedom: it is over-constrained"
@@ -192,7 +192,7 @@ def over_constrained(
 def undetermined(
     description: Description, equations: Equations, sketch: Sketch, given: Sequence[Coordinate], reason: str
 ) -> MechanismError:
-    """Which links given coordinates fix twice and which they leave free; otherwise the `reason` that is known."""
+    """The error for given coordinates that fix some links twice and leave others free; else it has the `reason`."""
     graph = equations.graph
     still = _still(description, graph, given)
     if still is not None:
@@ -237,7 +237,7 @@ def _links(names: Sequence[str]) -> str:
 
 
 def _parts(graph: Graph, names: Sequence[str]) -> str:
-    """Links and joints, each called what it is."""
+    """Names of links and of joints as a phrase: ``links 'a' and 'b' and joint 'c'``."""
     links, joints = ([name for name in names if (name in graph.bodies) == body] for body in (True, False))
     named = [_links(links)] if links else []
     named += [f"joint{'s' if len(joints) > 1 else ''} {listed(joints)}"] if joints else []
@@ -245,7 +245,7 @@ def _parts(graph: Graph, names: Sequence[str]) -> str:
 
 
 def _rigid(equations: Equations, count: int, drives: int) -> str:
-    """Which links hold each other, in a mechanism that does not move."""
+    """Which links hold each other in a mechanism that cannot move, and what to leave out."""
     graph = equations.graph
     if count == 0:
         try:
@@ -267,20 +267,20 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
 
 
 def _motions(equations: Equations, jacobian: Floats) -> list[Floats]:
-    """Independent motions that the rows of a Jacobian leave, the first link's first."""
-    found = separated(null_space(jacobian), equations.inner)
-    return sorted(found, key=lambda motion: np.flatnonzero(motion).tolist())
+    """Independent motions in the null space of a Jacobian, in the order of the links that move."""
+    motions = separated(null_space(jacobian), equations.inner)
+    return sorted(motions, key=lambda motion: np.flatnonzero(motion).tolist())
 
 
 def motions_in_words(equations: Equations, jacobian: Floats) -> str:
-    """What can still move under the rows of a Jacobian; empty where nothing can."""
-    found = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
-    more = [f"and {len(found) - MAX_MOTIONS} more motions"] if len(found) > MAX_MOTIONS else []
-    return "; ".join([*found[:MAX_MOTIONS], *more])
+    """The motions in the null space of a Jacobian as a phrase; empty where there are none."""
+    words = [_motion(equations.graph, motion)[0] for motion in _motions(equations, jacobian)]
+    more = [f"and {len(words) - MAX_MOTIONS} more motions"] if len(words) > MAX_MOTIONS else []
+    return "; ".join([*words[:MAX_MOTIONS], *more])
 
 
 def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
-    """A motion in words; the link, where it is one link's turn; and a drive that would hold it."""
+    """A motion in words, the link if only one turns, and a drive that would hold it."""
     angles, inner = graph.classes - 1, graph.classes - 1 + len(graph.slides)
     turning = [
         body
@@ -309,7 +309,7 @@ def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
 
 
 def doubled(equations: Equations, jacobian: Floats) -> tuple[list[int], list[bool]]:
-    """Edges and held coordinates whose equations depend on each other: the support of the left null space."""
+    """Edges and held coordinates whose equations depend on each other: those in the left null space."""
     stress = null_space(jacobian.T)
     count = len(equations.graph.edges)
     size = np.abs(stress).max(axis=1, initial=0.0) > 1e-6
@@ -318,27 +318,27 @@ def doubled(equations: Equations, jacobian: Floats) -> tuple[list[int], list[boo
 
 
 def owners_of(graph: Graph, edges: Iterable[int]) -> list[str]:
-    """Links and joints that edges belong to, the ground left out."""
-    found = []
+    """Names of the links and joints of edges, without the ground."""
+    names = []
     for k in edges:
         edge = graph.edges[k]
         name = graph.slides[edge.slide] if edge.slide is not None else edge.locals[0][1].removesuffix(":rod")
         if name != GROUND:
-            found.append(name)
-    return list(dict.fromkeys(found))
+            names.append(name)
+    return list(dict.fromkeys(names))
 
 
 def repeating(description: Description, equations: Equations, x: Floats, excess: int) -> list[str]:
-    """Links, else joints, that can be left out without changing the motion; or none.
+    """Redundant links or joints: those that can be left out without changing the motion.
 
-    `x` is a configuration in the midst of the motion, `excess` its degrees of freedom beyond the count.
+    `x` is a configuration within the motion, `excess` the number of degrees of freedom beyond the mobility by counting.
     """
     graph = equations.graph
     jacobian = equations.jacobian(x)
     free, more = equations.without(jacobian, set(), set())
     stressed, _ = doubled(equations, jacobian)
     driven = {name for drive in description.drives.values() for name in (drive.target, drive.reference)}
-    found: list[str] = []
+    repeated: list[str] = []
     edges: set[int] = set()
     classes: set[int] = set()
     for name in reversed(list(dict.fromkeys(owners_of(graph, stressed)))):
@@ -356,22 +356,22 @@ def repeating(description: Description, equations: Equations, x: Floats, excess:
         freedom, left = equations.without(jacobian, edges | own, classes | frames)
         gain = more - left
         if freedom == free and gain > 0:
-            found.append(name)
+            repeated.append(name)
             edges |= own
             classes |= frames
             excess, more = excess - gain, left
             if excess <= 0:
-                return found
+                return repeated
     return []
 
 
 def _can_go(description: Description, joint: str) -> bool:
-    """Whether a slide can be left out and its links still turn together as before."""
-    found = description.joints[joint]
-    if not isinstance(found, Prismatic):
+    """Whether the links of a joint still turn together if the joint is left out."""
+    slide = description.joints[joint]
+    if not isinstance(slide, Prismatic):
         return True
     pairs = [{*other.links} for name, other in description.joints.items() if name != joint]
-    reached = {found.line.link}
+    reached = {slide.line.link}
     for _ in pairs:
         reached.update(*(pair for pair in pairs if pair & reached))
-    return found.slider in reached
+    return slide.slider in reached

@@ -66,7 +66,7 @@ class FourBar:
 
     @cached_property
     def excess(self) -> float:
-        """What decides whether a link turns fully: positive where one does, zero at a change point.
+        """Length by which the condition for a link to turn fully is met: zero at a change point, negative if none does.
 
         Four-bar: p + q - (s + l), with s and l the shortest and the longest link. Slider-crank: rod - (crank + offset).
         Inverted: difference of crank and frame, less the offset.
@@ -76,7 +76,7 @@ class FourBar:
         return right - left if abs(right - left) > EQUAL_LENGTHS * size else 0.0
 
     def _compared(self) -> tuple[tuple[str, float], tuple[str, float]]:
-        """The lengths that decide, by name: a link turns fully where the first is below the second."""
+        """The two sums of lengths, by name, that are compared: a link turns fully if the first is the smaller."""
         if self.kind == "four-bar":
             shortest, *others, longest = sorted(self.lengths)
             return ("s + l", shortest + longest), ("p + q", sum(others))
@@ -119,11 +119,11 @@ class FourBar:
         return f"{'-'.join(self.links)} ({' '.join(joint.name for joint in self.joints)})"
 
     def whole(self, size: float) -> bool:
-        """Whether none of its links is a point, in a mechanism of this size."""
+        """Whether all its links have a length, in a mechanism of this size."""
         return not any(length <= EQUAL_LENGTHS * size for length in self.lengths)
 
     def measured(self, poses: Configuration, size: float) -> list[FourBar]:
-        """The chain in mechanisms of other dimensions, of a size, each with a pose of a flat batch."""
+        """The chain with its lengths in each pose of a flat batch, for a mechanism of this size."""
         joints, nothing = self.joints, np.full(poses.shape, math.nan)
         lengths = [
             nothing if min(a.node, b.node) < 0 else np.abs(poses.nodes[b.node] - poses.nodes[a.node])
@@ -138,10 +138,10 @@ class FourBar:
         return [replace(self, lengths=(*row[:4],), offset=row[4]) for row in table.tolist()]
 
     def _line(self, end: int | None) -> tuple[int, int]:
-        """Joints that the coupler's action leads from and to, or the arm of the input (`end` 0) or output (3).
+        """Ends of the coupler's line of action (`end` None), or of the arm of the input (`end` 0) or the output (3).
 
         The coupler passes a force on from pin to pin, and an arm leads from the frame to where the coupler pushes. The
-        same joint twice is a slide: across it.
+        same joint twice is a slide: the line is across it.
         """
         if end is None:
             return (self.slide, self.slide) if self.slide in (1, 2) else (1, 2)
@@ -191,14 +191,14 @@ def four_bars(mechanism: Mechanism) -> tuple[FourBar, ...]:
 
 
 def chains(mechanism: Mechanism) -> tuple[FourBar, ...]:
-    """Every four-bar and slider-crank by the joints alone, without lengths; some of its links may be points."""
+    """Every four-bar and slider-crank by its joints alone, without lengths; links of length zero are not excluded."""
     bodies = _Bodies(mechanism)
-    found: dict[frozenset[tuple[str, int, int]], FourBar] = {}
+    rings: dict[frozenset[tuple[str, int, int]], FourBar] = {}
     for links, joints in _rings(bodies):
         key = frozenset((joint.name, joint.node, joint.edge) for joint in joints)
-        if key not in found:
-            found[key] = bodies.four_bar(links, joints)
-    return tuple(sorted(found.values(), key=lambda chain: bodies.ground not in chain.links))
+        if key not in rings:
+            rings[key] = bodies.four_bar(links, joints)
+    return tuple(sorted(rings.values(), key=lambda chain: bodies.ground not in chain.links))
 
 
 def describe_loops(mechanism: Mechanism) -> list[str]:
@@ -267,7 +267,7 @@ class _Bodies:
         return min(range(4), key=lambda k: list(self.frames).index(links[k]))
 
     def _known(self, link: str, joint: Joint) -> int:
-        """When the place of a link against the frame is known: -1 by the drives, else the group that finds it."""
+        """Index of the group that places a link against the frame; -1 if the drives do."""
         structure, edges = self.mechanism.forward.structure, self.mechanism.graph.edges
         root = structure.ties[self.frames[link]].root
         for index, group in enumerate(structure.groups):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,21 +16,21 @@ from mechdesign.numerics.arrays import Ints
 
 
 def offset_names(body: str, point: str) -> tuple[str, str]:
-    """Places of a pin's offset from its nominal place, in the frame of the body's link (zero unless given)."""
+    """Names of the x and the y offset of a pin from its nominal place in the body's frame (zero unless given)."""
     name = f"{body.removesuffix(':rod')}.{point}"
     return f"{name}.dx", f"{name}.dy"
 
 
 def slide_offset(joint: str) -> str:
-    """Place of a slide's offset from its line, to the left of its direction (zero unless given)."""
+    """Name of a slide's offset from its line, positive to the left of its direction (zero unless given)."""
     return f"{joint}.offset"
 
 
 @dataclass(frozen=True)
 class Vectors:
-    """Values of all edges for one set of dimensions: w and d of each edge, the offset rotation of each body.
+    """Numbers of a graph for one set of dimensions.
 
-    Also of the parameters that measures take, by their names.
+    Vectors w and d of each edge, the offset of each body as a rotation, and the parameters of measures by their names.
     """
 
     w: Sequence[Vector]
@@ -37,16 +38,28 @@ class Vectors:
     offsets: Mapping[str, Vector]
     parameters: Mapping[str, Value]
 
+    def map(self, function: Callable[[Any], Any]) -> Vectors:
+        """The same with a function applied to each value."""
+        offsets = {body: function(turn) for body, turn in self.offsets.items()}
+        parameters = {name: function(value) for name, value in self.parameters.items()}
+        return Vectors([function(w) for w in self.w], [function(d) for d in self.d], offsets, parameters)
+
     def take(self, index: Ints | slice) -> Vectors:
-        """Those of some dimensions of a flat batch; what is the same for all stays a number."""
-        offsets = {body: picked(turn, index) for body, turn in self.offsets.items()}
-        parameters = {name: picked(value, index) for name, value in self.parameters.items()}
-        return Vectors([picked(w, index) for w in self.w], [picked(d, index) for d in self.d], offsets, parameters)
+        """The vectors of some sets of dimensions of a flat batch; a value that is the same for all stays a number."""
+        return self.map(lambda value: picked(value, index))
+
+
+class _Recorded(dict[str, Value]):
+    """Dimensions that are all nominal; the keys are the names that have been looked for."""
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self[name] = 0.0
+        return default
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Evaluates the edges of a graph; dimensions left out keep their nominal value."""
+    """Evaluates the edges of a graph; dimensions that are not given are nominal."""
 
     graph: Graph
     places: Mapping[str, Place]
@@ -59,7 +72,7 @@ class Geometry:
         return term
 
     def place(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
-        """Coordinates of a point in its body's frame, those of its hole where a pin moves in it."""
+        """Coordinates of a point in its body's frame; of a pin that has an offset, those of its hole."""
         return vector(*(self.term(term, values) for term in self.graph.points[body, point]))
 
     def pin(self, body: str, point: str, values: Mapping[str, Value]) -> Vector:
@@ -82,31 +95,6 @@ class Geometry:
                 total = total + turn.sign * np.angle(self.place(link, b, values) - self.place(link, a, values))
         return total
 
-    def _places_of(self, edge: Edge) -> frozenset[str]:
-        graph = self.graph
-        names: set[str] = set()
-
-        def add_place(body: str, point: str) -> None:
-            names.update(term for term in graph.points[body, point] if isinstance(term, str))
-
-        def add_turns(turns: Sequence[Turn]) -> None:
-            for turn in turns:
-                if turn.towards is not None:
-                    link, a, b = turn.towards
-                    add_place(link, a)
-                    add_place(link, b)
-                elif isinstance(turn.term, str):
-                    names.add(turn.term)
-
-        for _, body, point in edge.locals:
-            add_place(body, point)
-        for _, body, point in (*edge.locals, *edge.pins):
-            names.update(offset_names(body, point))
-            add_turns(graph.bodies[body][1])
-        add_turns(edge.turns)
-        names.update(self._offset_of(edge))
-        return frozenset(names)
-
     def _offset_of(self, edge: Edge) -> tuple[str, ...]:
         """Place of an edge's offset from the line of a slide, where it has one."""
         graph = self.graph
@@ -121,13 +109,20 @@ class Geometry:
 
     @cached_property
     def measured(self) -> Mapping[str, str]:
-        """Parameters that measures take, and the place of each."""
+        """Names of the parameters in measures, and the place of each."""
         return {name.removeprefix(MEASURED): name for name in self.places if name.startswith(MEASURED)}
 
     @cached_property
     def dependencies(self) -> tuple[frozenset[str], ...]:
-        """Names of the places that each edge depends on, offsets included."""
-        return tuple(self._places_of(edge) for edge in self.graph.edges)
+        """Names of the places that each edge depends on, offsets included: those that its evaluation reads."""
+        names = []
+        for edge in self.graph.edges:
+            values = _Recorded()
+            for _, body, _ in (*edge.locals, *edge.pins):
+                self.angle(self.graph.bodies[body][1], values)
+            self._edge(edge, values, {})
+            names.append(frozenset(values))
+        return tuple(names)
 
     @cached_property
     def nominal(self) -> Vectors:
@@ -139,31 +134,34 @@ class Geometry:
         return self._evaluate(values, self.nominal) if values else self.nominal
 
     def _evaluate(self, values: Mapping[str, Value], base: Vectors | None) -> Vectors:
-        graph = self.graph
-        changed = values.keys()
-        offsets: dict[str, Vector] = {}
-        for body, (_, turns) in graph.bodies.items():
-            offsets[body] = rotation(self.angle(turns, values)) if turns else 1.0
-        w: list[Vector] = []
-        d: list[Vector] = []
-        for k, edge in enumerate(graph.edges):
-            if base is not None and self.dependencies[k].isdisjoint(changed):
-                w.append(base.w[k])
-                d.append(base.d[k])
-                continue
-            total: Vector = 0.0
-            for sign, body, arm, _ in self._arms(edge, values):
-                if not isinstance(offsets[body], float) and not isinstance(arm, float):
-                    arm = arm * offsets[body]
-                total = plus(total, sign, arm)
-            if edge.slide is None:
-                d.append(0.0)
-            else:
-                d.append(rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j)
-            for name in self._offset_of(edge):
-                total = total + 1j * values[name] * d[k] if name in values else total
-            w.append(total)
-        return Vectors(w, d, offsets, {name: self.term(place, values) for name, place in self.measured.items()})
+        bodies = self.graph.bodies.items()
+        offsets = {body: rotation(self.angle(turns, values)) if turns else 1.0 for body, (_, turns) in bodies}
+        edges = [
+            (base.w[k], base.d[k])
+            if base is not None and self.dependencies[k].isdisjoint(values.keys())
+            else self._edge(edge, values, offsets)
+            for k, edge in enumerate(self.graph.edges)
+        ]
+        parameters = {name: self.term(place, values) for name, place in self.measured.items()}
+        return Vectors([w for w, _ in edges], [d for _, d in edges], offsets, parameters)
+
+    def _edge(
+        self, edge: Edge, values: Mapping[str, Value], offsets: Mapping[str, Vector]
+    ) -> tuple[Vector, Vector]:  # fmt: skip
+        """Vectors w and d of an edge; `offsets` are the rotations of the bodies that have one."""
+        total: Vector = 0.0
+        for sign, body, arm, _ in self._arms(edge, values):
+            offset = offsets.get(body, 1.0)
+            if not isinstance(offset, float) and not isinstance(arm, float):
+                arm = arm * offset
+            total = plus(total, sign, arm)
+        d: Vector = 0.0
+        if edge.slide is not None:
+            d = rotation(self.angle(edge.turns, values)) if edge.turns else 1.0 + 0.0j
+        for name in self._offset_of(edge):
+            shift = values.get(name)
+            total = total if shift is None else total + 1j * shift * d
+        return total, d
 
     def angle_derivative(self, turns: Sequence[Turn], place: str, values: Mapping[str, Value]) -> Value:
         """Derivative of a sum of turns (radians) with respect to a place."""
@@ -202,7 +200,7 @@ class Geometry:
     def _arms(
         self, edge: Edge, values: Mapping[str, Value], place: str = ""
     ) -> Iterator[tuple[int, str, Vector, complex]]:
-        """What `w` of an edge is the sum of: sign, body, vector in its frame, and derivative of that by a place."""
+        """Terms of an edge's w: sign, body, vector in the body's frame, and its derivative by a place."""
         for sign, body, point in edge.locals:
             change = _equal(self.graph.points[body, point], place) + _equal(offset_names(body, point), place)
             yield sign, body, self.local(body, point, values), change
@@ -211,5 +209,5 @@ class Geometry:
 
 
 def _equal(terms: tuple[Term, Term], place: str) -> complex:
-    """The derivative of two terms, x and y, by a place."""
+    """Derivative of the vector of two terms, x and y, by a place."""
     return complex(terms[0] == place, terms[1] == place)

@@ -16,7 +16,7 @@ from mechdesign.errors import MechanismError
 from mechdesign.mechanism.model import Description, Fixed, Joint, Line, Prismatic, Term
 
 GROUND = "ground"
-# What may follow a link's name, and so is none of its points there.
+# Words behind a link's name that are coordinates of the link, ``rod.angle``, and no points of it.
 OF_LINKS = frozenset(("angle", "length"))
 
 
@@ -43,8 +43,8 @@ class Turn:
 class Edge:
     """``X_head = X_tail + (w + s d) U``; `w` is a sum of signed local points, `d` a unit vector at a sum of turns.
 
-    A line and what slides along it are of links, not of the pins there: `pins` are those whose offsets in their links
-    are part of `w`.
+    A slide runs between places of links, not between the pins there: the offsets of `pins` in their links are therefore
+    part of `w`.
     """
 
     tail: int
@@ -62,30 +62,30 @@ class Graph:
 
     nodes: tuple[str, ...]  # the first is the origin of the ground, at 0
     edges: tuple[Edge, ...]
-    classes: int  # how many; class 0 is the ground's
-    bodies: Mapping[str, tuple[int, tuple[Turn, ...]]]  # angle class of each, and its constant offset within the class
-    points: Mapping[tuple[str, str], tuple[Term, Term]]  # by body and point, its coordinates in the body's frame
+    classes: int  # number of angle classes; class 0 is the ground's
+    bodies: Mapping[str, tuple[int, tuple[Turn, ...]]]  # angle class of each body, and its offset within the class
+    points: Mapping[tuple[str, str], tuple[Term, Term]]  # by body and point, the coordinates in the body's frame
     slides: tuple[str, ...]  # joints and telescopic legs whose displacement is a coordinate
-    telescopic: frozenset[int]  # which of them are legs
+    telescopic: frozenset[int]  # indices of the slides that are telescopic legs
     # Pairs of bodies that turn together, and the turns from the first's x axis to the second's.
     ties: tuple[tuple[str, str, tuple[Turn, ...]], ...]
 
     def node(self, name: str) -> int:
-        """Index of a point; that of a link, ``rod.B``, is where the others at its pin are."""
+        """Index of the node of a point, ``B``; the point of a link, ``rod.B``, has the node of its pin."""
         return self.nodes.index(name.rpartition(".")[2])
 
     def is_point(self, name: str) -> bool:
-        """Whether it names a point, ``B``, or one of a link, ``rod.B``."""
+        """Whether a name is that of a point, ``B``, or of a point of a link, ``rod.B``."""
         link, _, point = name.rpartition(".")
         on_link = point not in OF_LINKS and any((body, point) in self.points for body in (link, rod_of(link)))
         return name in self.nodes or on_link
 
     def links_at(self, point: str) -> list[str]:
-        """Links that have a point."""
+        """Names of the links that meet at a point."""
         return list(dict.fromkeys(body.removesuffix(":rod") for body, name in self.points if name == point))
 
     def joined(self, edges: Iterable[int]) -> list[str]:
-        """Names of the points at the ends of some edges, in their order; edges that stand for distances have none."""
+        """Names of the points at the ends of edges, in their order; given distances, no links, are left out."""
         ends = [node for k in edges if k < len(self.edges) for node in (self.edges[k].tail, self.edges[k].head)]
         return [self.nodes[node] for node in dict.fromkeys(ends) if ":" not in self.nodes[node]]
 
@@ -108,21 +108,21 @@ def _classes(
     for a, b, turns in ties:
         neighbours[a].append((b, turns))
         neighbours[b].append((a, _reverse(turns)))
-    found: dict[str, tuple[int, tuple[Turn, ...]]] = {}
+    class_of: dict[str, tuple[int, tuple[Turn, ...]]] = {}
     count = 0
     for root in bodies:
-        if root in found:
+        if root in class_of:
             continue
-        found[root] = (count, ())
+        class_of[root] = (count, ())
         queue = deque([root])
         while queue:
             body = queue.popleft()
             for other, turns in neighbours[body]:
-                if other not in found:
-                    found[other] = (count, found[body][1] + turns)
+                if other not in class_of:
+                    class_of[other] = (count, class_of[body][1] + turns)
                     queue.append(other)
         count += 1
-    return found, count
+    return class_of, count
 
 
 def build_graph(description: Description) -> Graph:

@@ -1,14 +1,14 @@
 """The loop equations of a mechanism: edges, what closes round a loop, and derivatives of both.
 
-One edge is e = (w + s d) U with U = exp(i theta). Every derivative of it, by an unknown, a drive or a dimension or in
-time, has those of the angle and of the slide in the same two places, and a rest that contains neither:
+One edge is e = (w + s d) U with U = exp(i theta). Every derivative of it, in time or by an unknown, a drive or a
+dimension, consists of a term with the angle's derivative, one with the slide's, and a rest without either:
 
     e^ = i e theta^ + d U s^ + rest
 
 A loop is a signed sum of edges between two nodes whose places are known, X_start + sum(sign e) - X_end = 0. The columns
 of its derivatives by the angles that edges turn with and by slides along them are thus sums of i e and of d U. Edges of
-a tree place the other nodes, and with the derivatives of edges in their place give those of the nodes. All that solves
-the equations, differentiates them, judges their rank or reads a sketch takes them from here.
+a tree place the other nodes; the same sums of the edges' derivatives give the derivatives of the nodes. Solver,
+derivatives, rank and sketch all use these equations.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.mechanism.structure import Group, Loop, Structure, Tie
 from mechdesign.numerics.arrays import Floats
 
-# The unknowns of groups, one after another: angles, slides, then x and y of each base (see `Structure.unknowns`).
+# Unknowns of groups: of each its angles, its slides, then x and y of its bases (see `Structure.unknowns`).
 Unknowns = Sequence[Value] | Floats
 # A vector of each edge, by its number.
 OfEdges = Callable[[int], Vector]
@@ -38,10 +38,10 @@ ZERO = np.float64(0.0)
 
 @dataclass
 class Loops:
-    """The edges of a structure at positions found so far (`None` where not known yet), for coordinates `given`.
+    """The edges of a structure while its groups are solved; positions that are not solved yet are `None`.
 
-    `w` are the vectors of the edges, given distances among them, and `ties` the rotations of classes against their
-    roots. `near` are values within half a turn of which angles in given expressions lie.
+    `given` are the values of the given coordinates, `w` the vectors of the edges and of given distances, and `ties` the
+    rotations of classes against their roots. Angles in given expressions lie within half a turn of `near`.
     """
 
     graph: Graph
@@ -57,7 +57,7 @@ class Loops:
 
     @classmethod
     def start(cls, graph: Graph, structure: Structure, vectors: Vectors, given: Sequence[Value]) -> Self:
-        """What is known before the first group: the ground, the given coordinates, and the ties between classes."""
+        """The positions before the first group is solved: the ground and the given coordinates."""
         nodes: list[Any] = [0.0, *[None] * (len(graph.nodes) - 1)]
         slides: list[Any] = [None] * len(graph.slides)
         ties: list[Vector] = []
@@ -72,7 +72,7 @@ class Loops:
         for slide, k in structure.known_slides:
             slides[slide] = given[k]
         for k, coordinate in enumerate(structure.given):
-            # Half a point may stand in an expression before the other half is known.
+            # An expression may contain the given x of a point whose y is still unknown, or the other way round.
             if coordinate.kind in ("x", "y"):
                 pair = (given[k], np.nan) if coordinate.kind == "x" else (np.nan, given[k])
                 nodes[coordinate.node] = vector(*pair)
@@ -100,18 +100,18 @@ class Loops:
         return self.turned(self.vectors.d[k], self.structure.edges[k].frame)
 
     def chord(self, k: int) -> Vector:
-        """World vector between the ends of an edge where these are known."""
+        """World vector from the tail to the head of an edge, whose positions are known."""
         edge = self.structure.edges[k]
         span: Vector = self.nodes[edge.head] - self.nodes[edge.tail]
         return span
 
     def displacement(self, k: int) -> Value:
-        """Displacement of an edge's slide between its ends where these and its rotation are known."""
+        """Displacement of an edge's slide from the positions of its ends and its rotation, which are known."""
         frame = self.structure.edges[k].frame
         return dot(self.chord(k) - self.turned(self.w[k], frame), self.direction(k))
 
     def change(self, k: int, angles: Sequence[Value], slides: Sequence[Value], rest: Vector = 0.0) -> Vector:
-        """Derivative of an edge's world vector from those of all classes' angles and slides, and from its `rest`."""
+        """Derivative of an edge's world vector, from the derivatives of all angles and slides and its `rest`."""
         edge = self.structure.edges[k]
         if not nothing(angles[edge.frame]):
             rest = plus(rest, 1, self.edge(k) * (1j * angles[edge.frame]))
@@ -144,8 +144,8 @@ class Loops:
     ) -> tuple[Vector, list[Vector]]:
         """Sum of the signed edges along `path`, and its derivatives with respect to a group's angles and slides.
 
-        Where `edge` and `along` give other vectors than those of the edges and their slides' directions, such as
-        derivatives of these, the sums are of them.
+        `edge` and `along` may give other vectors in place of the edges and the directions of their slides, such as the
+        derivatives of these.
         """
         edge, along = edge or self.edge, along or self.direction
         total: Vector = 0.0
@@ -162,7 +162,7 @@ class Loops:
         return total, [_quarter_turn(value) for value in by_root.values()] + list(by_slide.values())
 
     def equations(self, group: Group) -> tuple[list[list[Value]], list[Value]]:
-        """Matrix (a list of rows) and errors of a group's equations at its angles, slides and bases."""
+        """Matrix (a list of rows) and residuals of a group's equations at its angles, slides and bases."""
         rows: list[list[Value]] = []
         errors: list[Value] = []
         for loop in group.loops:
@@ -198,9 +198,9 @@ class Loops:
         return moves
 
     def dyad(self, group: Group) -> tuple[Vector, dict[int, Vector], dict[int, Vector]]:
-        """Around a dyad's loop: the known vector k, and by its unknowns the vectors z that turn and the directions d.
+        """A dyad's loop: known vector k, vector z that turns with each unknown angle, direction d of each slide.
 
-        They are in the frames of the unknown angles' roots, where the unknowns themselves do not enter.
+        z and d of a link that turns are in the frame of its angle's root, so that they do not contain the unknowns.
         """
         structure = self.structure
         loop = group.loops[0]
@@ -225,7 +225,7 @@ class Loops:
         return k, z, d
 
     def pose(self) -> Configuration:
-        """What is known, as poses whose coordinates have values."""
+        """The positions solved so far as a configuration, for values of coordinates."""
         return Configuration(
             self.graph, self.vectors, (), self.nodes, self.rotations, self.slides, [], np.zeros((), np.int8), {},
             self.near,
@@ -233,7 +233,7 @@ class Loops:
 
 
 def tied(tie: Tie, given: Sequence[Value], offsets: Mapping[str, Value]) -> Value:
-    """Angle of a class against its root, or a derivative of it, from those of coordinates and of bodies' offsets."""
+    """Angle of a class against its root, or its derivative, from given coordinates and bodies' offsets or theirs."""
     total: Value = 0.0
     for sign, k in tie.given:
         total = plus(total, sign, given[k])
@@ -243,12 +243,12 @@ def tied(tie: Tie, given: Sequence[Value], offsets: Mapping[str, Value]) -> Valu
 
 
 def gap_of(loop: Loop, nodes: Sequence[Vector]) -> Vector:
-    """Known part of a loop's closure error, or a derivative of it: from the node where it ends to that of its start."""
+    """Vector from the node where a loop ends to the node where it starts, or a derivative of this vector."""
     return 0.0 if loop.start == loop.end else plus(nodes[loop.start], -1, nodes[loop.end])
 
 
 def walk(edges: Sequence[Edge], tree: Sequence[tuple[int, int]], nodes: list[Vector], step: OfEdges) -> None:
-    """Place nodes, or derivatives of their places, along signed edges from nodes that are known."""
+    """Place nodes along signed edges from nodes already placed; or add up derivatives in the same way."""
     for k, sign in tree:
         begin, end = (edges[k].tail, edges[k].head) if sign > 0 else (edges[k].head, edges[k].tail)
         nodes[end] = plus(nodes[begin], sign, step(k))
@@ -258,28 +258,26 @@ def unknowns_of(
     group: Group, nodes: Sequence[Vector], rotations: Sequence[Vector], slides: Sequence[Value]
 ) -> list[Value]:
     """A group's angles, slides, and x and y of its bases, at given positions; see `Loops.put`."""
-    found: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
-    found += [slides[slide] for slide in group.slides]
-    return found + [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
+    unknowns: list[Value] = [angle_of(np.asarray(rotations[root])) for root in group.angles]
+    unknowns += [slides[slide] for slide in group.slides]
+    return unknowns + [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
 
 
 def nothing(value: Vector) -> bool:
-    """Whether a value is the plain zero of what does not depend on anything."""
+    """Whether a value is the number 0, the derivative of a constant."""
     return isinstance(value, float) and value == 0.0
 
 
 def _quarter_turn(value: Vector) -> Vector:
-    """i times a vector; a vector that no edge contributes to stays the plain zero."""
+    """i times a vector; the number 0 stays the number 0."""
     return value if isinstance(value, float) else vector(-value.imag, value.real)
 
 
 def rows_of(lines: Sequence[Sequence[Vector]]) -> list[list[Value]]:
-    """Loop equations as rows of a real matrix: of each line of columns real and imaginary parts, each contiguous."""
-    return [[_part(column, name) for column in line] for line in lines for name in ("real", "imag")]
+    """Loop equations as rows of a real matrix: of each line of columns the real and the imaginary parts."""
+    parts = [part for line in lines for part in ([z.real for z in line], [z.imag for z in line])]
+    return [[_contiguous(value) for value in row] for row in parts]
 
 
-def _part(value: Vector, name: str) -> Value:
-    if isinstance(value, float):
-        return value if name == "real" else 0.0
-    part = getattr(value, name)
+def _contiguous(part: Value) -> Value:
     return part if isinstance(part, float) or not part.ndim else np.ascontiguousarray(part)

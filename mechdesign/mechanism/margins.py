@@ -1,4 +1,4 @@
-"""What ends the motion or the region of a mechanism: margins, positive within and zero where it ends, and folds."""
+"""Limits of motions and regions: margins, which are positive inside and zero at the limit, and folds."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from mechdesign.mechanism.solve import State, run, solve_linear
 from mechdesign.numerics.arrays import Floats
 
 DEAD_CENTRE, SINGULARITY, LIMIT, ZERO_LENGTH = "dead centre", "singularity", "limit", "leg at zero length"
-# Largest errors at a fold: of its equations (parts of the mechanism's size) and of the determinant (parts of that at
-# the last pose).
+# Largest residuals of a fold: of its equations (parts of the mechanism's size) and of the determinant (parts of the
+# determinant at the last pose).
 FOLD_SOLVED = 1e-9
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What ends a motion or a region where its margin reaches zero.
+    """The cause by which a motion or a region ends where the cause's margin reaches zero.
 
     Parameters
     ----------
     kind : str
-        ``dead centre``: a group of links is stretched or folded. ``singularity``: links that are solved together turn
-        back, or the motion goes to infinity. ``leg at zero length``. ``limit``: one that the study states.
+        ``dead centre``: a group of links is stretched or folded. ``singularity``: a group without a closed form turns
+        back, or the motion goes to infinity. ``leg at zero length``. ``limit``: a limit that the study states.
     name, joint : str
-        The links of the group and how they lie, and its joints; for others the leg or the limit.
+        The links of the group and how they lie, and its joints; for legs and limits their names.
     group : int
         Index of the group among the plan's, -1 for legs and stated limits.
     role : str
-        Which margin it has: ``closure`` of a group; ``across``, of two slides (the motion goes to infinity where the
-        sign changes); ``reached``, 1 or -1, of a group without a closed form; ``leg``; ``limit``.
+        Which margin it has: ``closure`` of a group; ``across``, the sine between two slides (the motion goes to
+        infinity where its sign changes); ``reached``, 1 or -1, of a group without a closed form; ``leg``; ``limit``.
     """
 
     kind: str
@@ -49,8 +49,8 @@ class Cause:
 
 
 def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]:
-    """What may end it, in the order in which the mechanism is solved: groups, `legs`, stated limits."""
-    graph, found = mechanism.graph, list[Cause]()
+    """All that may end a motion, in the order of solution: groups, then `legs`, then stated limits."""
+    graph, listed = mechanism.graph, list[Cause]()
     for index, group in enumerate(plan.structure.groups):
         joint = " ".join(graph.joined(group.edges))
         links = "-".join(
@@ -58,24 +58,24 @@ def causes(plan: Plan, mechanism: Mechanism, legs: Iterable[str]) -> list[Cause]
         )
         leg = next((graph.slides[slide] for slide in group.slides if slide in graph.telescopic), None)
         if group.form == "two angles":
-            found += [Cause(DEAD_CENTRE, f"{links} {how}", joint, index, "closure") for how in ("stretched", "folded")]
+            listed += [Cause(DEAD_CENTRE, f"{links} {how}", joint, index, "closure") for how in ("stretched", "folded")]
         elif group.form == "angle and turning slide" and leg is not None:
-            found.append(Cause(ZERO_LENGTH, f"{links} at its reach", leg, index, "closure"))
+            listed.append(Cause(ZERO_LENGTH, f"{links} at its reach", leg, index, "closure"))
         elif group.form in ("angle and turning slide", "angle and fixed slide"):
-            found.append(Cause(DEAD_CENTRE, f"{links} at its reach", joint, index, "closure"))
+            listed.append(Cause(DEAD_CENTRE, f"{links} at its reach", joint, index, "closure"))
         elif group.form == "two slides":
-            found.append(Cause(SINGULARITY, joint, joint, index, "across"))
+            listed.append(Cause(SINGULARITY, joint, joint, index, "across"))
         elif group.form == "newton":
-            found.append(Cause(SINGULARITY, joint, joint, index, "reached"))
-    found += [Cause(ZERO_LENGTH, f"{leg} length", leg, -1, "leg") for leg in legs]
+            listed.append(Cause(SINGULARITY, joint, joint, index, "reached"))
+    listed += [Cause(ZERO_LENGTH, f"{leg} length", leg, -1, "leg") for leg in legs]
     stated = mechanism.margins(mechanism.sketch_configuration)
-    return found + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
+    return listed + [Cause(LIMIT, name, name, -1, "limit") for name, _ in stated]
 
 
 class Margins:
-    """What may end the motion of a plan, in the order of `causes`: as functions of solved poses, shape (causes, n).
+    """Margins of all causes that may end the motion of a plan, as functions of solved poses, shape (causes, n).
 
-    The stated limits come last; `limited` is their number.
+    They are in the order of `causes`; the stated limits come last, and `limited` is their number.
     """
 
     def __init__(self, mechanism: Mechanism, plan: Plan) -> None:
@@ -87,7 +87,7 @@ class Margins:
         self.limited = sum(cause.role == "limit" for cause in self.causes)
 
     def of(self, configuration: Configuration, given: Sequence[Value]) -> Floats:
-        """Margins but for the stated limits, of poses solved without these; nan where an earlier one is negative.
+        """Margins except the stated limits, of poses solved without limits; nan where an earlier margin is negative.
 
         `given` are the values of the plan's coordinates (radians, lengths), shape (n,).
         """
@@ -117,7 +117,7 @@ class Margins:
     def _lengths(self, configuration: Configuration, given: Sequence[Value]) -> list[Value]:
         slides: Sequence[Value] = configuration.slides
         if self.legs and not self.plan.iterative:
-            # As they come out of the closed forms: those of a pose that is not valid are hidden.
+            # Solved again, as lengths of poses that are not valid are nan.
             slides = self.plan.run(given, configuration.vectors, None, self.plan.modes_at(given)).slides
         return [*(slides[slide] for slide in self.legs), *(given[k] for _, k in self.plan.structure.spans)]
 
@@ -136,10 +136,10 @@ class Margins:
 def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floats]:
     """Margins of assembly with the drives held, and their derivatives by dimensions; a margin of 0 is a dead centre.
 
-    Two links have the triangle inequalities of their lengths and of the distance that they span; a link with a slide
-    its length less its reach across the slide, to either side; links that are solved together the square of what
-    `conditionings` has of them, over its value, which is linear in the dimensions near a fold; a telescopic leg its
-    length.
+    Two links have three margins, the triangle inequalities of their lengths and of the distance that they span. A link
+    with a slide has two: its length less its reach across the slide, to either side. A group without a closed form has
+    the square of its conditioning, relative to the square itself: near a fold it is linear in the dimensions. A
+    telescopic leg has its length.
 
     Returns
     -------
@@ -148,7 +148,7 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
     """
     position = linear.sensitivity(places)
     shape = linear.configuration.shape
-    found: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
+    pairs: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
     for index, group in enumerate(linear.structure.groups):
         if group.form in ("place", "two slides"):
             continue
@@ -161,20 +161,20 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
                 size = sum(value * value for value in column)
                 logarithmic = logarithmic + solve_linear(rows, column_z)[0][k]
                 logarithmic = logarithmic - sum(v * v_z for v, v_z in zip(column, column_z, strict=True)) / size
-            found.append((1.0, 2.0 * logarithmic))
+            pairs.append((1.0, 2.0 * logarithmic))
             continue
         ((a, b),), ((a_z, b_z),) = lines, changes
         if group.form == "two angles":
             sides = [_length(a, a_z), _length(b, b_z), _length(a + b, a_z + b_z)]
             total, total_z = (sum(part) for part in zip(*sides, strict=True))
-            found += [(total - 2.0 * side, total_z - 2.0 * side_z) for side, side_z in sides]
+            pairs += [(total - 2.0 * side, total_z - 2.0 * side_z) for side, side_z in sides]
             continue
         (size, size_z), (unit, unit_z) = _length(a, a_z), _length(b, b_z)
         reach = dot(a, b) / unit
         reach_z = (dot(a_z, b) + dot(a, b_z) - reach * unit_z) / unit
-        found += [(size - way * reach, size_z - way * reach_z) for way in (1.0, -1.0)]
-    margins, slopes = np.empty((len(found), *shape)), np.empty((len(found), len(places), *shape))
-    for k, (margin, slope) in enumerate(found):
+        pairs += [(size - way * reach, size_z - way * reach_z) for way in (1.0, -1.0)]
+    margins, slopes = np.empty((len(pairs), *shape)), np.empty((len(pairs), len(places), *shape))
+    for k, (margin, slope) in enumerate(pairs):
         margins[k], slopes[k] = margin, slope
     return margins, slopes
 
@@ -190,8 +190,8 @@ def turning_point(
 ) -> tuple[float, Configuration, int] | None:
     """Place along a motion at which it ends at a fold of a group without a closed form.
 
-    There the determinant of the group's equations F(y, s) = 0 vanishes. F = 0 and det(dF/dy) = 0 together are regular
-    there, so that the fold can be solved for to the last digit, where a search for the last pose that converges cannot.
+    There the determinant of the group's equations F(y, s) = 0 vanishes. The system F = 0, det(dF/dy) = 0 is regular at
+    a fold, so that Newton's method finds it to the last digit.
 
     Parameters
     ----------
@@ -209,8 +209,8 @@ def turning_point(
     """
     guess = plan.unknowns(near, given(place))
     folds = [(index, _fold(plan, given, place, reach, near, guess, index)) for index in plan.structure.unknowns]
-    found = [(abs(fold[0] - place), index, fold) for index, fold in folds if fold is not None]
-    distance, index, (end, state) = min(found, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
+    candidates = [(abs(fold[0] - place), index, fold) for index, fold in folds if fold is not None]
+    distance, index, (end, state) = min(candidates, key=lambda one: one[:2], default=(np.inf, 0, (0.0, None)))
     if state is None or distance > reach:
         return None
     return end, plan.configuration(state, (), near.places, None), index
@@ -229,7 +229,7 @@ def _fold(
     weights = np.where(np.arange(len(own)) < len(group.angles), 1.0, size)
 
     def state_at(unknowns: Floats) -> State:
-        """Everything up to the group, with its unknowns and the place in their own scales."""
+        """The mechanism up to the group, for the group's unknowns and the place, each in its own scale."""
         values = [np.asarray(value) for value in given(place + reach * unknowns[-1])]
         state = State.start(plan.core.graph, plan.structure, near.vectors, values)
         state.size = size

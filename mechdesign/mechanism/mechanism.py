@@ -15,18 +15,18 @@ from mechdesign.mechanism.algebra import Value, rotation
 from mechdesign.mechanism.configuration import Configuration, Reason
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.core import Core
+from mechdesign.mechanism.decomposition import Undetermined, compile_structure
 from mechdesign.mechanism.derivatives import Jacobian, Linearization
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.model import Description, Quantity
 from mechdesign.mechanism.plan import Plan
 from mechdesign.mechanism.rigidity import check_independent
 from mechdesign.mechanism.sketch import SKETCH
-from mechdesign.mechanism.structure import Undetermined, compile_structure
 from mechdesign.numerics.arrays import Flags, Floats
 
-# Angles of slides and clamps in a closed chain, written with ten digits or more, agree this well (radians).
+# Angles of slides and clamps around a closed chain may differ by this (radians): they are written with ten digits.
 TIE_ROUNDING = 1e-9
-# Where other dimensions cannot be assembled at the drawn drive values, so many others are tried.
+# Number of random drive values tried for dimensions that cannot be assembled at the drawn ones.
 TRIED_POSES = 512
 
 
@@ -78,9 +78,9 @@ class Mechanism(Core):
         return self.coordinate(name).quantity
 
     def contradictions(self, places: Mapping[str, Value]) -> Iterator[tuple[str, str, Floats]]:
-        """Bodies whose angle follows in two ways from those of slides and clamps, and by how much these differ.
+        """Pairs of bodies whose relative angle follows in two ways from slides and clamps, and the difference.
 
-        Radians, for other dimensions where these are given, of their shape; 0 where they agree.
+        The differences are in radians, of the shape of the dimensions in `places`, and 0 within rounding.
         """
         offsets = self.geometry.vectors(places).offsets
         for a, b, turns in self.graph.ties:
@@ -231,10 +231,10 @@ class Pose:
 
 
 class Variant(Mechanism):
-    """A mechanism with other dimensions than its original: nothing of its topology is compiled again.
+    """A mechanism with other dimensions than its original, whose topology is not compiled again.
 
-    The assembly modes stay those of the original; groups without a closed form start from its sketch, brought to the
-    new dimensions by continuation at the same values of the drives, or as it is where that does not close.
+    The assembly modes are those of the original. Groups without a closed form start from its sketch, which is continued
+    to the new dimensions at the same values of the drives; if that does not close, the start is the sketch itself.
 
     Raises
     ------
@@ -277,14 +277,14 @@ class Variant(Mechanism):
     def _assemble_sketch(self) -> Configuration:
         before, changed = self.original.nominal, self._changed
         if self.forward.iterative:
-            found = begun(self.original, changed)
-            return replace(found, places={name: v for name, v in found.places.items() if v == before[name]})
-        found = drawn(self.original, changed)
-        return replace(found if found.valid else elsewhere(self.original, changed), places={})
+            pose = begun(self.original, changed)
+            return replace(pose, places={name: v for name, v in pose.places.items() if v == before[name]})
+        pose = drawn(self.original, changed)
+        return replace(pose if pose.valid else elsewhere(self.original, changed), places={})
 
 
 def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configuration:
-    """A pose with other dimensions and the drives near to where they were drawn; the sketch where none closes."""
+    """A pose with other dimensions, and drives as near as possible to the sketch; the sketch if no pose closes."""
     sketch, random = mechanism.sketch_configuration, np.random.default_rng(0)
     given = []
     away = np.zeros(TRIED_POSES)
@@ -299,18 +299,18 @@ def elsewhere(mechanism: Mechanism, changed: Mapping[str, Value]) -> Configurati
 
 
 def drawn(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
-    """The assembled sketch with other dimensions, the drives where they were drawn."""
+    """The pose with other dimensions and the drives as in the sketch."""
     sketch = mechanism.sketch_configuration
     given = [sketch.value(coordinate) for coordinate in mechanism.forward.structure.given]
     return mechanism.forward.solve(given, places, limits=False)
 
 
 def begun(mechanism: Mechanism, places: Mapping[str, Value]) -> Configuration:
-    """Where groups without a closed form are continued from: the sketch with other dimensions, if it closes so.
+    """The pose from which groups without a closed form are continued: the sketch with other dimensions, if that closes.
 
-    Where it does not it is the sketch with its own dimensions: these change on the way to a pose as the drives do.
+    Otherwise it is the sketch with its own dimensions, which then change on the way to a pose together with the drives.
     """
-    found = drawn(mechanism, places)
-    if found.valid.all():
-        return found
-    return drawn(mechanism, {name: np.where(found.valid, v, mechanism.nominal[name]) for name, v in places.items()})
+    sketch = drawn(mechanism, places)
+    if sketch.valid.all():
+        return sketch
+    return drawn(mechanism, {name: np.where(sketch.valid, v, mechanism.nominal[name]) for name, v in places.items()})

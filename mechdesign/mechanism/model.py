@@ -16,7 +16,7 @@ from mechdesign.expressions import Expression
 Term = str | float
 Quantity = Literal["length", "angle", "none"]
 
-# Beginning of the names of places that hold the parameters in measures; no name in a study has a colon.
+# Prefix of the places of parameters that measures use; no name in a study has a colon.
 MEASURED = "measures:"
 
 
@@ -33,8 +33,9 @@ class Place:
 class Link:
     """A rigid link, or a telescopic leg (two bodies and a slide), whose length is a coordinate.
 
-    `points` has the coordinates (x, y) of each in the link's frame. The x axis of a binary or telescopic link runs from
-    its first end, at (0, 0), to its second, at (length, 0), which for a telescopic leg is not among the points.
+    `points` has the coordinates (x, y) of each point in the link's frame. The x axis of a binary or telescopic link
+    runs from its first end, at (0, 0), to its second, at (length, 0); the second end of a telescopic leg is not among
+    its points.
     """
 
     name: str
@@ -65,7 +66,7 @@ class Prismatic:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """The link with the line, and that which slides."""
+        """The link that carries the line, and the slider."""
         return self.line.link, self.slider
 
 
@@ -79,7 +80,7 @@ class Slot:
 
     @property
     def links(self) -> tuple[str, ...]:
-        """The link with the line."""
+        """The link that carries the line."""
         return (self.line.link,)
 
 
@@ -110,7 +111,7 @@ class Drive:
 class Measure:
     """A named quantity: the angle from link a's x axis to b's, the distance of two points, or an expression.
 
-    Of the names in an expression those for which there is a place `MEASURED` are parameters, the others coordinates.
+    A name in an expression is a parameter if there is a place of that name behind `MEASURED`, else a coordinate.
     """
 
     name: str

@@ -20,8 +20,8 @@ GRADIENT_STEP = 1e-6
 class Rates:
     """One derivative of everything: node positions (complex), angles of classes, slides, offsets of bodies, parameters.
 
-    Of the parameters that measures take those that are not named do not change. `ends` are points of links, by link and
-    node, where these do not move with the pin at the node.
+    Parameters of measures that are not named do not change. `ends` has points of links, by link and node, that do not
+    move with the pin at the node.
     Arrays broadcast to the batch, with further leading axes where several derivatives are taken at once.
     """
 
@@ -62,8 +62,8 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 def second(configuration: Configuration, coordinate: Coordinate, one: Rates, other: Rates, both: Rates) -> Value:
     """Second derivative of a coordinate, along `one` and `other`; `both` has those of positions.
 
-    They are the accelerations where `one` and `other` are both the velocities; where `other` is by dimensions, what the
-    velocities change by these.
+    With velocities as `one` and `other` it is the acceleration; with derivatives by dimensions as `other`, the
+    derivative of the velocity by these.
     """
     if coordinate.kind == "distance":
         span, a, b, ab = (_span(n, coordinate) for n in (configuration.nodes, one.nodes, other.nodes, both.nodes))
@@ -124,7 +124,7 @@ def _user(part: Coordinate, value: Value, whole: Coordinate) -> Value:
 
 
 def _radians(coordinate: Coordinate, value: Value) -> Value:
-    """The value of an expression, or a derivative of it, as the core has it."""
+    """The value of an expression, or a derivative of it, in radians if it is an angle."""
     assert coordinate.expression is not None
     return value * coordinate.expression.angle_unit if coordinate.quantity == "angle" else value
 

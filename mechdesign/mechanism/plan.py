@@ -29,15 +29,15 @@ LIMIT_ROUNDING = 1e-14
 PATH_PRECISION = 1e-3
 # Poses of a chunk: the fastest of 4,096 to 262,144, measured.
 CHUNK = 32768
-# The same on several threads, which gain on longer arrays only: each operation hands the interpreter's lock over.
+# The same on several threads, which gain only on longer arrays: each operation passes on the interpreter's lock.
 THREAD_CHUNK = 131072
 
 
 class Plan:
     """How to find the whole mechanism from given coordinates; made by `Mechanism.plan`.
 
-    `modes` has the assembly mode of each group as drawn (0 where it has none). Motions pass change points only if the
-    study lets them and `follows`: they start from the assembled sketch, so not before there is one.
+    `modes` has the assembly mode of each group as drawn (0 where it has none). Motions pass change points if the study
+    says ``branch: follow`` and `follows` is true; it must be false until the sketch is assembled, where they start.
     """
 
     def __init__(self, core: Core, structure: Structure, modes: Sequence[int], *, follows: bool = True) -> None:
@@ -46,7 +46,7 @@ class Plan:
         self.modes = tuple(modes)
         self.follows = follows and core.description.branch == "follow"
         self.iterative = any(group.form == "newton" for group in structure.groups)
-        # Angles in given expressions, whose turns the way from the sketch tells.
+        # Angles in given expressions; their turns are counted on the way from the sketch.
         inner = angles_of(c for c in structure.given if c.kind == "expression")
         self.angles = tuple(angle for name, angle in inner.items() if name not in self.counted)
 
@@ -80,7 +80,7 @@ class Plan:
         beyond: bool = False,
         turns: Sequence[Value] | Floats = (),
     ) -> State:
-        """Solve all groups, in the assembly as drawn unless `modes` says another; `turns` are near to `angles`."""
+        """Solve all groups, in the assembly as drawn or that of `modes`; `turns` has values near to the `angles`."""
         state = State.start(self.core.graph, self.structure, vectors, given)
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
@@ -98,7 +98,7 @@ class Plan:
         return Start(given, at.places, guess, [np.sign(d) for d in state.determinants], turns)
 
     def unknowns(self, at: Configuration, given: Sequence[Value]) -> list[Value]:
-        """Unknowns of the groups without a closed form in a solved pose with such given coordinates."""
+        """Unknowns of the groups without a closed form in a solved pose; `given` are its given coordinates."""
         rotations = [*at.rotations]
         for position, (_, k) in enumerate(self.structure.spans):
             edge = self.structure.edges[len(self.core.graph.edges) + position]
@@ -125,7 +125,7 @@ class Plan:
         places : mapping of str to array_like, optional
             Dimensions that differ from the nominal ones, by place name; they broadcast against `given`.
         vectors : Vectors, optional
-            The edges for these dimensions, of a flat batch, where they are known.
+            The edges for these dimensions, of a flat batch, where the caller has them.
         start : Configuration, optional
             Solved pose (of batch shape or single) that groups without a closed form are continued from; the sketch
             where left out.
@@ -186,7 +186,7 @@ class Plan:
         start: Configuration | None,
         limits: bool,
     ) -> Configuration:
-        """`solve` without chunks, for arrays of floats that broadcast to `shape`."""
+        """`solve` in one piece, for arrays of floats that broadcast to `shape`."""
         reached: Flags | None = None
         guess: Unknowns | None = None
         turns: Floats = np.empty((0, *shape))
@@ -196,18 +196,18 @@ class Plan:
         vectors = vectors or self.core.geometry.vectors(dims)
         state = self.run(values, vectors, guess, self.modes_at(values), turns=turns)
         if reached is not None:
-            # What the path came near to must be a pose, and of the same assembly.
+            # The end of a path must be a pose, and of the same assembly.
             reached &= state.solved(shape, begin.signs)
-        found = self.configuration(state, shape, dims, reached, values)
+        poses = self.configuration(state, shape, dims, reached, values)
         if self.angles:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
-            found = replace(found, near={**found.near, **near})
+            poses = replace(poses, near={**poses.near, **near})
         if limits:
-            self.judge(found)
-        return found
+            self.judge(poses)
+        return poses
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
-        """Values within half a turn of which angles are reported: given ones as given, drives within their limits."""
+        """By name, values that angles are reported within half a turn of: given angles, and the limits of drives."""
         near = self.core.turns(dims)
         return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
 
@@ -216,7 +216,7 @@ class Plan:
         return self.core.drawn_angles()
 
     def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
-        """The same, the other angles near those of the sketch."""
+        """The same, and for other angles the values in the sketch."""
         return self._drawn_angles | self.turns(given, dims)
 
     @cached_property
@@ -259,8 +259,8 @@ class Plan:
             )
 
         given = [_flat(v, shape) for v in values]
-        found, reached, near = solve(given, None)
-        # First the given turns; but where they are not reached, the pose is the same with its angles in other turns.
+        unknowns, reached, near = solve(given, None)
+        # Where the given turns are not reached, the pose is the same with its angles less than half a turn away.
         turned = [
             nearest(v, at) if c.quantity == "angle" else v
             for c, v, at in zip(self.structure.given, given, begin.given, strict=True)
@@ -269,9 +269,9 @@ class Plan:
         rows = np.flatnonzero(other & ~reached)
         if len(rows):
             better, there, turns = solve(turned, rows)
-            found[:, rows[there]], reached[rows] = better[:, there], there
+            unknowns[:, rows[there]], reached[rows] = better[:, there], there
             near[:, rows[there]] = turns[:, there]
-        return found.reshape(len(found), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
+        return unknowns.reshape(len(unknowns), *shape), reached.reshape(shape), near.reshape(len(near), *shape)
 
     def configuration(
         self,
@@ -281,17 +281,17 @@ class Plan:
         reached: Flags | None,
         given: Sequence[Value] | None = None,
     ) -> Configuration:
-        """A state with the reason of each pose; angles that are given keep their turns where `given` has the values."""
+        """A state as a configuration, with the reason of each pose; angles that are `given` keep their turns."""
         graph = self.core.graph
         with np.errstate(invalid="ignore"):
             open_: Flags = np.zeros((), dtype=bool)
             # A group that does not close leaves nan in its first unknown.
-            known = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
-            known += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
-            known += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
-            known += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
-            known += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
-            for value in known:
+            values = [state.rotations[root] for group in self.structure.groups for root in group.angles[:1]]
+            values += [state.slides[slide] for group in self.structure.groups for slide in group.slides[:1]]
+            values += [state.nodes[base] for group in self.structure.groups for base in group.bases[:1]]
+            values += [state.nodes[c.node] for c in self.structure.given if c.kind in ("x", "y")]
+            values += [state.rotations[graph.bodies[c.body][0]] for c in self.structure.given if c.kind == "angle"]
+            for value in values:
                 open_ = open_ | ~np.isfinite(np.real(value))
             for slide in graph.telescopic:
                 open_ = open_ | ~(np.asarray(state.slides[slide]) > 0)
@@ -315,7 +315,7 @@ class Plan:
         )  # fmt: skip
 
     def judge(self, configuration: Configuration) -> None:
-        """Note in the reasons of solved poses where they are outside the study's limits."""
+        """Set the reason of solved poses that are outside the study's limits."""
         reason, places = configuration.reason, {**self.core.nominal, **configuration.places}
         with np.errstate(invalid="ignore"):
             for bound in self.core.bounds:

@@ -2,45 +2,46 @@
 
 Counting unknowns and equations is right for links of any dimensions; special dimensions (equal cranks, parallel
 guides) make equations depend on each other. Here the equations of all edges are solved from the sketch by least
-squares, and their Jacobian is judged at the place found and at a second one, reached along its null space: a motion
-that is only infinitesimal (a stretched chain) is none. The motions are the right null space, and the equations that
-depend on each other, the states of self-stress, the left one [Pellegrino and Calladine 1986].
+squares, and the rank of their Jacobian is taken there and at a second configuration, reached along its null space: a
+motion that is only infinitesimal (a stretched chain) does not count. The motions are the right null space, and the
+equations that depend on each other, the states of self-stress, the left one [Pellegrino and Calladine 1986].
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, vector, wrap
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.decomposition import TWICE_AND_FREE, Undetermined
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.loops import Loops, unknowns_of
 from mechdesign.mechanism.sketch import Sketch
-from mechdesign.mechanism.structure import Structure, Undetermined, whole
+from mechdesign.mechanism.structure import Structure, whole
 from mechdesign.numerics.arrays import Complexes, Floats
 
 # Singular values below this fraction of the largest are zeros, of columns scaled to length 1.
 RANK = 1e-7
 # Gaps below this fraction of the mechanism's size are closed.
 CLOSED = 1e-9
-# Step along the null space (radians, or fractions of the size).
+# Step along the null space (radians, or fractions of the mechanism's size).
 NULL_SPACE_STEP = 0.05
-# A motion that goes on for at least this part of a step is a finite one.
+# A motion that can be followed over at least this part of a step is finite.
 REAL_MOTION = 0.3
-# Directions and starts that are tried, drawn from fixed seeds.
+# Number of random directions, starts and dimensions that are tried, from fixed seeds.
 ATTEMPTS = 6
-# Random dimensions that are tried until one is regular: of a train of 200 four-bars one in three is.
+# Random dimensions that are tried until the equations are regular; for a train of 200 four-bars one try in three is.
 DRAWS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """All edges' equations; the unknowns are angles of classes, slides, and nodes, lengths as fractions of `size`."""
+    """The equations of all edges; unknowns are angles of classes, slides and nodes, lengths as fractions of `size`."""
 
     graph: Graph
     geometry: Geometry
@@ -58,7 +59,7 @@ class Equations:
 
     @cached_property
     def _units(self) -> Floats:
-        """Radians and lengths that unknowns are counted in."""
+        """Unit of each unknown: a radian, or the length `size`."""
         unknowns = self.inner + 2 * (len(self.graph.nodes) - 1)
         return np.where(np.arange(unknowns) < self.angles, 1.0, self.size)
 
@@ -67,20 +68,20 @@ class Equations:
         (group,) = whole(self.graph).groups
         return np.array(unknowns_of(group, nodes, rotations, slides), dtype=float) / self._units
 
-    def at(self, x: Floats, held: Sequence[Coordinate] = ()) -> Loops:
-        """The loops at given unknowns, lengths as in the study, with held coordinates that should be zero."""
+    def at(self, x: Floats, held: Sequence[Coordinate] = (), values: Sequence[float] = ()) -> Loops:
+        """The loops at given unknowns; `values` of the held coordinates (radians or lengths) are zero if left out."""
         structure = whole(self.graph, held)
-        loops = Loops.start(self.graph, structure, self.geometry.nominal, [0.0] * len(held))
+        loops = Loops.start(self.graph, structure, self.geometry.nominal, values or [0.0] * len(held))
         loops.put(structure.groups[0], x * self._units)
         return loops
 
     def from_sketch(self, sketch: Sketch, spread: float = 0.0, seed: int = 0) -> Floats:
-        """Unknowns as drawn, those not drawn at random, all moved at random by up to `spread`."""
+        """Unknowns as drawn, or random where the sketch does not show them; then all are moved by up to `spread`."""
         rng = np.random.default_rng(seed)
         drawn = np.array([np.nan if node is None else node for node in sketch.nodes], dtype=complex)
-        known = np.isfinite(drawn)
+        is_drawn = np.isfinite(drawn)
         anywhere = self.size * vector(*rng.uniform(-0.5, 0.5, (2, len(drawn))))
-        nodes = list(np.where(known, drawn, drawn[known].mean() + anywhere))
+        nodes = list(np.where(is_drawn, drawn, drawn[is_drawn].mean() + anywhere))
         turns = [np.exp(1j * rng.uniform(-3, 3)) if turn is None else turn for turn in sketch.rotations]
         loops = replace(sketch, nodes=nodes, rotations=turns, slides=[*sketch.slides])
         for k, edge in enumerate(self.graph.edges):
@@ -90,7 +91,7 @@ class Equations:
         return x + spread * rng.uniform(-1, 1, len(x))
 
     def gaps(self, x: Floats) -> Complexes:
-        """By how much each edge misses its head, in the study's lengths."""
+        """Vector by which each edge misses its head, in the study's length."""
         return self._system(self.at(x))[0].view(np.complex128) * self.size
 
     def jacobian(self, x: Floats, held: Sequence[Coordinate] = ()) -> Floats:
@@ -98,24 +99,24 @@ class Equations:
         return self._system(self.at(x, held))[1]
 
     def _system(self, loops: Loops) -> tuple[Floats, Floats]:
-        """Errors of the equations and values of the held coordinates, lengths as fractions, and their derivatives."""
+        """Residuals of the edges and of the held coordinates, lengths as fractions of `size`, and their Jacobian."""
         rows, errors = loops.equations(loops.structure.groups[0])
         held = [self.size if c.quantity == "length" else 1.0 for c in loops.structure.given]
         units = np.array([self.size] * 2 * len(self.graph.edges) + held)
         return np.array(errors, dtype=float) / units, np.array(rows, dtype=float) * self._units / units[:, None]
 
     def generic(self, held: Sequence[Coordinate] = ()) -> Floats:
-        """The Jacobian for dimensions without any special relation (but the directions of slides).
+        """The Jacobian for random dimensions, free of special relations except between the directions of slides.
 
-        Of several draws one of the largest rank: chance can only lower it. Not finite where no draw is, as a held
-        expression may be defined for few values only.
+        It is the one of largest rank of several draws, as chance can only lower the rank. It is not finite where no
+        draw is: a held expression may have no value for most dimensions.
         """
         draws = [self.drawn(held, seed) for seed in range(ATTEMPTS)]
         finite = [jacobian for jacobian in draws if np.isfinite(jacobian).all()]
         return min(finite, key=lambda jacobian: null_space(jacobian).shape[1], default=draws[0])
 
     def drawn(self, held: Sequence[Coordinate], seed: int) -> Floats:
-        """The Jacobian for dimensions drawn at random (but the directions of slides)."""
+        """The Jacobian for dimensions drawn at random; the directions of slides stay."""
         loops = self.at(np.random.default_rng(seed).uniform(-1, 1, len(self._units)), held)
         for k, edge in enumerate(self.graph.edges):
             loops.w[k] += np.conj(loops.rotations[edge.frame]) * (loops.chord(k) - loops.edge(k))
@@ -126,27 +127,30 @@ class Equations:
     ) -> tuple[Floats, float]:
         """Least squares from `x`, some coordinates held (angles in radians): the unknowns and the largest gap.
 
-        With a `step` the solution must lie that far from `x` in its direction: a point where two motions cross, or
-        where one ends, draws all others to itself.
+        With a `step` the solution must lie that far from `x` in the direction of the step. Otherwise the solver would
+        run back to `x` where two motions cross or one ends.
         """
         from scipy.optimize import least_squares
 
-        coordinates = [coordinate for coordinate, _ in held]
+        coordinates, values = [coordinate for coordinate, _ in held], [value for _, value in held]
+        turns = np.array([False] * 2 * len(self.graph.edges) + [c.quantity == "angle" for c in coordinates])
         ahead = np.zeros((0, len(x))) if step is None else step[None] / np.linalg.norm(step)
         start = x if step is None else x + step
 
+        # The solver asks for the slope where it has just asked for the residual.
+        @lru_cache(maxsize=1)
+        def system(unknowns: bytes) -> tuple[Floats, Floats]:
+            return self._system(self.at(np.frombuffer(unknowns), coordinates, values))
+
         def residual(y: Floats) -> Floats:
-            errors, count = self._system(self.at(y, coordinates))[0], 2 * len(self.graph.edges)
-            for k, (coordinate, value) in enumerate(held, start=count):
-                miss = errors[k] - value / (self.size if coordinate.quantity == "length" else 1.0)
-                errors[k] = wrap(miss) if coordinate.quantity == "angle" else miss
-            return np.concatenate([errors, ahead @ (y - start)])
+            errors, _ = system(y.tobytes())
+            return np.concatenate([np.where(turns, wrap(errors), errors), ahead @ (y - start)])
 
         def slope(y: Floats) -> Floats:
-            return np.vstack([self.jacobian(y, coordinates), ahead])
+            return np.vstack([system(y.tobytes())[1], ahead])
 
-        found = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
-        return found.x, float(np.abs(found.fun).max(initial=0.0))
+        result = least_squares(residual, start, slope, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=200)
+        return result.x, float(np.abs(result.fun).max(initial=0.0))
 
     def assemble(self, sketch: Sketch) -> Floats | None:
         """An assembled configuration near the sketch; None where there is none."""
@@ -169,11 +173,11 @@ class Equations:
             step *= NULL_SPACE_STEP / np.abs(step).max()
             y, gap = self.solve(x, step=step)
             if gap < CLOSED:
-                best = max(best, (self._realised(y, ordinary), y), key=lambda found: found[0])
+                best = max(best, (self._realised(y, ordinary), y), key=lambda trial: trial[0])
         return best
 
     def _realised(self, x: Floats, ordinary: int) -> int:
-        """How many of the motions at a configuration go on beyond the first order."""
+        """Number of motions at a configuration that are finite, not only of first order."""
         motions = np.linalg.qr(null_space(self.jacobian(x)))[0]
         if motions.shape[1] == ordinary:
             return ordinary
@@ -186,9 +190,9 @@ class Equations:
         return int((np.linalg.svd(kept, compute_uv=False) > REAL_MOTION).sum())
 
     def without(self, jacobian: Floats, edges: Collection[int], classes: Collection[int]) -> tuple[int, int]:
-        """Degrees of freedom where edges, slides on them, and classes are left out, with what only they place.
+        """Degrees of freedom, and the excess of equations over unknowns, if edges and classes are left out.
 
-        And how many more equations than unknowns are left.
+        Slides along these edges and nodes that no other edge places are left out as well.
         """
         every = self.graph.edges
         left = [k for k in range(len(every)) if k not in edges]
@@ -213,9 +217,10 @@ def null_space(matrix: Floats) -> Floats:
 
 
 def separated(basis: Floats, pivots: int) -> list[Floats]:
-    """Basis vectors reduced against each other, so that independent motions come one by one.
+    """Basis of the same space by Gauss-Jordan elimination, so that each vector is a motion of few links.
 
-    Pivots are taken among the first `pivots` entries while these say anything. Entries within rounding are zero.
+    Pivots are taken among the first `pivots` entries as long as these are not all zero. Entries within rounding are
+    set to zero.
     """
     rows = basis.T.copy()
     for index in range(len(rows)):
@@ -232,29 +237,26 @@ def separated(basis: Floats, pivots: int) -> list[Floats]:
 
 
 def check_independent(equations: Equations, structure: Structure) -> None:
-    """Check a mechanism with groups without a closed form for equations that depend on each other.
+    """Check that the equations of groups without a closed form are independent.
 
-    A perfect matching of equations and unknowns is necessary, but not enough: a part may be joined within itself too
-    often while another floats. So the rank of the equations is taken for random dimensions. Chance can make a draw
-    singular, but never singular equations regular: one regular draw is proof.
+    A perfect matching of equations and unknowns is necessary but not sufficient: one part may be over-constrained while
+    another floats. So the rank is computed for random dimensions. One regular draw is proof, as chance can make regular
+    equations singular but not the reverse.
 
     Raises
     ------
     Undetermined
-        If there are any whatever the dimensions.
+        If the equations depend on each other for all dimensions.
     """
     if not any(group.form == "newton" for group in structure.groups):
         return
     singular = False
     for seed in range(DRAWS):
         draw = equations.drawn(structure.given, seed)
-        # A given expression may have no value at random dimensions; such a draw does not count.
+        # A given expression may have no value for random dimensions; such a draw does not count.
         if np.isfinite(draw).all():
             singular = null_space(draw).shape[1] > 0
             if not singular:
                 return
     if singular:
-        raise Undetermined(
-            "the given coordinates fix one part of the mechanism twice and leave another free; give one of the other "
-            "part instead"
-        )
+        raise Undetermined(f"{TWICE_AND_FREE}; give one of the other part instead")

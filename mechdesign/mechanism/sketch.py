@@ -18,13 +18,13 @@ from mechdesign.mechanism.structure import Group, Structure, whole
 # A joint this near to its dividing line, as a fraction of the distances around it, chooses no side.
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
-# Forms of groups that have one assembly, or one that is searched for.
+# Forms of groups without an assembly mode: with a single assembly, or with one that is searched for.
 _WITHOUT_MODE = ("place", "newton", "two slides")
 
 
 @dataclass
 class Sketch(Loops):
-    """World position of each node and rotation of each angle class, `None` where the sketch does not tell."""
+    """Position of each node and rotation of each angle class as drawn; `None` where the sketch does not show them."""
 
     def modes(self, structure: Structure) -> tuple[int, ...]:
         """Assembly mode (+1 or -1) of each group of a structure as drawn; 0 for groups that have none.
@@ -53,7 +53,7 @@ class Sketch(Loops):
         if group.form in _WITHOUT_MODE:
             return 0
         (loop,) = group.loops
-        # A direction is unknown only where the whole link is drawn at one place, which decides nothing whatever it is.
+        # The direction is missing only of a link that is drawn as a point; then it decides nothing, and any will do.
         turns = [1.0 if turn is None else turn for turn in self.rotations]
         nodes = [np.nan if node is None else node for node in self.nodes]
         drawn = replace(self, structure=structure, nodes=nodes, rotations=turns)
@@ -74,7 +74,7 @@ class Sketch(Loops):
         return 1 if side > 0 else -1
 
     def value(self, coordinate: Coordinate) -> float | None:
-        """Value of a drive as drawn (radians), or `None` where the sketch does not tell."""
+        """Value of a drive as drawn (radians or length), or `None` where the sketch does not show it."""
         if coordinate.kind == "angle":
             turns = []
             for body in (coordinate.body, coordinate.reference):
@@ -84,12 +84,12 @@ class Sketch(Loops):
                 turns.append(turn * self.vectors.offsets[body])
             return float(np.angle(turns[0] * np.conj(turns[1])))
         k, edge = next((k, e) for k, e in enumerate(self.graph.edges) if e.slide == coordinate.slide)
-        known = (self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame])
-        return None if any(value is None for value in known) else float(self.displacement(k))
+        parts = (self.nodes[edge.tail], self.nodes[edge.head], self.rotations[edge.frame])
+        return None if any(value is None for value in parts) else float(self.displacement(k))
 
     def unknowns(self, structure: Structure) -> list[float]:
         """Angles and slides of the groups without a closed form as drawn: where Newton's method starts."""
-        found: list[float] = []
+        starts: list[float] = []
         for group in (structure.groups[index] for index in structure.unknowns):
             for root in group.angles:
                 turn = self.rotations[root] if root < self.graph.classes else None
@@ -97,7 +97,7 @@ class Sketch(Loops):
                     link = next((body for body, (frame, _) in self.graph.bodies.items() if frame == root), "?")
                     message = f"the points of link '{link}' are needed as a start; add them to the sketch"
                     raise MechanismError(message, SKETCH)
-                found.append(float(np.angle(turn)))
+                starts.append(float(np.angle(turn)))
             for slide in group.slides:
                 value = self.value(Coordinate("", "slide", "length", slide=slide))
                 if value is None:
@@ -105,8 +105,8 @@ class Sketch(Loops):
                         f"the ends of '{self.graph.slides[slide]}' are needed as a start; add them to the sketch",
                         SKETCH,
                     )
-                found.append(value)
-        return found
+                starts.append(value)
+        return starts
 
 
 def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch:
@@ -129,16 +129,16 @@ def locate(description: Description, graph: Graph, geometry: Geometry) -> Sketch
                     rotations[frame] = fit / abs(fit)
                     changed = True
         for k, edge in enumerate(graph.edges):
-            known = [nodes[end] is not None for end in (edge.tail, edge.head)]
-            if edge.slide is None and rotations[edge.frame] is not None and any(known) and not all(known):
-                walk(graph.edges, [(k, 1 if known[0] else -1)], nodes, sketch.edge)
+            placed = [nodes[end] is not None for end in (edge.tail, edge.head)]
+            if edge.slide is None and rotations[edge.frame] is not None and any(placed) and not all(placed):
+                walk(graph.edges, [(k, 1 if placed[0] else -1)], nodes, sketch.edge)
                 changed = True
         changed = changed or _lay_along_slide(sketch)
     return sketch
 
 
 def _lay_along_slide(sketch: Sketch) -> bool:
-    """Lay a class that nothing else shows along one of its slides, taken as positive; False where there is none."""
+    """Take the direction of a class from one of its slides, as if displaced forwards; False where there is none."""
     for k, edge in enumerate(sketch.graph.edges):
         tail, head = sketch.nodes[edge.tail], sketch.nodes[edge.head]
         if edge.slide is None or tail is None or head is None or tail == head:
@@ -171,7 +171,7 @@ def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
 
 
 def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:
-    """Names of the joints whose place the assembly mode of a group chooses; those of slides where it has no other."""
+    """Names of the joints whose place the assembly mode of a group chooses, or of its slides where it has no joints."""
     ends = {graph.nodes[node] for loop in group.loops for node in (loop.start, loop.end)}
     names = [name for name in graph.joined(group.edges) if name not in ends]
     return tuple(names) or tuple(graph.slides[slide] for slide in group.slides)

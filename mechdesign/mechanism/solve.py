@@ -28,17 +28,17 @@ from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
 
-# In products of complex arrays a temporary stands first, or `np.multiply` is called: of long arrays NumPy's operator
-# computes the product in the temporary's place, with the factors exchanged if it is the second, and in other last bits.
+# In products of complex arrays a temporary stands first, or `np.multiply` is called: with a temporary as second factor
+# NumPy exchanges the factors of long arrays, and their last bits would differ from those of short ones.
 
 # Closures down to this fraction of the links' squared lengths count as an exact limit, not as open: they are
 # differences of squares, so rounding leaves a few units in the last place there.
 CLOSURE_ROUNDING = 4e-15
-# Up to this many unknowns equations are solved by minors, array by array; more of them matrix by matrix.
+# Up to this many unknowns equations are solved by minors, on whole arrays; more unknowns pose by pose.
 MINORS_ORDER = 4
 
 NEWTON_STEPS = 10
-# After a correction this small (radians, or parts of the mechanism's size) another one would be below rounding.
+# After a correction this small (radians, or parts of the mechanism's size) the next would be below rounding.
 CONVERGED = 1e-8
 
 Solution = tuple[Vector, Vector, tuple[Value, ...]]
@@ -46,7 +46,7 @@ Solution = tuple[Vector, Vector, tuple[Value, ...]]
 
 @dataclass
 class State(Loops):
-    """What is known of a mechanism while its groups are solved one after another.
+    """The positions of a mechanism while its groups are solved one after another.
 
     Groups with a closed form leave their `closures`, with `beyond` also stretched or folded. The others are solved by
     at most `steps` of Newton's corrections, until one is below `enough` (radians, or parts of the length `size`), and
@@ -64,12 +64,12 @@ class State(Loops):
 
     def solved(self, shape: tuple[int, ...], signs: Sequence[Value] | None = None) -> Flags:
         """Which poses of a batch converged in all groups, with determinants of these signs."""
-        found = np.ones(shape, dtype=bool)
+        solved = np.ones(shape, dtype=bool)
         for converged in self.converged:
-            found &= converged
+            solved &= converged
         for determinant, sign in zip(self.determinants, signs or (), strict=False):
-            found &= np.sign(determinant) == sign
-        return found
+            solved &= np.sign(determinant) == sign
+        return solved
 
 
 def solve_newton(state: State, index: int, guess: Unknowns) -> None:
@@ -78,24 +78,24 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     A pose that has converged is not changed any more: its result does not depend on its batch.
     """
     group = state.structure.groups[index]
-    found: list[Value] = [np.asarray(value, dtype=float) for value in guess]
+    unknowns: list[Value] = [np.asarray(value, dtype=float) for value in guess]
     count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
     determinant: Value = 0.0
     for _ in range(state.steps):
-        state.put(group, found)
+        state.put(group, unknowns)
         solution, determinant = solve_linear(*state.equations(group))
         turned, moved = largest(solution[:count]), largest(solution[count:])
         moving = np.logical_not((turned < state.enough) & (moved < state.enough * state.size))
         if active.ndim:
             solution = [np.where(active, step, 0.0) for step in solution]
             moving = moving & active
-        found = [value - step for value, step in zip(found, solution, strict=True)]
+        unknowns = [value - step for value, step in zip(unknowns, solution, strict=True)]
         active = np.asarray(moving)
         if not active.any():
             break
-    state.put(group, found)
-    state.unknowns += found
+    state.put(group, unknowns)
+    state.unknowns += unknowns
     state.converged.append(~active)
     state.determinants.append(determinant)
 
@@ -112,7 +112,7 @@ def solve_linear(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tup
 def _by_minors(rows: Sequence[Sequence[Value]], right: Sequence[Value]) -> tuple[list[Value], Value]:
     """Cramer's rule with Laplace's expansion by the 2 x 2 minors of the upper and of the lower rows."""
     count = len(rows)
-    # Rows and columns of the identity fill up to two pairs of rows; the plain numbers in them cost nothing.
+    # Rows and columns of the identity fill the matrix up to two pairs of rows; as plain numbers they cost nothing.
     zeros = [0.0] * (MINORS_ORDER - count)
     full = [[*row, *zeros, side] for row, side in zip(rows, right, strict=True)]
     full += [[*(float(i == j) for j in range(MINORS_ORDER)), 0.0] for i in range(count, MINORS_ORDER)]

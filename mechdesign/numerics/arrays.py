@@ -1,4 +1,4 @@
-"""Types of arrays, and records of several of the same length."""
+"""Types of arrays, and records of several arrays of the same length."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Lanes:
     """A record of arrays whose last axes are of the same length."""
 
     def take(self, index: Ints | Flags) -> Self:
-        """The lanes at `index`, of every array."""
+        """The record with the lanes `index` of every array."""
         return type(self)(*(values[..., index] for values in vars(self).values()))
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:
-        """The lanes of several records, one after the other."""
+        """One record with the lanes of several, one after the other."""
         return cls(*(np.concatenate(group, axis=-1) for group in zip(*(vars(p).values() for p in parts), strict=True)))

@@ -17,13 +17,13 @@ _ORDERS = np.arange(COUNT)
 _ANGLES = np.pi * (np.arange(COUNT)[::-1] + 0.5) / COUNT
 NODES = np.cos(_ANGLES)
 _TO_SERIES = np.cos(np.outer(_ANGLES, _ORDERS)) * np.where(_ORDERS == 0, 1.0, 2.0) / COUNT
-# Places, both ends included, at which series are evaluated: dense enough that no turning point falls between unseen.
+# Places, both ends included, at which series are evaluated, so dense that no two turning points lie between neighbours.
 PLACES = -np.cos(np.linspace(0.0, np.pi, 3 * COUNT + 1))
 # Integrals of the polynomials through the nodes (Fejer's first rule), over [-1, 1].
 WEIGHTS = _TO_SERIES @ np.where(_ORDERS % 2 == 0, 2.0 / (1.0 - _ORDERS**2.0 + (_ORDERS == 1)), 0.0)
-# Length in [-1, 1] of a step of Newton's method after which a root is exact.
+# Newton step, as a length in [-1, 1], after which a root is exact.
 _LAST_STEP = 1e-8
-# Largest number of steps: as many as halving an interval needs.
+# Largest number of steps: as many as bisection needs.
 _STEPS = 60
 
 
@@ -189,6 +189,6 @@ def slope_series(coefficients: Floats) -> Floats:
 
 
 def filled(values: Floats, good: Flags) -> Floats:
-    """Values at the nodes, shape (nodes,), those that are not `good` replaced by the polynomial through the others."""
+    """Values at the nodes, shape (nodes,); those not `good` come from the polynomial through the others."""
     table = np.polynomial.chebyshev.chebvander(NODES, np.count_nonzero(good) - 1)
     return np.where(good, values, table @ np.linalg.solve(table[good], values[good]))

@@ -1,4 +1,4 @@
-"""Derivatives by central differences, of values that may be rough, kinked or missing."""
+"""Derivatives by central differences of functions that may be rough, kinked or undefined at places."""
 
 from __future__ import annotations
 

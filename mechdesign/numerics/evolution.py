@@ -9,9 +9,9 @@ import numpy as np
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.numerics.fronts import crowding
 
-# Distribution indices: children are the nearer to their parents the larger these are [Deb et al., 2002].
+# Distribution indices: the larger, the nearer are children to their parents [Deb et al., 2002].
 CROSSOVER_INDEX, MUTATION_INDEX = 15, 20
-# Parts of the pairs, and of the variables of a pair, that are crossed.
+# Fraction of the pairs, and of the variables of a pair, that are crossed.
 CROSSED_PAIRS, CROSSED_VARIABLES = 0.9, 0.5
 
 
@@ -26,10 +26,10 @@ def simplex(goals: int, divisions: int) -> Floats:
 
 
 def survivors(values: Floats, violations: Floats, directions: Floats | None, random: np.random.Generator) -> Ints:
-    """Rows from the best to the worst: by front, then by how lonely they are; after them those that are not feasible.
+    """Rows from the best to the worst: feasible ones by front, then by crowding; then the others by their violations.
 
-    On a front the larger crowding distance is better [Deb et al., 2002]; with directions, the smaller number of rows
-    that are better, or on the same front and nearer, of those nearest to the same direction [Deb & Jain, 2014].
+    On a front the larger crowding distance is better [Deb et al., 2002]. With directions, each row belongs to the
+    nearest direction, and it is the better the fewer better rows this direction has [Deb & Jain, 2014].
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ def survivors(values: Floats, violations: Floats, directions: Floats | None, ran
 
 
 def offspring(parents: Floats, random: np.random.Generator) -> Floats:
-    """As many children, in the unit cube, as parents, shape (points, dimensions), from the best to the worst.
+    """As many children in the unit cube as parents, shape (points, dimensions), which are sorted, best first.
 
-    The better of two chosen at random is a parent. Pairs of parents are crossed [simulated binary crossover: Deb &
+    The better of two random rows is a parent. Pairs of parents are crossed [simulated binary crossover: Deb &
     Agrawal, 1995], and of each child one variable on average changes [polynomial mutation: Deb & Goyal, 1996].
     """
     number, dimensions = len(parents), parents.shape[1]

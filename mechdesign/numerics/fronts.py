@@ -1,4 +1,4 @@
-"""Pareto fronts of many points: those that no other surpasses, how far apart they are, and what lies behind them."""
+"""Pareto fronts: points that no other dominates, their crowding distances and hypervolume."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def front(values: Floats) -> Flags:
 
 
 def hypervolume(values: Floats, corner: float) -> float:
-    """Volume that points, shape (points, goals), surpass, up to a corner with the same number in each goal.
+    """Volume that points, shape (points, goals), dominate, up to a corner with the same number in each goal.
 
-    Less is better [Zitzler & Thiele, 1999]; 0 of no points.
+    Smaller values are better [Zitzler & Thiele, 1999]; 0 for no points.
     """
     import moocore
 

@@ -11,7 +11,7 @@ from mechdesign.numerics.arrays import Floats
 
 # Largest number of steps.
 MOST_STEPS = 30
-# Length of a step as a fraction of the way to the nearest bound.
+# Length of a step, as a fraction of the distance to the nearest bound.
 INSIDE = 0.995
 # Largest product of a slack and its multiplier where a program counts as solved.
 COMPLEMENTARITY = 1e-9

@@ -13,8 +13,8 @@ from mechdesign.numerics.arrays import Floats, Ints
 Evaluate = Callable[[Ints, Floats], Floats]
 # Largest number of steps to a root.
 MAX_ROOT_STEPS = 80
-# Where a function becomes nan, a step towards the zero of a secant stops short of it, by a fraction of the way between
-# these two: the shorter the way compared with the secant, the smaller the fraction.
+# Where a function becomes nan, a step towards the zero of a secant stops short of it by a fraction of the step. The
+# fraction lies between these two; it is small where the step is short compared with the secant.
 SHORT = (1e-3, 0.1)
 # The golden section of an interval.
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -24,7 +24,7 @@ GOLDEN_SECTIONS = 50
 MAX_PARABOLAS = 24
 # Accuracy of a minimum's place, as a fraction of the place or of its bracket.
 LOWEST_ACCURACY = 1e-9
-# A function may fall this many times as far as its convexity would allow.
+# A function counts as too high if it would have to fall this many times as far as convexity allows.
 STEEP = 2.0
 
 

@@ -15,7 +15,7 @@ ACCURACY = 1e-13
 NODE = 1e-9
 # A sign change is a jump, not a root, if the function there is larger than this fraction of its values at the nodes.
 JUMP = 1e-6
-# Largest distance of ends that meet, as a multiple of the last steps of their curves.
+# Largest distance of ends that meet, as a multiple of the longer of the last steps of their curves.
 LAST_STEPS = 1.5
 
 
@@ -66,7 +66,7 @@ def zero_curves(values: Floats, function: Callable[[Floats, Floats], Floats]) ->
 def joined(curves: Sequence[Complexes], exact: float) -> list[Complexes]:
     """Curves joined where their ends meet, the nearest ends first; a curve whose own ends meet is closed.
 
-    Ends nearer than `exact` meet however densely the points are spaced.
+    Ends nearer than `exact` meet, whatever the spacing of the points.
     """
     curves = [curve for curve in curves if len(curve) > 1]
     if not curves:

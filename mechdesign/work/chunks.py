@@ -24,7 +24,7 @@ HELP_PAGE = "reference/commands"
 
 Item = TypeVar("Item")
 Value = TypeVar("Value")
-# From the name of what is computed, a map, and the items of that, to values.
+# From the name of a computation, its map and the items, to the values.
 Share = Callable[[str, Callable[[Iterable[Any]], Iterator[Any]], Iterable[Any]], Iterator[Any]]
 
 _pool: ContextVar[Pool | None] = ContextVar("pool of long computations", default=None)
@@ -77,8 +77,8 @@ def workers(
         its kernels, so threads gain on few operations of some thousand elements and share memory; many operations of
         less need processes. The function, items and values are pickled.
     travels : bool
-        Whether the work is worth going to the executor of `on`, where there is one, and being divided by `divided`. The
-        function, items and values are pickled there.
+        Whether the work is long enough to run on the executor of `on`, where there is one, and to be divided by
+        `divided`. The function, items and values are then pickled.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def workers(
 
 
 def _local(count: int, *, processes: bool) -> AbstractContextManager[Pool | None]:
-    """Workers of this machine; none where the calling thread is the only one."""
+    """Workers of this machine; None where the calling thread computes alone."""
     if count == 1:
         return nullcontext()
     if processes and sys.platform == "linux":
@@ -109,10 +109,10 @@ def _one_after_another(function: Callable[[Item], Value], items: Iterable[Item])
 
 
 def _settle_in() -> None:
-    # Work inside of work stays here.
+    # Work within a task runs in this worker.
     _pool.set(None)
     _division.set(None)
-    # An interrupt is the parent's to handle: it lets the chunks under way finish.
+    # The parent handles interrupts: it lets the chunks under way finish.
     interrupts.leave_to_parent()
 
 
@@ -143,7 +143,7 @@ class Divided(BaseException):
 
 @contextmanager
 def apart(left: list[Divided]) -> Iterator[None]:
-    """Inside, work may be divided without an end to what follows, which does not depend on it; `left` tells of it."""
+    """Inside, divided work does not end the computations after it, which do not depend on it; `left` collects it."""
     try:
         yield
     except Divided as error:
@@ -152,7 +152,7 @@ def apart(left: list[Divided]) -> Iterator[None]:
 
 @contextmanager
 def here() -> Iterator[None]:
-    """Inside, no work goes elsewhere or is divided."""
+    """Inside, all work runs in this process and is not divided."""
     pool, division = _pool.set(None), _division.set(None)
     try:
         yield
@@ -167,7 +167,7 @@ def _undivided(function: Callable[[Item], Value], item: Item) -> Value:
 
 
 def _name(function: Any) -> str:
-    """What a function computes, in the same words in every process."""
+    """Name of a function with its callable arguments, the same in every process."""
     if isinstance(function, partial):
         return " ".join(map(_name, (function.func, *filter(callable, function.args))))
     kind = function if hasattr(function, "__qualname__") else type(function)

@@ -1,4 +1,4 @@
-"""Executors by name, as `--executor` takes them: of dask, or what a function of a module gives."""
+"""Executors by name, as `--executor` takes them: of dask, or those that a function of a module returns."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK, LostWorkerError, Pool
 
 LOCAL = "local"
-_PORT = 8786  # of a scheduler, where none is said
-# Seconds that the address of a scheduler may take to answer, and that it may be without workers.
+_PORT = 8786  # of a scheduler, if the address has none
+# Seconds after which a scheduler that does not answer is given up, and one without workers.
 _ANSWERS = 10
 _NO_WORKERS = 60
-# More bytes than the first message of a scheduler has.
+# Upper bound of the bytes of a scheduler's first message.
 _MOST_FIRST = 2**20
-# Of a scheduler that is started here: its clocks and profiles would take a twentieth of each processor.
+# Settings of a scheduler that is started here, whose clocks and profiles would take a twentieth of each processor.
 _OWN = {
-    "distributed.scheduler.allowed-failures": 0,  # a chunk that ends its worker is found here
+    "distributed.scheduler.allowed-failures": 0,  # chunks that end their workers are handled by `ChunkMap`
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.tick.cycle": "10s",
     "distributed.worker.profile.enabled": False,
@@ -45,12 +45,12 @@ def named(name: str, jobs: int | None) -> Pool:
     Parameters
     ----------
     jobs : int or None
-        Number of workers, where the executor does not say that itself; None: as many as processors.
+        Number of workers, where the executor has no number of its own; None: one for each processor.
 
     Raises
     ------
     StudyError
-        If there is no such executor, or nobody answers.
+        If there is no such executor, or its scheduler does not answer.
     """
     kind, colon, rest = name.partition(":")
     if not kind or not colon or not rest:
@@ -59,7 +59,7 @@ def named(name: str, jobs: int | None) -> Pool:
 
 
 def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
-    # As for `python -m`: a module in the working directory is found.
+    # A module in the working directory is found, as with `python -m`.
     sys.path.insert(0, os.getcwd())
     try:
         found = getattr(importlib.import_module(module), factory)
@@ -81,14 +81,14 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
         return executor
 
     first = open_()
-    # Those of the standard library say how many workers they have.
+    # Executors of the standard library have the number of their workers.
     width = worker_count(jobs if jobs is not None else getattr(first, "_max_workers", None) or None)
     opened = chain([first], iter(open_, None))
     return Pool(lambda: next(opened), width)
 
 
 class _Dask(Pool):
-    """Workers of a scheduler of dask, which replaces those that are lost; or of one that is started here."""
+    """Workers of a dask scheduler, which replaces lost ones itself, at an address or started here."""
 
     threads = False
     _counted, _threads = -math.inf, 0  # when the workers' threads were counted, and how many there were
@@ -100,7 +100,7 @@ class _Dask(Pool):
             message = "needs dask, which is not installed: pip install 'mechdesign[cluster]'"
             raise StudyError(f"--executor {name} {message}") from None
         self._name, self._cluster = name, None
-        # What it logs, with tracebacks, is told here in words.
+        # Errors of dask are reported as messages here, instead of its log with tracebacks.
         for handler in logging.getLogger("distributed").handlers:
             handler.setLevel(logging.CRITICAL + 1)
         try:
@@ -130,7 +130,7 @@ class _Dask(Pool):
             message = f"the scheduler has no workers after {counted(_NO_WORKERS, 'second')}; start some"
             raise StudyError(f"--executor {name}: {message}") from None
         if address != LOCAL:
-            # It has tried several workers.
+            # The scheduler has tried several workers already.
             self.losses = 0
         self.executor = self._client.get_executor(pure=False)
 
@@ -154,7 +154,7 @@ class _Dask(Pool):
         )
 
     def outcome(self, future: Future[Any]) -> Any:
-        """What a task gives; a scheduler without workers would wait for some for ever."""
+        """Wait for the value of a task, but not for ever on a scheduler without workers."""
         since = time.monotonic()
         while not wait([future], min(LOOK, _RECOUNT)).done:
             interrupts.check()
@@ -170,7 +170,7 @@ class _Dask(Pool):
             raise self._gone() from error
 
     def renew(self) -> None:
-        """The scheduler takes other workers itself."""
+        """Nothing to do: the scheduler replaces lost workers."""
 
     def close(self) -> None:
         """Drop the tasks and leave the scheduler; one that was started here ends."""
@@ -183,14 +183,14 @@ class _Dask(Pool):
 
 
 def _knock(address: str) -> None:
-    """Whether anybody answers, found out sooner than by a client that tries again and again."""
+    """Raise an OSError if no scheduler answers, sooner than a client does, which tries again and again."""
     place = urlsplit(address if "://" in address else f"tcp://{address}")
     with socket.create_connection((place.hostname, place.port or _PORT), timeout=_ANSWERS) as stream:
-        # A scheduler speaks first, and says how much.
+        # A scheduler sends the first message, which begins with its length.
         if place.scheme == "tcp" and not 0 < int.from_bytes(stream.recv(8), "little") < _MOST_FIRST:
             raise OSError("it does not answer as one")
 
 
 def dask_setup(worker: object) -> None:
-    """In a worker of a scheduler that was started here: an interrupt is the command's to handle."""
+    """In a worker of a scheduler started here: leave interrupts to the command."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# Of interrupts, on systems that have them.
+# Signals that interrupt, on systems that have them.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-# Those and the alarm's.
+# These and the alarm.
 _ALL = (*SIGNALS, signal.SIGALRM) if hasattr(signal, "SIGALRM") else SIGNALS
 _PATIENCE = 2.0  # seconds until an interrupt is raised wherever the command is
 
@@ -40,21 +40,21 @@ class Signals:
             sys.unraisablehook = self._dropped
 
     def hear(self) -> None:
-        """Let through what has waited since the process began."""
+        """Unblock signals that have waited since the process began."""
         if hasattr(signal, "pthread_sigmask"):
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {*self._handled, signal.SIGALRM})
 
     def ignore(self) -> None:
-        """The command is done: what comes now changes nothing."""
+        """Ignore all signals from now on: the command is done."""
         self._pending = False
         for number in self._handled:
             signal.signal(number, signal.SIG_IGN)
-        # Python forgets its handlers as it ends, and an alarm would end it first.
+        # Python removes its handlers as it ends, and an alarm would then kill it.
         if hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0)
 
     def check(self) -> None:
-        """Raise what was noted."""
+        """Raise a noted interrupt."""
         if self._pending:
             self._pending = False
             raise KeyboardInterrupt
@@ -76,7 +76,7 @@ class Signals:
             self.check()
 
     def _dropped(self, error: sys.UnraisableHookArgs) -> None:
-        """An interrupt that was raised in a finaliser or a call back, which drop it, is tried again."""
+        """Note an interrupt again that was raised in a finaliser or a callback, where Python drops it."""
         if isinstance(error.exc_value, KeyboardInterrupt):
             self._pend()
         else:
@@ -87,7 +87,7 @@ _signals: Signals | None = None
 
 
 def check() -> None:
-    """Raise KeyboardInterrupt if the command was interrupted; a place to call it at leaves nothing half done.
+    """Raise KeyboardInterrupt if the command was interrupted; to be called where nothing is half done.
 
     Does nothing outside of a command, and in other threads than the main one.
     """
@@ -107,7 +107,7 @@ def leave_to_parent() -> None:
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Inside, signals wait; also in what is forked there."""
+    """Inside, signals wait, also in processes that are forked there."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _ALL)
     try:
         yield

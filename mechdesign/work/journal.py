@@ -1,7 +1,7 @@
-"""The journal of a long computation: what was finished, kept so that it can go on after an interrupt.
+"""The journal of a long computation: its finished batches, from which it resumes after an interrupt.
 
-A computation that is the same each time asks for the same batches in the same order. The journal keeps each batch's
-outcome under a digest of what was asked; a computation begun anew finds there what had been finished.
+A computation asks for the same batches in the same order each time. The journal keeps the result of each batch under a
+digest of the batch; a computation that is started again reads finished batches from there.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mechdesign.numerics.arrays import Floats
 
 NAME = "unfinished.npz"
 MARK = b"origin.npy"  # by which it is known
-# Seconds between two versions of the file, and how many times as long as its writing took they are at least.
+# Least seconds between two versions of the file, and the least ratio of this time to that of writing it.
 _INTERVAL = 30.0
 _MIN_RATIO = 20.0
 
@@ -41,8 +41,8 @@ def digest(columns: Sequence[Floats]) -> bytes:
 class Journal:
     """Finished batches in a file, written whole or not at all by `save` and every half minute.
 
-    `origin` is what decides the results: study, overrides, seed, versions. To resume, a file of the same origin is
-    used; `usable` says whether there is one.
+    `origin` decides the results: study, overrides, seed, versions. With `resume` a file of the same origin is read;
+    `usable` is whether there is one.
     """
 
     def __init__(self, path: Path, origin: Mapping[str, Any], *, resume: bool = False) -> None:
@@ -71,7 +71,7 @@ class Journal:
         return bool(self._found)
 
     def recall(self, key: bytes) -> Floats | None:
-        """The outcome of the next batch if it was finished; if another batch was, it and what follows is void."""
+        """The result of the next batch if it was finished; if another batch was next, the rest of the file is void."""
         if not self._found:
             return None
         known, rows = self._found.pop()
@@ -81,17 +81,17 @@ class Journal:
         return rows
 
     def add(self, key: bytes, rows: Floats, words: Sequence[str]) -> None:
-        """Note a finished batch: numbers, a row a design, and all words that they refer to so far."""
+        """Add a finished batch: numbers, a row for each design, and all words so far that the numbers refer to."""
         self._digests.append(key)
         self._rows.append(rows)
         self.words = list(words)
         if time.monotonic() - self._written > self._patience:
-            # A disk that is full now may have room when it is tried again.
+            # The next attempt may find room on the disk.
             with suppress(OutputError):
                 self.save()
 
     def save(self) -> None:
-        """Write what is finished, also what an earlier run finished and this one has not come to yet.
+        """Write all finished batches, including those of an earlier run that this one has not reached yet.
 
         Raises
         ------

@@ -1,6 +1,6 @@
-"""Workers of any executor of `concurrent.futures`, and an ordered map on them; workers may be lost on the way.
+"""Workers of any executor of `concurrent.futures`, and an ordered map on them that survives the loss of workers.
 
-A task is a function and some items. In other processes the function goes along pickled, and is read once a worker.
+A task is a function and some items. Other processes get the function pickled, and each worker unpickles it once.
 """
 
 from __future__ import annotations
@@ -24,26 +24,25 @@ from mechdesign.work.threads import keep_freed_memory, one_thread
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 
-# Tasks a worker that are under way or waiting: enough that none idles while the consumer works; few, because they are
-# all in memory.
+# Tasks of each worker that are under way or waiting: enough that no worker idles, few because all are in memory.
 LOOK_AHEAD = 3
-LOOK = 0.2  # seconds between two looks for an interrupt
-# Length of a task, in seconds, and how many times as many chunks as the one before it has at most.
+LOOK = 0.2  # seconds between two checks for an interrupt
+# Length of a task in seconds, and the largest factor by which its number of chunks grows from task to task.
 _SECONDS = 1.0
 _GROWTH = 8
 
 
 class LostWorkerError(MechdesignError):
-    """A chunk of work ends each worker that takes it, or there is nobody left to take it."""
+    """A chunk of work ends every worker that computes it, or no worker is left."""
 
 
 class Pool:
-    """`width` workers of an executor; `open_` gives one, and another where workers were lost.
+    """`width` workers of an executor; `open_` gives the executor, and a new one where workers were lost.
 
-    Threads of this process have its functions and its memory: to them nothing is pickled, and chunks go one by one.
+    Threads of this process share its functions and memory: nothing is pickled for them, and a task is a single chunk.
     """
 
-    losses = 1  #: times that workers are lost before chunks go one by one
+    losses = 1  #: losses of workers after which chunks are computed one by one
 
     def __init__(self, open_: Callable[[], Executor], width: int, *, threads: bool = False) -> None:
         self._open, self._width, self.threads = open_, width, threads
@@ -60,7 +59,7 @@ class Pool:
         self.executor = self._open()
 
     def outcome(self, future: Future[Any]) -> Any:
-        """What a task gives, once it is there.
+        """Wait for the value of a task.
 
         Raises
         ------
@@ -80,7 +79,7 @@ class Pool:
         try:
             self.executor.shutdown(wait=True, cancel_futures=True)
         except TypeError:
-            # Dask's does not know the second.
+            # The executor of dask does not know `cancel_futures`.
             self.executor.shutdown(wait=False)
 
 
@@ -94,9 +93,9 @@ class _Task:
 
     @property
     def lost(self) -> bool:
-        """Whether there will be no outcome."""
+        """Whether it will have no value, as its workers were lost."""
         if not self.future.done():
-            # Of a pool that was lost.
+            # It belongs to the pool that was lost.
             return True
         return self.future.cancelled() or _is_loss(self.future.exception())
 
@@ -104,13 +103,13 @@ class _Task:
 class ChunkMap(Generic[Item, Value]):
     """An ordered map of a function over items on the workers of a pool.
 
-    At most ``3 * width`` tasks are under way or waiting to be consumed; chunks are put together so that a task takes
-    about a second. Chunks of lost workers are computed again.
+    At most ``3 * width`` tasks are under way or waiting to be consumed; a task has as many chunks as take about a
+    second. Chunks of lost workers are computed again.
 
     Raises
     ------
     LostWorkerError
-        If a chunk ends each worker that takes it, or the executor takes no work or gives something else for it.
+        If a chunk ends every worker that computes it, or the executor refuses work or returns something else.
     """
 
     def __init__(self, pool: Pool, function: Callable[[Item], Value]) -> None:
@@ -118,7 +117,7 @@ class ChunkMap(Generic[Item, Value]):
         self._work = partial(_timed, function)
         if not pool.threads:
             self._work = partial(_perform, _version(), pickle.dumps(function, protocol=5))
-        # Of the next task, as far as there are enough for all workers.
+        # Number of chunks of the next task.
         self._chunks = 1
 
     def __call__(self, items: Iterable[Item]) -> Iterator[Value]:
@@ -128,7 +127,7 @@ class ChunkMap(Generic[Item, Value]):
         try:
             while True:
                 while len(tasks) < (ahead := LOOK_AHEAD * self._pool.width):
-                    # The last tasks are short: no worker waits long for another.
+                    # The last tasks are short, so that all workers finish together.
                     shared = -(-left // ahead) if left > 0 else self._chunks
                     own = [*islice(source, min(self._chunks, shared))]
                     if not own:
@@ -179,7 +178,7 @@ class ChunkMap(Generic[Item, Value]):
         return cast(list[Value], values)
 
     def _one_by_one(self, task: _Task) -> Iterator[Value]:
-        """Values of a task that workers may be lost by: each chunk by itself, with nothing else under way."""
+        """Values of a task that may end its worker: chunk by chunk, with no other work under way."""
         if not task.lost:
             yield from self._values(task)
             return
@@ -196,13 +195,13 @@ class ChunkMap(Generic[Item, Value]):
 
 
 def _is_loss(error: BaseException | None) -> bool:
-    """Whether an error says that a worker was lost: the pool's, or dask's, which has tried several."""
+    """Whether an error is that of a lost worker: the pool's, or that of dask, which has tried several."""
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
 @cache
 def _version() -> str:
-    """What decides values, besides the work."""
+    """Versions on which values depend besides the work itself."""
     from importlib.metadata import version
 
     python = ".".join(platform.python_version_tuple()[:2])

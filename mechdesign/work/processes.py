@@ -1,4 +1,4 @@
-"""Forked processes: executors of them, and one that does a great task at a time and takes notes of how far it is."""
+"""Forked processes: executors of them, and a process that does one long task at a time and reports its progress."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from typing import Any
 
 from mechdesign.work.interrupts import Signals, undisturbed
 
-# Tells the one who waits how far a task is.
+# Reports the progress of a task.
 Tell = Callable[[Any], None]
-# From the number of a task, and who hears of it, to its value.
+# From the number of a task, and the function that reports its progress, to its value.
 Work = Callable[[int, Tell], Any]
 
 # Option of Linux's prctl, from prctl.h: the signal that a process gets when its parent ends.
@@ -25,7 +25,7 @@ _PR_SET_PDEATHSIG = 1
 
 
 def forked(count: int, settle_in: Callable[[], None]) -> Executor:
-    """An executor of forked workers, which end when this process does; signals wait until each has settled in.
+    """An executor of forked workers, which end when this process does; signals wait until each has called `settle_in`.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def forked(count: int, settle_in: Callable[[], None]) -> Executor:
             # The first work forks all of them.
             pool.submit(os.getpid)
     except OSError:
-        # Where there is no room for all, those that there are would wait for work for ever.
+        # Where not all could be forked, those that were would wait for work for ever.
         for worker in set(multiprocessing.active_children()).difference(others):
             worker.kill()
         raise
@@ -48,7 +48,7 @@ def forked(count: int, settle_in: Callable[[], None]) -> Executor:
 
 
 def _end_with_parent(parent: int, settle_in: Callable[[], None]) -> None:
-    """However the process that forked this one ends, this one ends with it."""
+    """End this process when its parent ends, however that ends."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -58,12 +58,12 @@ def _end_with_parent(parent: int, settle_in: Callable[[], None]) -> None:
 class TaskProcess:
     """A forked process that does one task at a time; one that is killed costs its task alone.
 
-    An interrupt is raised in the task, which gives what it has. Wait for `notes` to be readable, and call `hear`.
+    An interrupt is raised in the task, which returns what it has. Wait for `notes` to be readable, and call `hear`.
 
     Attributes
     ----------
     notes : Connection
-        Gives what the task tells.
+        Connection that receives the reports of the task.
     task : int or None
         Number of the task under way.
     lost : bool
@@ -74,7 +74,7 @@ class TaskProcess:
         self.task: int | None = None
         self.lost = False
         self.notes, notes = multiprocessing.Pipe(duplex=False)
-        # In the end nobody else holds the other end: a process that is killed closes it.
+        # Only the process holds the other end, which closes when the process is killed.
         with notes:
             self._executor = forked(1, partial(_take_tasks, work, notes))
         self._process = self._executor.submit(os.getpid)
@@ -82,12 +82,12 @@ class TaskProcess:
     def begin(self, task: int) -> None:
         """Give it a task."""
         self.task = task
-        # One that was killed has closed its end of the notes.
+        # A process that was killed has closed its end of the notes.
         with suppress(BrokenExecutor):
             self._value = self._executor.submit(_do, task)
 
     def hear(self) -> Any:
-        """A note while `task` is under way, and then its value: None where it was not begun or the process killed."""
+        """A report of the `task` under way, or its value at the end; None where it was not begun, or killed."""
         try:
             if (note := self.notes.recv()) is not None:
                 return note
@@ -98,7 +98,7 @@ class TaskProcess:
             return None
 
     def interrupt(self) -> None:
-        """Raise an interrupt in its task, if there is one."""
+        """Raise an interrupt in the task under way, if there is one."""
         if self.task is not None:
             self._send(signal.SIGTERM)
 
@@ -115,7 +115,7 @@ class TaskProcess:
 
 
 def _take_tasks(work: Work, notes: Connection) -> None:
-    """In the process, when it begins: signals count while there is a task, and nothing is begun after one."""
+    """In the process, when it begins: signals are raised during a task, and after one no further task begins."""
     global _duty
     signals = Signals()
     signals.raising = False
@@ -131,7 +131,7 @@ def _do(task: int) -> Any:
     work, notes, signals = _duty
 
     def tell(note: Any) -> None:
-        # What is half written could not be read.
+        # An interrupt must not leave a report half written.
         with undisturbed():
             notes.send(note)
 

@@ -1,7 +1,7 @@
 """Long computations divided between processes that do not communicate, such as those of a job array.
 
-Each computes every n-th chunk of the maps that it comes to, and keeps their values in a file. Who merges them takes the
-values from the files, and computes what depends on them.
+Each process computes every n-th chunk of its maps and writes the values to a file. A merge reads the values from the
+files and computes the rest.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Compute = Callable[[Iterable[Any]], Iterator[Any]]
 FILE = "chunks"  # in a folder of its own
 MARK = b'"shard": ['  # by which it is known
 _SHARD = re.compile(r"([1-9]\d{0,5})/([1-9]\d{0,5})")
-# What values are made of, besides dataclasses and named tuples of this package.
+# Types that a file may have besides dataclasses and named tuples of this package.
 _ARRAYS = {
     ("numpy", "dtype"), ("numpy", "ndarray"), ("numpy._core.multiarray", "_reconstruct"),
     ("numpy._core.multiarray", "scalar"), ("numpy._core.numeric", "_frombuffer"),
@@ -67,16 +67,16 @@ class Shard:
 
 @dataclass(frozen=True)
 class Kept:
-    """Values of every n-th chunk of a map of so many."""
+    """Values of every n-th chunk of a map with this number of chunks."""
 
     chunks: int
     values: Sequence[Any]
 
 
 class Taken:
-    """The chunks of one shard are computed, and kept by the name of their map; then it is `Divided`.
+    """Computes the chunks of one shard, keeps them by the name of their map, and raises `Divided`.
 
-    A map of a single chunk is everybody's.
+    A map of a single chunk is computed by every shard.
     """
 
     def __init__(self, shard: Shard) -> None:
@@ -105,7 +105,7 @@ class Taken:
         raise Divided
 
     def write(self, directory: Path, origin: Mapping[str, Any], command: str) -> None:
-        """Write what is kept into a folder; `origin` decides the values, `command` was given.
+        """Write the kept values into a folder; `origin` decides the values, `command` was given.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class Taken:
 
 
 class Merged:
-    """Values of chunks that all shards computed; what none of them came to is computed here."""
+    """Reads the values of all shards; maps that the shards did not reach are computed here."""
 
     def __init__(self, parts: Sequence[Mapping[str, Kept]]) -> None:
         self._parts = parts
@@ -156,27 +156,15 @@ def found(directory: Path) -> list[Path]:
     return sorted(directory.glob(f"shard_*_of_*/{FILE}"))
 
 
-def command_of(path: Path) -> str:
-    """The command that was given where a shard was computed.
+def head_of(path: Path) -> Mapping[str, Any]:
+    """The head of a shard: the ``command`` that was given, and in ``origin`` the study, its changes and the seed.
 
     Raises
     ------
     StudyError
         If the file is damaged.
     """
-    return str(_read(path)[0]["command"])
-
-
-def origin_of(path: Path) -> Mapping[str, Any]:
-    """What decided the values of a shard: the study, the changes of it and the seed.
-
-    Raises
-    ------
-    StudyError
-        If the file is damaged.
-    """
-    origin: Mapping[str, Any] = _read(path)[0]["origin"]
-    return origin
+    return _read(path)[0]
 
 
 def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:
@@ -217,7 +205,7 @@ def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:
 
 
 def missing(directory: Path) -> StudyError:
-    """What is wrong where nothing can be merged."""
+    """The error where there are no shards to merge."""
     return StudyError(f"{directory}: there are no shards; compute them with --shard 1/N to N/N")
 
 
@@ -229,7 +217,7 @@ def remove(directory: Path) -> None:
 
 
 def is_current(directory: Path, origin: Mapping[str, Any]) -> bool:
-    """Whether the folder of a shard holds it, whole and of this origin."""
+    """Whether a folder holds a whole shard of this origin."""
     try:
         head, _ = _read(directory / FILE)
     except StudyError:
@@ -256,10 +244,10 @@ def _damaged(path: Path) -> StudyError:
 
 
 class _Reader(pickle.Unpickler):
-    """Reads values of this package and arrays; a file of another hand can call nothing else."""
+    """Reads values of this package and arrays, and refuses everything else that a foreign file might call."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """What a name means, where it may stand in a shard."""
+        """The type of a name that a shard may have."""
         if (module, name) in _ARRAYS:
             return getattr(import_module(module), name)
         if module.startswith("mechdesign."):

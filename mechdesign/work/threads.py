@@ -1,4 +1,4 @@
-"""Linear algebra on one thread, and memory that is freed and wanted again: both are settings of the whole process.
+"""Settings of the whole process: linear algebra on one thread, and freed memory that is kept for reuse.
 
 The last digits of a long sum depend on how many threads share it.
 """
@@ -17,7 +17,7 @@ from functools import cache
 _TRIM_THRESHOLD = -1
 _MMAP_THRESHOLD = -3
 _MEBIBYTE = 2**20
-# Read by a library of linear algebra when it is loaded: SciPy's may be so in the middle of a computation.
+# Variables that a library of linear algebra reads when it is loaded, SciPy's perhaps in the middle of a computation.
 _VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 _lock = threading.Lock()
@@ -41,10 +41,10 @@ def keep_freed_memory() -> None:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Results of what is computed inside do not depend on how many threads linear algebra may use.
+    """Inside, linear algebra uses one thread, so that results do not depend on the number of threads.
 
-    The limit is that of the process, and of those forked from it. What was set before comes back with the last of
-    those inside, so that they may be nested, and overlap where several threads compute.
+    The limit holds for the process and those forked from it. The former settings come back when the last block ends:
+    blocks may be nested, and overlap in several threads.
     """
     global _inside
     with _lock:

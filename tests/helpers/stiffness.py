@@ -6,7 +6,7 @@ import numpy as np
 
 import mechdesign
 from helpers.studies import study_of
-from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.body import ask
 from mechdesign.analyses.stiffness.legs import Leg
 from mechdesign.results import Result
 

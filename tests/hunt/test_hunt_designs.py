@@ -17,7 +17,7 @@ from mechdesign.analyses.optimize.evaluation import Evaluator
 from mechdesign.analyses.optimize.goals import goal
 from mechdesign.analyses.together import Group
 from mechdesign.errors import MechdesignError
-from mechdesign.experiments.cases import Case, answers
+from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted
 from mechdesign.results import Result
@@ -281,7 +281,7 @@ def test_cases_at_once_are_those_written_out(seeds: Seeds) -> None:
             cases.append(entries)
         names = [f"{name}.{word}" for name in columns(command, own)[:12] for word in ("min", "max")]
         wanted = [Wanted(name) for name in names]
-        tally = Tally([*map(Case.of, cases)], len(wanted), 0)
+        tally = Tally([tuple(entries.items()) for entries in cases], len(wanted), 0)
         for answered in answers(mechdesign.load(data), tally.cases, wanted):
             tally.add(answered)
         for k, entries in enumerate(cases):

@@ -20,7 +20,8 @@ from helpers.random_stiffness import Sprung
 from helpers.studies import study_of
 
 from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import ask, hold, stiffness
+from mechdesign.analyses.stiffness.analysis import stiffness
+from mechdesign.analyses.stiffness.body import ask, hold
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration

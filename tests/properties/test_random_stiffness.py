@@ -20,7 +20,8 @@ from hypothesis import strategies as st
 
 import mechdesign
 from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import answers, ask, hold, stiffness
+from mechdesign.analyses.stiffness.analysis import answers, stiffness
+from mechdesign.analyses.stiffness.body import ask, hold
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration

@@ -179,7 +179,7 @@ def test_a_limit_out_of_reach_of_a_bounded_variable_is_never_broken() -> None:
 @pytest.mark.slow
 def test_pins_in_contact() -> None:
     """Two pins on their rims: the x offset of both beyond a limit, against the integral over the one's direction."""
-    from mechdesign.analyses.reliability.laws import PIN_LAWS
+    from mechdesign.analyses.reliability.pin_laws import PIN_LAWS
 
     limit = 1.99
 

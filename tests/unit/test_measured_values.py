@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.reliability.sources import find_sources
+from mechdesign.analyses.reliability.study_sources import find_sources
 from mechdesign.errors import StudyError
 
 VALUES = np.round(100.02 + 0.05 * np.random.default_rng(5).standard_normal(30), 3)

@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 import mechdesign
 from mechdesign.analyses.reliability.methods.second_order import Quadratic, cumulants
-from mechdesign.analyses.reliability.sources import find_sources
+from mechdesign.analyses.reliability.study_sources import find_sources
 from mechdesign.results import Result
 
 LEVER = """

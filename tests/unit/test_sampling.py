@@ -9,7 +9,6 @@ from scipy.stats import beta
 
 from mechdesign.analyses.reliability.copula import Correlation
 from mechdesign.analyses.reliability.laws import (
-    PIN_LAWS,
     Beta,
     Lognormal,
     Marginal,
@@ -20,6 +19,7 @@ from mechdesign.analyses.reliability.laws import (
     Uniform,
     marginal,
 )
+from mechdesign.analyses.reliability.pin_laws import PIN_LAWS
 from mechdesign.analyses.reliability.simulation import generator
 from mechdesign.errors import StudyError
 from mechdesign.study.schema.variation import DISTRIBUTIONS, Dimension

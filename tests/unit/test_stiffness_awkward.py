@@ -11,7 +11,7 @@ from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
 from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.body import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
 from mechdesign.results import Result

@@ -12,7 +12,7 @@ from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
 from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import ask
+from mechdesign.analyses.stiffness.body import ask
 from mechdesign.analyses.stiffness.force_method import load, twists_of
 
 YOUNG, SHEAR, AREA, INERTIA = 2e5, 8e4, 20 * 40.0, 20 * 40.0**3 / 12

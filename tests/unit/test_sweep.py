@@ -27,7 +27,7 @@ def study_of(matrix: dict[str, Any], **more: Any) -> Any:
 
 
 def columns_of(matrix: dict[str, Any], seed: int = 0) -> Floats:
-    return np.array([[value for _, value in case.changes] for case in cases_of(study_of(matrix, seed=seed))])
+    return np.array([[value for _, value in case] for case in cases_of(study_of(matrix, seed=seed))])
 
 
 def test_a_grid_of_slider_cranks():
@@ -82,7 +82,7 @@ def test_sobol_has_one_sample_in_each_elementary_rectangle():
 
 def test_words_of_a_random_design_come_equally_often():
     matrix = {"vary": {"mechanism.branch": ["side", "follow"], R: "20:30"}, "method": "latin_hypercube", "samples": 10}
-    words = [dict(case.changes)["mechanism.branch"] for case in cases_of(study_of(matrix))]
+    words = [dict(case)["mechanism.branch"] for case in cases_of(study_of(matrix))]
     assert (words.count("side"), words.count("follow")) == (5, 5)
 
 

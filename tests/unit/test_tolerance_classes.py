@@ -9,7 +9,7 @@ import pytest
 
 import mechdesign
 from mechdesign.analyses.reliability.laws import fit_law
-from mechdesign.analyses.reliability.sources import find_sources
+from mechdesign.analyses.reliability.study_sources import find_sources
 from mechdesign.errors import StudyError
 from mechdesign.study.designs import variant
 from mechdesign.study.schema.iso_tolerances import ToleranceClassError, angle_deviations, deviations, fit_deviations

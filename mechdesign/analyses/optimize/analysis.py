@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from mechdesign.analyses.optimize.tables import (
     optimum_table,
     sensitivity_table,
 )
-from mechdesign.analyses.optimize.variables import Design, check_choices, grid, in_words, parted, snapped, study_of
+from mechdesign.analyses.optimize.variables import Design, check_choices, from_cube, grid, in_words, parted, study_of
 from mechdesign.analyses.poses import solve_shown
 from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import index_columns, workspace
@@ -45,11 +44,11 @@ from mechdesign.work.chunks import workers
 from mechdesign.work.journal import Journal
 from mechdesign.work.threads import one_thread
 
-# Numbers that a search keeps of the rows behind its goals.
+# Most numbers of rows behind the goals that a search keeps.
 MAX_KEPT_ROWS = 30_000_000
 # Reasons of infeasible designs that are reported one by one.
 MAX_REASONS = 10
-# Designs tie in a goal where it differs by no more, in its unit or as a part of its size.
+# Largest difference of a goal, in its unit or as a part of its size, with which designs tie.
 TIE = 1e-12
 
 
@@ -112,7 +111,7 @@ def optimize(
 def _ask(
     study: Study, judge: Judge, evaluator: Evaluator, weights: Floats, budget: int, seed: int
 ) -> tuple[Caution, ...]:  # fmt: skip
-    """Evaluate the designs of the study's method; returns what is to be warned of."""
+    """Evaluate the designs of the study's method; returns warnings."""
     assert study.optimize is not None
     section = study.optimize
     if section.method == "grid":
@@ -120,24 +119,25 @@ def _ask(
         judge.progress.start(len(next(iter(variables.values()))), "designs")
         judge.evaluate(variables)
         return ()
-    dimensions, smallest = len(section.variables), [each.smallest for each in judge.goals]
+    dimensions, signs = len(section.variables), np.array([goal.sign for goal in judge.goals])
     judge.progress.start(budget, "designs")
     # Values of a workspace are known to a tolerance only.
     rough = bool(evaluator.questions)
-    explorer = Explorer(judge.known, dimensions, budget, judge.parts(), snap=partial(snapped, study), rough=rough)
+    explorer = Explorer(
+        judge.known, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=rough
+    )
     if section.method == "search":
         use_all = section.evaluations is not None
-        ending = searching.search(explorer, smallest, weights.tolist(), seed, use_all=use_all)
+        ending = searching.search(explorer, signs, weights.tolist(), seed, use_all=use_all)
         names = [[goal.name for goal, weight in zip(judge.goals, row, strict=True) if weight] for row in weights]
         objectives = [own[0] if len(own) == 1 else "a weighted sum" for own in names]
         return tuple(_doubts(ending, budget, objectives))
-    signs = np.where(smallest, 1.0, -1.0)
     pareto.search_front(explorer, signs, seed, use_all=section.evaluations is not None)
     return ()
 
 
 def _doubts(ending: searching.Ending, budget: int, objectives: Sequence[str]) -> Iterator[Caution]:
-    """What speaks against the optima of a search; `objectives` are what each row of weights looks for."""
+    """Warnings about the optima of a search; `objectives` names the objective of each row of weights."""
     more = f"allow more, e.g. optimize.evaluations: {4 * budget}"
     if not ending.checked:
         early = f"the search ended with its {budget} evaluations before its optimum was confirmed; {more}"
@@ -178,42 +178,44 @@ def _optima(designs: Designs) -> dict[str, tuple[int, str]]:
 
 
 def _nothing_feasible(study: Study, designs: Designs, nearest: int | None) -> AssemblyError:
-    """Why no design is feasible, and of the one that misses least by how much it misses each condition."""
-    told = _none_feasible(designs)
+    """Why no design is feasible, and by how much the nearest one misses each condition."""
+    message = _none_feasible(designs)
     if nearest is None:
-        return AssemblyError(told)
+        return AssemblyError(message)
     table = nearest_table(designs, nearest)
     short = [
         f"{row['condition']} by {row['missing']:.6g} {row['unit']}".rstrip()
         + f" (it is {row['value']:.6g})" * bool(np.isfinite(row["value"]))
         for row in table if not row["missing"] <= 0
     ]  # fmt: skip
-    told += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
+    message += f"; the nearest, {in_words(designs.design(nearest))}, misses {', '.join(short)}; see nearest.yaml"
     files, wrong = design_files(study, designs, {"nearest": (nearest, f"Nearest to a feasible design of {study.name}")})
     counts = {"designs": len(designs), "infeasible": len(designs)}
-    tables = {each.name: each for each in (table, designs_table(designs))}
-    return AssemblyError(told, Result("optimize", tables, tuple(wrong), counts, failed=told, files=files))
+    tables = {part.name: part for part in (table, designs_table(designs))}
+    return AssemblyError(message, Result("optimize", tables, tuple(wrong), counts, failed=message, files=files))
 
 
 def _none_feasible(designs: Designs) -> str:
     reasons = designs.counted()
     if not reasons:
         return "no design can be made: the bounds of the variables leave no value"
-    told = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
+    message = "; ".join(f"{reason} ({count} designs)" for reason, count, _ in reasons[:MAX_REASONS])
     for condition in designs.conditions:
         index, statistic = split(condition.column) if condition.regional and condition.outline is None else ("", "")
         values = designs.found[condition][np.isfinite(designs.found[condition])] if statistic == "min" else np.empty(0)
         if values.size and (np.abs(values) <= 0).all():
-            told += (f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
-                     f"bound {index}_mean, or keep the region off singularities by mechanism.limits")  # fmt: skip
-    return f"no design of {len(designs)} is feasible: {told}"
+            message += (
+                f"; {condition.column} is 0 in all of them, as it is wherever the region ends at a singularity: "
+                f"bound {index}_mean, or keep the region off singularities by mechanism.limits"
+            )
+    return f"no design of {len(designs)} is feasible: {message}"
 
 
 def _finished_part(designs: Designs) -> Result:
     table = designs_table(designs)
-    told = f"interrupted after {len(designs)} designs; --resume goes on"
-    partly = Caution("incomplete", told, table.name)
-    return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=told)
+    message = f"interrupted after {len(designs)} designs; --resume goes on"
+    partly = Caution("incomplete", message, table.name)
+    return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=message)
 
 
 def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
@@ -233,7 +235,7 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
                 "magnitudes says abs: true",
                 "designs",
             )
-    for goal in [each for each in designs.goals if each.unassembled]:
+    for goal in filter(lambda goal: goal.unassembled, designs.goals):
         optimum = ask(study_of(evaluator.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
             words = (
@@ -242,13 +244,13 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
             yield Caution("unassembled", words, "optimum")
     if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
-    for each, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[each]))
+    for goal, error in designs.errors.items():
+        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[goal]))
         if loose.any():
             yield Caution(
                 "unconverged",
-                f"{each.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
-                f"{each.name}_error, or allow a larger workspace.integrate.tolerance",
+                f"{goal.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
+                f"{goal.name}_error, or allow a larger workspace.integrate.tolerance",
                 "designs", int(loose.argmax()),
             )  # fmt: skip
 
@@ -263,8 +265,8 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
     for goal in evaluator.goals:
         if goal.outline is not None:
             shape = goal.column.removeprefix("scale of ")
-            told = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-            found[goal.column] = "", f"{told}: contained from 1 on, negative where its centre lies outside"
+            meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
+            found[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
     if len(evaluator.questions) > 1:
         held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
                 for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
@@ -273,7 +275,7 @@ def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
 
 
 def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
-    """Where a design's workspace holds shapes best."""
+    """Places at which a design's workspace holds shapes at the largest scale."""
     if not shapes:
         return []
     panels = answer(questions(study, wanted=("area",))[0], {}, 1, SINGLE).panels
@@ -281,7 +283,7 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
 
 
 def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
-    """Where the optima hold shapes that may lie anywhere, of a single region."""
+    """Places of shapes without a given centre in the workspaces of the optima; none where there are several regions."""
     free = [
         condition
         for condition in designs.conditions
@@ -293,24 +295,24 @@ def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
     for k in designs.winners.tolist():
         study, numbers = parted(designs.study, designs.design(k))
         rows.append(_centres(variant(study, numbers), _shapes(free, study, numbers)))
-    names = (each.column.removeprefix("scale of ") for each in free)
+    names = (goal.column.removeprefix("scale of ") for goal in free)
     return dict(zip(names, np.array(rows, dtype=complex).T, strict=True))
 
 
 def _shapes(judged: Iterable[Goal], study: Study, changed: Mapping[str, float]) -> list[Shape]:
-    """What a design's workspace is to hold."""
+    """The shapes that a design's workspace has to contain."""
     numbers = study_designs.Designs(study, {name: np.array([value]) for name, value in changed.items()}).numbers
-    outlines = [each.outline for each in judged if each.outline is not None]
+    outlines = [goal.outline for goal in judged if goal.outline is not None]
     return [shape_of(outline, lambda number: float(numbers.of(number)[0])) for outline in outlines]
 
 
 def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
-    """A design as a study, with what was judged of it: its workspace, or else its motion with the targets' errors."""
+    """The study of a design, and its workspace or else its motion with the errors from targets, as far as judged."""
     study, numbers = parted(designs.study, design)
     made = variant(study, numbers)
     judged = (*designs.goals, *designs.conditions)
-    if made.workspace is not None and any(each.command == "workspace" for each in judged):
-        # The region is drawn, not its indices.
+    if made.workspace is not None and any(goal.command == "workspace" for goal in judged):
+        # Only the region is drawn.
         plain = dataclasses.replace(made, workspace=made.workspace.model_copy(update={"indices": ()}))
         result = workspace(plain)
         if "local" in result.tables:

@@ -1,9 +1,9 @@
-"""What is found of a batch of designs: a row of numbers each, and why a design cannot be built."""
+"""Results of a batch of designs: a row of numbers each, and why a design cannot be built."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -28,11 +28,11 @@ FAILED = np.array([
 
 
 class Layout:
-    """Columns of what is found of designs.
+    """Columns of the results of designs.
 
-    Values of the goals and their estimated errors (nan where there is none); how far the poses are from assembling
-    (`mechdesign.analyses.optimize.stacked.shortfall`, nan where there is no such design); a code that is 0 where the
-    design can be built; then `rows` that goals are made of, and `assembly` margins of commands.
+    They are the values of the goals and their estimated errors (nan where there is none); the shortfall of the poses
+    from assembling (`mechdesign.analyses.optimize.stacked.shortfall`, nan where the numbers make no design); a code
+    that is 0 where the design can be built; then the `rows` behind the goals, and the `assembly` margins of commands.
     """
 
     def __init__(self, goals: Sequence[Goal], rows: Mapping[Goal, int], assembly: Mapping[str, int]) -> None:
@@ -49,14 +49,14 @@ class Layout:
 
 
 class Evaluated(NamedTuple):
-    """A row of a `Layout` for each design, and why it cannot be built (empty where it can); its code is still nan."""
+    """A row of a `Layout` for each design, its code still nan, and why it cannot be built (empty where it can)."""
 
     table: Floats
     reasons: list[str]
 
 
 class Batch:
-    """Designs of one call, and what is found of them."""
+    """Designs of one call, and their results."""
 
     def __init__(self, designs: Designs, layout: Layout) -> None:
         self.designs, self._layout = designs, layout
@@ -69,21 +69,28 @@ class Batch:
         """Rows of the designs that have no reason to be infeasible so far."""
         return np.flatnonzero(self.reasons == "")
 
-    def judge(self, each: Goal, result: Result, rows: Ints) -> Floats:
-        """Note the values of a goal by a result of some designs; returns them."""
-        values, listed, _ = each.judge(result, len(rows))
-        self.table[rows, self._layout.column[each]] = values
-        place = self._layout.rows.get(each, slice(0))
+    def judge(self, goal: Goal, result: Result, rows: Ints) -> Floats:
+        """Read the values of a goal from a result of some designs; returns them."""
+        values, listed, _ = goal.judge(result, len(rows))
+        self.table[rows, self._layout.column[goal]] = values
+        place = self._layout.rows.get(goal, slice(0))
         if listed is not None and listed.shape[1] == place.stop - (place.start or 0):
             self.table[rows, place] = listed
         return values
 
     def failed(self, rows: Ints, error: MechdesignError) -> None:
-        """Say why designs make no study, or have no answer."""
+        """Note why designs make no study, or have no answer."""
         self.reasons[rows] = without_numbers(error)
 
+    def halves(self, rows: Ints, error: MechdesignError) -> Iterator[Ints]:
+        """Designs in halves, as the numbers of one of them give an error; a single design gets it as its reason."""
+        if len(rows) == 1:
+            self.failed(rows, error)
+        else:
+            yield from np.array_split(rows, 2)
+
     def note(self, rows: Ints | slice, wrong: Flags, reasons: NDArray[np.object_] | str) -> None:
-        """Say what is wrong with some of the rows, where nothing has been said yet."""
+        """Note reasons of the designs in `rows` that are `wrong`, where they have none yet."""
         self.reasons[rows] = np.where(wrong & (self.reasons[rows] == ""), reasons, self.reasons[rows])
 
 

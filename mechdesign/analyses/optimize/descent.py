@@ -1,10 +1,10 @@
-"""From designs to the optima near them, many at once, by sequential quadratic programming with exact curvature.
+"""Descents from designs to the optima near them, many at once, by sequential quadratic programming.
 
-A design in a batch costs far less than alone: at each point all first and second differences are evaluated together.
-They give quadratic models of everything smooth: the residuals of a root mean square, the rows of which a goal is the
-worst, the rows of conditions, and the margins by which poses assemble. The worst of rows is made small by its epigraph,
-``min t`` where no row exceeds ``t``. What is best of the models is looked for in boxes of several widths, and all of
-it is evaluated together again. [Nocedal & Wright, Numerical Optimization, 2006, ch. 4, 10 and 18.]
+A design in a batch costs far less than alone, so that all first and second differences about a point are evaluated
+together. They give quadratic models of all smooth terms: the residuals of a root mean square, the rows whose worst is a
+goal, the rows of conditions, and the margins of assembly. The worst of rows is minimised by its epigraph, ``min t``
+where no row exceeds ``t``. The models are minimised in boxes of several widths, and the designs found are evaluated
+together. [Nocedal & Wright, Numerical Optimization, 2006, ch. 4, 10 and 18.]
 """
 
 from __future__ import annotations
@@ -19,45 +19,45 @@ from mechdesign.analyses.optimize.models import FAR, Models, Stencil, Terms, squ
 from mechdesign.numerics import quadratic
 from mechdesign.numerics.arrays import Floats, Ints
 
-# Half the first width of the box in which models are trusted, its largest, and where a descent ends.
+# Half the width of the box in which models are trusted: the first, the largest, and those below which a descent ends.
 FIRST_WIDTH, LARGEST_WIDTH, SMALLEST_WIDTH, ROUGH_SMALLEST_WIDTH = 0.1, 0.5, 1e-9, 1e-4
-# Parts of that width in which it is looked, too, and that remains where nothing of this was better.
+# Parts of that width that are tried together, and the part to which it shrinks where none of them is better.
 NARROWER = (1.0, 0.25, 0.0625)
 SHRUNK = 1 / 64
-# Steps of a descent, and after how many it ends where in so many more it would not reach the best of the others.
+# Most steps of a descent. After `RACE` steps one ends that would not reach the best of the others in `CATCH_UP` more.
 MOST_STEPS, RACE, CATCH_UP = 300, 8, 30
-# Pairs of programs solved, one after the other, for what is best of the models, and rows of each worst, and of all
-# conditions, that they hold per (variables + 1).
+# Most pairs of quadratic programs that minimise the models of one step.
 ROUNDS = 5
-# The models' best is settled where a pair gains less than this part of what they promise.
+# The minimum of the models is settled where a pair gains less than this part of the whole gain.
 SETTLED = 0.02
+# Rows of each worst, and of all conditions, that a program has per (variables + 1).
 ROWS_HELD = 6
-# Descents that come this near to another go on as one, in parts of the ranges.
+# Descents that come nearer to each other than this, in parts of the ranges, continue as one.
 SAME = 1e-3
-# Price of a condition that is missed, where what a range changes of the goals costs 1.
+# Price of violating a condition, in units of the change of the objective over the ranges.
 PRICE = 1e3
-# How far conditions are kept, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
+# Distance kept from conditions, in parts of the ranges: the optimum lies on them, and rounding must not put it beyond.
 CONDITION_SLACK = 1e-9
-# A descent ends where its models promise less than this part of the objective.
+# A descent ends where its models predict a gain of less than this part of the objective.
 SMALLEST_GAIN, ROUGH_SMALLEST_GAIN = 1e-12, 1e-6
-# Slopes of conditions below this part of their values are none.
+# Slopes of conditions below this part of their values count as zero.
 FLAT_SLOPE = 1e-6
 TINY = float(np.finfo(float).tiny)
 
 
 @dataclass
 class _Lane:
-    """One descent: the row of its best point, the width of its box, and what it knows of its conditions.
+    """One descent: the row of its best point, the width of its box, and how wrong the models of its conditions were.
 
-    Where the widest box led to nothing better, `ahead` is the row of what was found there, and the box: along a curved
-    valley the way over such points is shorter [Chamberlain et al., The watchdog technique, 1982].
+    Where the widest box gave no better point, `ahead` is the row of the point found there and the box's width: along a
+    curved valley the way over such points is shorter [Chamberlain et al., The watchdog technique, 1982].
     """
 
     objective: Floats
     row: int
     width: float = FIRST_WIDTH
-    # By how much conditions were missed where their models said they were met, in parts of the width's cube.
-    bent: float = 0.0
+    # Violation of conditions whose models were met, over the cube of the box's width.
+    model_error: float = 0.0
     steps: int = 0
     ended: bool = False
     value: float = np.inf
@@ -66,12 +66,12 @@ class _Lane:
 
 
 def descend(explorer: Explorer, descents: Sequence[tuple[Floats, int]], *, width: float = FIRST_WIDTH) -> list[int]:
-    """Descend from known points, all at once.
+    """Descend from evaluated points, all at once.
 
     Parameters
     ----------
     descents : sequence of (ndarray, int)
-        Factors of the goals whose sum is made small, and the row of `explorer.known` from which.
+        Factors of the goals in the sum that is minimised, and the row of `explorer.known` to start from.
     width : float
         Half the first width of the boxes, in parts of the ranges.
 
@@ -95,14 +95,14 @@ def descend(explorer: Explorer, descents: Sequence[tuple[Floats, int]], *, width
         for group in _alike(lanes):
             _race(explorer.known, group)
         scouts = [
-            (_Lane(lane.objective, lane.ahead[0], lane.ahead[1], lane.bent), lane)
+            (_Lane(lane.objective, lane.ahead[0], lane.ahead[1], lane.model_error), lane)
             for lane in lanes if lane.ahead is not None and not lane.ended
         ]  # fmt: skip
     return [lane.row for lane in lanes]
 
 
 def _step(explorer: Explorer, lanes: list[_Lane]) -> None:
-    """A step of every lane, or of some of them a narrower box."""
+    """One step of every lane: a better point, or a narrower box."""
     groups = _alike(lanes)
     stencil = Stencil(explorer, [lane.row for group in groups for lane in group])
     first, programs = 0, []
@@ -117,7 +117,7 @@ def _step(explorer: Explorer, lanes: list[_Lane]) -> None:
 
 
 def _alike(lanes: Sequence[_Lane]) -> list[list[_Lane]]:
-    """Lanes of the same objective together."""
+    """Lanes by their objective."""
     groups: dict[bytes, list[_Lane]] = {}
     for lane in lanes:
         groups.setdefault(lane.objective.tobytes(), []).append(lane)
@@ -125,7 +125,7 @@ def _alike(lanes: Sequence[_Lane]) -> list[list[_Lane]]:
 
 
 def _race(known: Known, lanes: Sequence[_Lane]) -> None:
-    """End descents of one objective that come to where a better one is, or would not catch up with the best."""
+    """End descents of one objective that come to the place of a better one, or would not catch up with the best."""
     lanes = sorted(lanes, key=lambda lane: lane.value)
     for k, lane in enumerate(lanes):
         behind = lane.value - lane.pace * CATCH_UP > lanes[0].value
@@ -135,7 +135,7 @@ def _race(known: Known, lanes: Sequence[_Lane]) -> None:
 
 
 class _Programs:
-    """What is best of the models of some lanes with one objective, in boxes of several widths.
+    """Quadratic programs that minimise the models of lanes with one objective, in boxes of several widths.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class _Programs:
         self._begin = (self._at - centre)[wide]
         self._low, self._high = (np.clip(self._at[wide] + side * self._widths[:, None], 0, 1) - centre[wide]
                                  for side in (-1, 1))  # fmt: skip
-        self._slack = CONDITION_SLACK + np.array([lane.bent for lane in lanes])[wide] * self._widths**3
+        self._slack = CONDITION_SLACK + np.array([lane.model_error for lane in lanes])[wide] * self._widths**3
         scale = self._scale(plain, pieces)
         self._plain = plain.take(wide) if self._terms.squared else plain.scaled(scale[:, None]).take(wide)
         widest, most = np.array([lane.width for lane in lanes]), ROWS_HELD * (centre.shape[1] + 1)
@@ -180,7 +180,7 @@ class _Programs:
         self._promised = (promised * self._scales).reshape(len(lanes), -1).max(axis=1)
 
     def _scale(self, plain: Models, pieces: Models) -> Floats:
-        """What a range changes of the objective, by its slopes or by its curvature; 1 where it changes nothing."""
+        """Change of the objective over a range, by its slopes or else its curvature; 1 where it does not change."""
         if self._terms.squared:
             _, slope, bend = square(plain, np.zeros_like(plain.slope[:, 0]))
             scale = np.maximum(np.abs(slope).max(axis=1), np.abs(bend).max(axis=(1, 2)))
@@ -202,7 +202,7 @@ class _Programs:
         return np.nan_to_num(value[:, 0]), slope[:, 0], self._plain.bend[:, 0]
 
     def _cost(self, x: Floats) -> Floats:
-        """What the models say of points, with the price of what is missed."""
+        """The models' objective at points, with the price of violated conditions."""
         cost = self._smooth_at(x)[0]
         pieces, limits = self._pieces.at(x)[0], self._limits.at(x)[0]
         for k in range(self._terms.edges):
@@ -210,14 +210,14 @@ class _Programs:
         return np.asarray(cost + PRICE * np.maximum(limits.max(axis=1, initial=FAR) + self._slack, 0.0))
 
     def _best(self) -> tuple[Floats, Floats]:
-        """The best points of the models that some rounds of programs find, and by how much they are better."""
+        """The best points of the models after some rounds of programs, and the gain that the models predict."""
         begin = self._cost(self._begin)
         x, cost = self._begin, begin
         widths, weights = self._widths.copy(), None
         for _ in range(ROUNDS):
             low, high = (np.clip(x + side * widths[:, None], self._low, self._high) for side in (-1, 1))
             first, weights = self._program(x, weights, low, high, widths)
-            # Where rows bend the first step may miss them; a second one comes back to them.
+            # Where rows are curved the first step may violate them, and a second one corrects that.
             second, weights = self._program(first, weights, low, high, widths)
             before = cost
             for new in (first, second):
@@ -254,7 +254,7 @@ class _Programs:
         rooms = [
             tops[:, self._owner] - pieces[0], -limits[0] - self._slack[:, None], high - x, np.zeros((lanes, 1)), x - low
         ]  # fmt: skip
-        # Slopes are at most 1: what is farther does not matter within the box.
+        # Slopes are at most 1: rows with more room than this are never reached within the box.
         bounds = np.minimum(np.concatenate(rooms, axis=1) / width[:, None], 2 * n + 2)
         rows = np.concatenate([*lines, box, -box[:, :n]], axis=1)
         z, multipliers = quadratic.solve(matrix, q, rows, bounds, np.zeros((lanes, size)))
@@ -265,19 +265,21 @@ class _Programs:
     def judge(self, rows: Ints) -> None:
         """Go to the best of the evaluated points, shape (lanes, widths), and choose the next boxes, or end."""
         among = np.column_stack([[lane.row for lane in self._lanes], rows])
-        standing, missed = self._standing(among)
+        merits, missed = self._merits(among)
         for k, lane in enumerate(self._lanes):
             lane.steps += 1
-            best = int(standing[k].argmin())
-            gained = standing[k, 0] - standing[k, best]
-            lane.value, lane.pace = float(standing[k, best]), float(gained)
+            best = int(merits[k].argmin())
+            gained = merits[k, 0] - merits[k, best]
+            lane.value, lane.pace = float(merits[k, best]), float(gained)
             value = abs(lane.value)
             widths = lane.width * np.array(NARROWER)
-            # Of narrow boxes it is rounding.
+            # In narrow boxes smaller violations are rounding errors.
             wrong = missed[k, 1:] > CONDITION_SLACK
-            lane.bent = min(float(2 * (missed[k, 1:] / widths**3)[wrong][0]), 1.0) if wrong.any() else lane.bent / 2
+            lane.model_error = (
+                min(float(2 * (missed[k, 1:] / widths**3)[wrong][0]), 1.0) if wrong.any() else lane.model_error / 2
+            )
             lane.ahead = None
-            if best != 1 and standing[k, 1] < UNKNOWN:
+            if best != 1 and merits[k, 1] < UNKNOWN:
                 lane.ahead = int(among[k, 1]), lane.width
             if best:
                 way = np.abs(self._explorer.known.u[among[k, best]] - self._at[k]).max()
@@ -287,15 +289,15 @@ class _Programs:
             else:
                 lane.width *= SHRUNK
             small = self._rounding * (value**2 if self._terms.squared else value)
-            # What does not keep its conditions yet goes on as long as it gains.
+            # A descent that still violates conditions continues as long as it gains.
             lane.ended = (
                 bool(self._promised[k] <= small and gained <= self._rounding * value)
                 or lane.width < (ROUGH_SMALLEST_WIDTH if self._explorer.rough else SMALLEST_WIDTH)
                 or lane.steps >= MOST_STEPS
             )
 
-    def _standing(self, rows: Ints) -> tuple[Floats, Floats]:
-        """What is made small at points, shape (lanes, points), and by how much they miss conditions."""
+    def _merits(self, rows: Ints) -> tuple[Floats, Floats]:
+        """The merit of points, shape (lanes, points), and their violation of conditions."""
         known, flat = self._explorer.known, rows.ravel()
         limits = self._terms(rows)[2] / self._lengths[:, None]
         missed = np.nan_to_num(limits, nan=FAR).max(axis=2, initial=FAR)
@@ -307,6 +309,6 @@ class _Programs:
 
 
 def _convex(matrices: Floats) -> Floats:
-    """The nearest matrices that bend nowhere downwards."""
+    """The nearest positive semidefinite matrices."""
     values, vectors = np.linalg.eigh(np.nan_to_num(matrices))
     return np.asarray((vectors * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(vectors, 1, 2))

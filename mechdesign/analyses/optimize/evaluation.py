@@ -37,61 +37,62 @@ from mechdesign.terms import Sum, terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"
-# Studies put together otherwise that are kept.
+# Most studies of other structure that are kept.
 MAX_OTHERS = 256
 
 
 class Evaluator:
     """Evaluates goals for designs of one study, which differ in parameters or single places.
 
-    Goals that are left out are those of the study, and its conditions. Graded, it also gives the rows that goals are
-    the worst of, or the root mean square of (those in `squares`), and how far poses are from assembling.
+    Without `goals` it evaluates the study's goals and conditions. If `graded`, it also gives the rows whose worst is a
+    goal, or whose root mean square is one (goals in `squares`), and how far poses are from assembling.
 
     Raises
     ------
     StudyError
-        If a goal names what no result has, or the study lacks what it needs.
+        If no result has the column of a goal, or the study lacks a section that it needs.
     """
 
     def __init__(self, study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> None:
         assert study.optimize is not None
-        # Where the study names each.
+        # Each goal and the place in the study that names it.
         moved = study.parameters.moved(study.optimize.variables)
         self._keys = goals_of(study.optimize) | conditions_of(study.optimize, moved)
         self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals or self._keys)), graded
         self.squares: set[Goal] = set()
         self._rows: dict[Goal, int] = {}
-        # Goals of commands and tables whose answers are found for all designs at once; those asked of each design.
+        # Goals by command and table where tables of all designs are computed at once; goals by command where they are
+        # not.
         self._together: dict[str, dict[str, list[Goal]]] = {}
         self._alone: dict[str, list[Goal]] = {}
-        # Outputs whose extremes are asked, and what is asked of columns between the poses.
+        # Outputs whose extremes are needed, and columns that are followed between the poses.
         self._outputs: set[str] = set()
         self._asked: set[Asked] = set()
-        # Studies that are put together otherwise.
+        # Evaluators of studies of another structure, by the values that decide it.
         self._others: dict[tuple[float, ...], Evaluator] = {}
         # Goals with their bounds in the unit of their column.
         self._bounded: dict[Goal, Goal] = {}
         self._regional = [goal for goal in self.goals if goal.regional]
-        whole = [each for each in self._regional if each.outline is None]
-        self._columns = tuple(dict.fromkeys(("area", *(each.column for each in whole))))
-        # One for each value of the held coordinates; of each design the worst counts.
+        whole = [goal for goal in self._regional if goal.outline is None]
+        self._columns = tuple(dict.fromkeys(("area", *(goal.column for goal in whole))))
+        # One question for each value of the held coordinates; the worst answer of a design counts.
         self.questions: list[Question] = []
         self._regions_together = True
         if self._regional:
             self.questions = questions(study, GRID_TOLERANCE, self._columns)
             together = shared(study, self.questions, moved) and not remeasured(study, study.optimize.variables)
-            self._regions_together = together and all(batched(each.column) for each in whole)
+            self._regions_together = together and all(batched(goal.column) for goal in whole)
         commands = dict.fromkeys(goal.command for goal in self.goals if not goal.regional and not goal.expression)
         problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
         if problems:
-            # A condition of two bounds would be named twice.
+            # A condition with two bounds has the same problem twice.
             raise StudyError([*dict.fromkeys(problems)])
         self.goals = tuple(self._bounded.get(goal, goal) for goal in self.goals)
-        # By command of which every pose must be valid: the number of its assembly margins.
+        # Number of assembly margins, by the commands of which every pose must be valid.
         clear: dict[str, int] = {}
         for command, tables in self._together.items() if graded else ():
             poses = study_poses(study, command)
-            # Extremes may be of some of the poses only.
+            # Extremes may be those of a part of the poses.
             if poses.listed or set(tables) != {"extremes"}:
                 clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
         self.layout = Layout(self.goals, self._rows, clear)
@@ -99,7 +100,7 @@ class Evaluator:
             self.limit_rows(0)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What the study gives again, where it travels to."""
+        """A copy in another process reads its questions from the study again."""
         return {name: value for name, value in self.__dict__.items() if name not in ("questions", "_others")}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
@@ -109,34 +110,34 @@ class Evaluator:
 
     @property
     def alone(self) -> bool:
-        """Whether some goals are asked of each design alone."""
+        """Whether some goals are computed design by design."""
         return bool(self._alone)
 
     @property
     def slow(self) -> bool:
-        """Whether a design costs as much alone as among others: not where all goals are tables found at once."""
+        """Whether a design costs as much in a batch as alone: where not all goals are tables of all designs at once."""
         return bool(self._alone) or bool(self._regional)
 
     def limit_rows(self, most: int) -> None:
-        """Leave out the rows of goals and the assembly margins where a design has more than so many."""
+        """Leave out the rows of goals and the assembly margins where a design has more than `most` of them."""
         if self.layout.width - self.layout.head > most:
             self.squares.clear()
             self.layout = Layout(self.goals, {}, {})
 
     def _misfits(self) -> Iterator[Problem]:
-        """Bounds that are of another kind than the number of the workspace, or the expression, that they bound."""
+        """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
         columns = index_columns(self.study, self.questions[0]) if self.questions else {}
-        units = {each: columns[each.column].unit for each in self._regional if each.column in columns}
+        units = {goal: columns[goal.column].unit for goal in self._regional if goal.column in columns}
         units |= {goal: unit for goal in self.goals if goal.expression and (unit := unit_of(self.study, goal.column))}
-        for each, unit in units.items():
+        for goal, unit in units.items():
             try:
-                Amount.of(each.bound).within(unit)
+                Amount.of(goal.bound).within(unit)
             except QuantityError as error:
-                yield self.study.problem(str(error), *self._keys.get(each, ()))
+                yield self.study.problem(str(error), *self._keys.get(goal, ()))
 
     def _look(self, command: str) -> Iterator[Problem]:
-        """Find the tables of a command's goals, before anything is computed but the study's own design."""
-        goals = [each for each in self.goals if each.command == command and not each.regional]
+        """Problems of a command's goals, whose tables are found by a look at the study's own design."""
+        goals = [goal for goal in self.goals if goal.command == command and not goal.regional]
         if command == "optimize":
             mistake = "an optimisation cannot judge itself; name a result of another command"
             yield self.study.problem(mistake, *self._keys.get(goals[0], ()))
@@ -147,57 +148,54 @@ class Evaluator:
             poses = study_poses(self.study, command)
             stack = stacked.tables(self.study, command, stacked.TABLES[command], poses)
             named: dict[Goal, Chosen | Sum] = {}
-            for each in goals:
+            for goal in goals:
                 with suppress(UnknownColumnError):
-                    named[each] = self._named(each, stack.result)
-            for each, terms in named.items():
+                    named[goal] = self._named(goal, stack.result)
+            for goal, terms in named.items():
                 for chosen in terms.parts:
                     if chosen.table.name == "extremes":
                         self._outputs.update(chosen.table["output"][chosen.counts].tolist())
-                    elif (asked := each.asked_of(chosen)) is not None:
+                    elif (asked := goal.asked_of(chosen)) is not None:
                         self._asked.add(asked)
             tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
             stack = stacked.tables(self.study, command, {"motion", *tables}, poses, self._outputs, self._asked)
-            for each, terms in named.items():
-                goal = self._count(each, terms, stack.result)
-                goals.remove(each)
+            for named_goal, terms in named.items():
+                goal = self._count(named_goal, terms, stack.result)
+                goals.remove(named_goal)
                 tables_of = self._together.setdefault(command, {})
                 wanted = [tables_of.setdefault(chosen.table.name, []) for chosen in terms.parts]
                 wanted[0].append(goal)
         if not goals:
             return
-        # Where the study's own design has no such result, other designs may.
+        # Other designs may have a result where the study's own design does not assemble.
         with suppress(AssemblyError):
             result = look(self.study, command)
-            for k, each in enumerate(goals):
+            for k, goal in enumerate(goals):
                 try:
-                    goals[k] = self._count(each, self._named(each, result), result)
+                    goals[k] = self._count(goal, self._named(goal, result), result)
                 except UnknownColumnError as error:
-                    yield self.study.problem(str(error), *self._keys.get(each, ()))
+                    yield self.study.problem(str(error), *self._keys.get(goal, ()))
         self._alone.setdefault(command, []).extend(goals)
 
-    def _named(self, each: Goal, result: Result) -> Chosen | Sum:
-        """What a goal is of."""
-        terms = terms_of(result, each.column, dict(each.where))
+    def _named(self, goal: Goal, result: Result) -> Chosen | Sum:
+        """The rows, or the sum, that a goal names."""
+        terms = terms_of(result, goal.column, dict(goal.where))
         if terms.missing:
             raise UnknownColumnError(terms.missing)
-        terms.bound(each.bound)
+        terms.bound(goal.bound)
         if isinstance(terms, Sum):
             terms.numbers()
         return terms
 
-    def _count(self, each: Goal, terms: Chosen | Sum, result: Result) -> Goal:
-        """A goal with its bound in the unit of its column.
-
-        How many rows it is the worst of, or the root mean square, by the study's own design, is noted.
-        """
-        self._bounded[each] = each = replace(each, bound=terms.bound(each.bound))
-        judgement = each.judge(result)
+    def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
+        """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
+        self._bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
+        judgement = bounded.judge(result)
         if judgement.squares:
-            self.squares.add(each)
+            self.squares.add(bounded)
         if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
-            self._rows[each] = judgement.rows.size
-        return each
+            self._rows[bounded] = judgement.rows.size
+        return bounded
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -216,19 +214,19 @@ class Evaluator:
                 reasons[rows] = without_numbers(error)
                 continue
             found = other({name: values[rows] for name, values in own.items()})
-            # What stands behind the goals has as many rows in designs that are put together alike.
+            # Designs of another structure may have another number of rows behind their goals.
             width = self.layout.width if other.layout.width == self.layout.width else self.layout.head
             table[rows, :width] = found.table[:, :width]
             reasons[rows] = found.reasons if own else found.reasons[0]
         return Evaluated(table, reasons.tolist())
 
     def _forms_study(self, name: str) -> bool:
-        """Whether a variable decides how the study is put together: an entry, or a whole number that is read once."""
+        """Whether a variable decides the structure of the study: an entry, or a whole number that is read once."""
         parameters = self.study.parameters
         return name not in parameters.known() or not parameters.moved([name]).isdisjoint(self.study.fixed)
 
     def _of(self, values: Mapping[str, float]) -> Evaluator:
-        """Evaluates the same goals for the study with such values."""
+        """The evaluator of the same goals for the study with these values of entries."""
         key = tuple(values.values())
         if key not in self._others:
             while len(self._others) >= MAX_OTHERS:
@@ -260,38 +258,36 @@ class Evaluator:
         return Evaluated(batch.table, [str(reason) for reason in batch.reasons])
 
     def _regions(self, batch: Batch, rows: Ints, asked: Sequence[Question]) -> None:
-        """Numbers of the workspaces of some designs, the worst of all values of the held coordinates.
+        """Numbers of the workspaces of some designs, the worst over all values of the held coordinates.
 
-        The questions are those of the study, or of the one design.
+        `asked` are the questions of the study, or of a single design.
         """
         if not len(rows):
             return
         numbers, own = batch.designs.take(rows).numbers, asked is self.questions
         try:
-            given = [answer(each, each.places(numbers) if own else {}, len(rows), BATCH) for each in asked]
+            given = [answer(question, question.places(numbers) if own else {}, len(rows), BATCH) for question in asked]
         except AssemblyError as error:
-            # One design's workspace has no end; the others are asked in halves.
-            if len(rows) == 1:
-                batch.reasons[rows] = without_numbers(error)
-                return
-            for half in np.array_split(rows, 2):
+            # The workspace of one design has no end.
+            for half in batch.halves(rows, error):
                 self._regions(batch, half, asked)
             return
-        for question, each in zip(asked, given, strict=True):
+        for question, region in zip(asked, given, strict=True):
             there = where(question) if len(asked) > 1 else ""
-            batch.note(rows, ~(each.panels.closes & (each.values["area"] > 0)), NO_REGION + there)
+            batch.note(rows, ~(region.panels.closes & (region.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
         for goal in self._regional:
             column, outline = self.layout.column[goal], goal.outline
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
-                each.values[goal.column] if shape is None else fitting_scale(shape, each.panels)[0] for each in given
+                region.values[goal.column] if shape is None else fitting_scale(shape, region.panels)[0]
+                for region in given
             ])  # fmt: skip
-            # Where one has no value none is worse.
+            # A missing value counts as the worst.
             worst = np.where(np.isnan(values), np.inf, values if goal.smallest else -values).argmax(axis=0)
             batch.table[rows, column] = values[worst, lanes]
             if split(goal.column)[1] == "mean":
-                errors = np.stack([each.errors[goal.column] for each in given])
+                errors = np.stack([region.errors[goal.column] for region in given])
                 batch.table[rows, len(self.goals) + column] = errors[worst, lanes]
 
     def _tables(
@@ -301,11 +297,7 @@ class Evaluator:
         try:
             stack = stacked.tables(study, command, wanted, poses, self._outputs, self._asked)
         except MechdesignError as error:
-            if len(rows) == 1:
-                batch.failed(rows, error)
-                return
-            # The numbers of one design cannot be asked; the others are, in halves.
-            for half in np.array_split(rows, 2):
+            for half in batch.halves(rows, error):
                 own = study_poses(study, command, batch.designs.take(half).numbers)
                 self._tables(batch, command, tables, half, study, own)
             return
@@ -320,12 +312,12 @@ class Evaluator:
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None and margins.shape[1] == clear.stop - clear.start:
                 batch.table[rows, clear] = margins
-        for each in [goal for goals in tables.values() for goal in goals]:
-            lost = np.isnan(batch.judge(each, stack.result, rows))
+        for goal in [goal for goals in tables.values() for goal in goals]:
+            lost = np.isnan(batch.judge(goal, stack.result, rows))
             batch.note(rows, lost & (failed != ""), failed)
 
     def _needed(self, study: Study) -> Study:
-        """The study without what no goal asks and costs much more than the goals: tolerances, Sobol' indices."""
+        """The study without costly parts that no goal needs: allocation of tolerances, Sobol' indices."""
         section, columns = study.reliability, [goal.column for goal in self.goals]
         if section is None:
             return study
@@ -336,7 +328,7 @@ class Evaluator:
         return replace(study, reliability=section)
 
     def _one(self, batch: Batch, k: int) -> str:
-        """Ask what is left of one design; returns why it is infeasible."""
+        """Evaluate the other goals of one design; returns why it is infeasible, empty if it is not."""
         row = np.array([k])
         command = ""
         try:
@@ -361,17 +353,17 @@ class Evaluator:
         return ""
 
     def _pose_reason(self, batch: Batch, k: int, study: Study, command: str) -> str:
-        """Why poses of one design fail, empty where none does; notes how far they are from assembling."""
+        """Why poses of a design fail, empty where none does; notes their shortfall from assembling."""
         if command == "workspace":
             return NO_REGION
         poses = study_poses(study, command)
         solved = list(solve_poses(study, poses))
         if self._graded:
             batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
-        return str(FAILED[first_reason(np.concatenate([each.configuration.reason for each in solved])[None])[0]])
+        return str(FAILED[first_reason(np.concatenate([part.configuration.reason for part in solved])[None])[0]])
 
 
 def missing(goal: Goal, result: Result) -> str:
-    """Which poses or parts of the motion that a goal is of are not valid, in words; empty where all are."""
+    """Invalid poses or parts of the motion among those that a goal judges, in words; empty where all are valid."""
     scopes = [chosen.table.scope for chosen in terms_of(result, goal.column, dict(goal.where)).parts]
     return next((scope.missing for scope in scopes if scope is not None and scope.missing), "")

@@ -1,4 +1,4 @@
-"""Points of the unit cube and what is known of them: the memory that all stages of a search share."""
+"""Evaluated points of the unit cube, which all stages of a search share."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Least merits, beyond any goal and with room for their order, of points that miss a condition, of points without a
-# value, and of those of which nothing is known.
+# Merits, larger than any goal, from which on a point misses a condition, has no value, or is not known at all; far
+# enough from each other for an order within each class.
 CONDITION_MISSED = 1e60
 NO_VALUE = 1e90
 UNKNOWN = 1e120
-# Column of the parts that are of no goal or condition: margins of assembly, negative where a pose does not assemble.
+# Column of the margins of assembly, negative where a pose does not assemble: they belong to no goal or condition.
 ASSEMBLY = -1
 FIRST_ROWS = 256
 
 
 class Spent(Exception):
-    """The evaluations that were allowed are used up."""
+    """The allowed evaluations are used up."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Part:
     Parameters
     ----------
     column : int
-        Of the goals, and after them of the conditions; or `ASSEMBLY`.
+        Number of the goal, or of the condition after all goals; or `ASSEMBLY`.
     sign : float
         1 where the largest row is the worst, -1 where the smallest is.
     absolute : bool
@@ -47,32 +47,32 @@ class Part:
     squares: bool = False
 
     def pieces(self, rows: Floats) -> Floats:
-        """What ``sign * (goal - bound)`` is the largest of, and by how much a condition is not met; smooth."""
+        """Smooth functions whose largest value is ``sign * (goal - bound)``, the violation of a condition."""
         found = self.sign * rows[:, self.place]
         if self.absolute and self.sign > 0:
             found = np.concatenate([found, -found], axis=1)
         elif self.absolute:
-            # Its edge at zero does not matter: these values are made large.
+            # These values are made large, and so stay away from the kink at zero.
             found = -np.abs(found)
         return np.asarray(found - self.sign * self.bound)
 
 
 @dataclass(frozen=True)
 class Known:
-    """Evaluated points, a line each.
+    """Evaluated points.
 
     Parameters
     ----------
     u : ndarray, shape (points, dimensions)
         Points of the unit cube.
     values : ndarray, shape (points, goals)
-        Of the goals; nan where there is none.
+        Values of the goals; nan where a point has none.
     margins : ndarray, shape (points, conditions)
-        By how much each condition is met, negative where it is not.
+        Margin of each condition, negative where it is not met.
     rows : ndarray, shape (points, rows)
-        What goals and conditions are the worst of, as far as that is known; see `Part`.
+        The rows whose worst are goals and conditions, as far as they are known; see `Part`.
     shortfall : ndarray, shape (points,)
-        How far a point without a value is from having one; nan where that is not known.
+        How far a point without a value is from assembling; nan where that is not known.
     """
 
     u: Floats
@@ -96,12 +96,11 @@ class Known:
         return np.asarray(self.valid & (self.margins >= 0).all(axis=1))
 
     def merit(self, objective: Floats) -> Floats:
-        """What is made small, shape (points,): the objective where it is feasible, always less than elsewhere.
+        """What a search minimises, shape (points,): of feasible points the sum of the goals times `objective`.
 
-        The objective is the sum of the goals times its factors, negative where a goal is made large.
-
-        Points that miss a condition follow by how much they miss, then those without a value by their shortfall
-        [Deb, An efficient constraint handling method for genetic algorithms, 2000]; inf where that is not known.
+        Points that miss a condition come after all feasible ones, ordered by their violation, then points without a
+        value, ordered by their shortfall [Deb, An efficient constraint handling method for genetic algorithms, 2000];
+        infinite where that is not known.
         """
         valid, feasible = self.valid, self.feasible
         merit = np.where(np.isnan(self.shortfall), np.inf, NO_VALUE * (1.0 + self.shortfall))
@@ -120,16 +119,16 @@ class Explorer:
     Parameters
     ----------
     evaluate
-        Of points, shape (m, dimensions).
+        Evaluates points, shape (m, dimensions).
     snap
-        Points of shape (m, dimensions), moved to where those that are the same design are the same point.
+        Moves points, shape (m, dimensions), so that points of the same design are equal.
     rough : bool
         Whether values are known to a tolerance only, so that differences over small steps are noise.
 
     Attributes
     ----------
     left, reserve : int
-        Evaluations that are left, and how many of them are kept for later.
+        Evaluations that are left, and how many of these are kept for later.
     visited : ndarray of int
         Rows of `known` that were asked for since the last `forget`.
     """
@@ -143,7 +142,7 @@ class Explorer:
         self.rough = rough
         self._rows: dict[bytes, int] = {}
         self._visits: list[Ints] = []
-        # Columns of points, values, margins, rows and shortfall; more lines than are filled.
+        # Columns of points, values, margins, rows and shortfall, with room for further points.
         self._table, self._ends = np.empty((0, dimensions + 1)), [dimensions] * 4
 
     @property
@@ -159,10 +158,11 @@ class Explorer:
 
     @property
     def visited(self) -> Ints:
+        """Rows of `known` that were asked for since the last `forget`, each once."""
         return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *self._visits]))
 
     def forget(self) -> None:
-        """Begin to note anew which points are visited."""
+        """Start a new list of visited points."""
         self._visits.clear()
 
     def __call__(self, u: Floats) -> Ints:

@@ -23,14 +23,14 @@ from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.text.document import plain
 from mechdesign.study.variants import changed_data, rewritten
 
-# Poses between two listed ones at which it is looked whether an optimum can go from one to the other.
+# Poses between two listed ones at which the motion from one to the other is checked.
 BETWEEN = 100
 
 
 def design_files(
     study: Study, designs: Designs, wanted: Mapping[str, tuple[int, str]]
 ) -> tuple[dict[str, str], list[Caution]]:
-    """Texts by file name, and what is wrong with them.
+    """Texts by file name, and warnings about them.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ def design_files(
     for name, (k, heading) in wanted.items():
         heading = f"{heading}: {in_words(designs.design(k))}"
         form, numbers = parted(study, designs.design(k))
-        # The sections that make other studies of it stay.
+        # Sections that make other studies, such as the matrix, stay in the file.
         data = {**plain(study.resolved), **changed_data(form, numbers)}
         try:
             best = variant(form, numbers)
             doubts += [Caution("unassembled", f"{name}.yaml: {words}") for words in _parted(best, designs)]
             judged = [goal for goal in (*designs.goals, *designs.conditions) if not goal.expression]
-            commands = tuple(dict.fromkeys(each.command for each in judged))
+            commands = tuple(dict.fromkeys(goal.command for goal in judged))
             drawings, given = _drawings(best, commands), _given(best, commands)
             while not _assembles_alike(study, best.mechanism, data, given):
                 pose = next(drawings, None)
@@ -67,7 +67,7 @@ def design_files(
 
 
 def _parted(study: Study, designs: Designs) -> Iterator[str]:
-    """Listed poses that one drive does not lead from one to the next."""
+    """A warning of listed poses between which the single drive cannot move the mechanism."""
     if not any(goal.command == "kinematics" and not goal.expression for goal in designs.goals):
         return
     poses = study_poses(study, "kinematics")
@@ -90,7 +90,7 @@ def _parted(study: Study, designs: Designs) -> Iterator[str]:
 
 
 def _given(study: Study, commands: Iterable[str]) -> list[tuple[str, ...]]:
-    """Coordinates from which commands find poses, and the drives."""
+    """The coordinates that give the poses of commands, and the drives."""
     found = [study.mechanism.drives]
     for command in commands:
         if command == "workspace" and study.workspace is not None:
@@ -101,7 +101,7 @@ def _given(study: Study, commands: Iterable[str]) -> list[tuple[str, ...]]:
 
 
 def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
-    """Poses that a design may be drawn in: its sketch as it assembles, or else one that a command asks for."""
+    """Poses for the sketch of a design: its own sketch as it assembles, then a pose of each command."""
     yield study.mechanism.sketch_configuration
     for command in commands:
         poses = workspace_nodes(study) if command == "workspace" else study_poses(study, command)
@@ -109,7 +109,7 @@ def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
             pose = solved.configuration
             valid = np.flatnonzero(pose.valid)
             if valid.size:
-                # A workspace begins at its boundary, where legs are stretched: the pose that is farthest from that.
+                # The poses of a workspace begin at its boundary, where legs are stretched: the pose farthest from that.
                 closures = [np.broadcast_to(closure, pose.shape)[valid] for closure in pose.closures]
                 farthest = int(np.min(closures, axis=0).argmax()) if closures else valid.size // 2
                 yield pose.take(int(valid[farthest]))
@@ -119,7 +119,7 @@ def _drawings(study: Study, commands: Iterable[str]) -> Iterator[Configuration]:
 def _assembles_alike(
     study: Study, mechanism: Mechanism, data: Mapping[str, Any], given: Iterable[tuple[str, ...]]
 ) -> bool:  # fmt: skip
-    """Whether the study of this data has the assemblies of the mechanism that was evaluated, whatever is given."""
+    """Whether the study of this data has the assembly modes of the evaluated mechanism, from all given coordinates."""
     try:
         text = yaml.safe_dump(dict(data), sort_keys=False).encode()
         alone = load_bytes(text, study.path, folder=study.folder).mechanism

@@ -1,4 +1,4 @@
-"""What designs are compared by: a number of the workspace, the worst row of any column, or an expression."""
+"""Goals and conditions of designs: a number of the workspace, the worst row of any column, or an expression."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 @dataclass(frozen=True)
 class Goal:
-    """What is maximised, minimised or bounded: a number of the workspace, the worst row of a column, or an expression.
+    """A number that is maximised, minimised or bounded: of the workspace, the worst row of a column, or an expression.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class Goal:
     unassembled : bool
         Whether poses that are not valid are left out; else they make a design infeasible.
     outline : Outline, optional
-        What the workspace is to hold; the largest scale at which it does is judged.
+        A shape that the workspace has to contain; the largest scale at which it does is judged.
     gate : bool
-        Whether it is a condition, which has to hold between the poses of a motion, too; of a goal the rows count.
+        Whether it is a condition, which has to hold between the poses of a motion, too. Of a goal only the rows count.
     """
 
     name: str
@@ -62,6 +62,11 @@ class Goal:
     expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
     outline: Outline | None = None
     gate: bool = False
+
+    @property
+    def sign(self) -> float:
+        """1 where less is better, or the largest row the worst one; else -1."""
+        return 1.0 if self.smallest else -1.0
 
     @property
     def regional(self) -> bool:
@@ -83,7 +88,7 @@ class Goal:
         Parameters
         ----------
         result : Result
-            Of several designs, as many rows of each, one design after the other.
+            The result of all designs, with the same number of rows for each, design by design.
 
         Raises
         ------
@@ -113,7 +118,7 @@ class Goal:
         return Judgement(found, rows)
 
     def asked_of(self, chosen: Chosen) -> Asked | None:
-        """What of a column has to be known between the poses: of conditions, statistics, and parts of a motion."""
+        """How a column is followed between the poses, for conditions, statistics and parts of a motion; else None."""
         between = self.gate or chosen.statistic or chosen.part
         if not between or chosen.picked:
             return None
@@ -122,16 +127,16 @@ class Goal:
 
 
 class Judgement(NamedTuple):
-    """What a goal is for some designs.
+    """The values of a goal for some designs.
 
     Parameters
     ----------
     values : ndarray, shape (designs,)
         The worst of the rows, of a condition also of the motion between them; nan where none counts or has no value.
     rows : ndarray, shape (designs, rows), or None
-        The signed rows that count, then of a condition the worst between them; None where these are not as many in each
-        design. Of a root mean square over targets, where the result has the motion, errors whose squares have its
-        square as their sum.
+        The signed rows that count, then of a condition the worst value between them; None where designs do not have the
+        same number of rows. Of a root mean square over targets, where the result has the motion, errors whose squares
+        add up to its square.
     squares : bool
         Whether the rows are such errors.
     """
@@ -142,9 +147,10 @@ class Judgement(NamedTuple):
 
 
 def _errors(result: Result, output: str, rms: Floats) -> Floats:
-    """Errors of an output's target, in such parts that their squares sum to that of `rms`, shape (designs, errors).
+    """Errors from an output's target, scaled so that their squares add up to that of `rms`, shape (designs, errors).
 
-    Of a motion that is followed they are those of a Gauss rule, else those of the poses, 0 where one has no target.
+    They are those at the nodes of a Gauss rule where the motion is followed between the poses, else those of the poses,
+    0 where a pose has no target.
     """
     motion, designs = result.tables["motion"], len(rms)
     parts = [f"{output}_error"] if f"{output}.x_error" not in motion else [f"{output}.{k}_error" for k in "xy"]
@@ -163,7 +169,7 @@ def goal(
 ) -> Goal:  # fmt: skip
     """Read a result's name, such as ``GII``, ``stiffness.k_min``, ``kinematics.extremes.C.x.range``.
 
-    Of an error the absolute value counts in any case.
+    Of an error the absolute value always counts.
     """
     name, command, column, expression = _parts(result)
     rows = tuple((where or {}).items())
@@ -173,7 +179,7 @@ def goal(
 
 
 def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
-    """What a section maximises, then what it minimises, and where it says so."""
+    """The goals that a section maximises, then those that it minimises, with their places in the study."""
     return {
         goal(
             judged.result, smallest=key == "minimize", where=judged.where, absolute=judged.abs,
@@ -185,9 +191,9 @@ def goals_of(section: OptimizeSection) -> dict[Goal, KeyPath]:
 
 
 def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal, KeyPath]:
-    """The worst rows that a section's conditions judge, and where it says so; designs differ in parameters `moved`."""
+    """The conditions of a section with their places in the study; designs differ in the parameters `moved`."""
     given = enumerate(section.subject_to)
-    return {each: ("optimize", "subject_to", k) for k, condition in given for each in bounds_of(condition, moved)}
+    return {goal: ("optimize", "subject_to", k) for k, condition in given for goal in bounds_of(condition, moved)}
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:
@@ -209,7 +215,7 @@ def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -
 
 
 def shape_of(outline: Outline, number: Callable[[float], Any] = float) -> Shape:
-    """The shape that an outline is, by what `number` makes of its numbers: one each, or one for each design."""
+    """The shape of an outline; `number` evaluates its numbers, to one value or to one for each design."""
     centre = None
     if outline.center is not None:
         x, y = outline.center
@@ -222,7 +228,7 @@ def shape_of(outline: Outline, number: Callable[[float], Any] = float) -> Shape:
 
 
 def _parts(result: str | Expression) -> tuple[str, str, str, Expression | None]:
-    """Name, command, column and expression of what is judged."""
+    """Name, command, column and expression of a judged result."""
     if isinstance(result, Expression):
         return result.text, "", result.text, result
     return result, command_of(result) or "workspace", path_of(result), None

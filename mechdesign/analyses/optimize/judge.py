@@ -28,9 +28,9 @@ from mechdesign.study.schema.checker import ORDERS
 from mechdesign.study.schema.limits import SUFFIXES
 from mechdesign.work.journal import Journal, digest
 
-# Designs evaluated together: enough that arrays are long, few enough that the workers end together.
+# Designs evaluated together: enough for long arrays, few enough that all workers finish at about the same time.
 DESIGNS_AT_ONCE = 384
-# The same where designs cost much and a search asks for few at once.
+# The same where a design costs much and a search evaluates few at once.
 SLOW_DESIGNS_AT_ONCE = 16
 
 
@@ -43,9 +43,9 @@ class Designs:
     Parameters
     ----------
     found : dict of Goal to ndarray
-        Values of the goals and of what the conditions bound; nan where there is none.
+        Values of the goals and of the bounded results; nan where a design has none.
     errors : dict of Goal to ndarray
-        Estimated errors, of goals that have any.
+        Estimated errors of goals that have any.
     codes, words : ndarray of int, list of str
         Why a design cannot be built: ``words[code]``, empty where it can.
     shortfall : ndarray
@@ -86,7 +86,7 @@ class Designs:
 
     @cached_property
     def failures(self) -> dict[str, Flags]:
-        """Designs by why they are infeasible: that they cannot be built, else every condition that they miss."""
+        """Infeasible designs by reason: why they cannot be built, else every condition that they miss."""
         found = {word: self.codes == code for code, word in enumerate(self.words) if word}
         built = self.codes == 0
         return found | {
@@ -107,9 +107,9 @@ class Designs:
         return np.asarray(self.reasons == "", dtype=bool)
 
     def counted(self) -> list[tuple[str, int, int]]:
-        """Why designs are infeasible, the most frequent first: reason, how many designs, and the first."""
+        """Reasons of infeasible designs, the most frequent first: reason, number of designs, and the first design."""
         found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
-        return sorted(found, key=lambda each: (-each[1], each[0]))
+        return sorted(found, key=lambda reason: (-reason[1], reason[0]))
 
     @cached_property
     def values(self) -> Floats:
@@ -118,7 +118,7 @@ class Designs:
 
     @cached_property
     def _ends(self) -> tuple[Floats, Floats]:
-        """Smallest and largest value of each goal over the feasible designs; without one no range is left."""
+        """Smallest and largest value of each goal over the feasible designs; an empty range where there are none."""
         inside = self.values[self.feasible]
         return inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
 
@@ -129,12 +129,12 @@ class Designs:
 
     @cached_property
     def winners(self) -> Ints:
-        """A front's knee and ends, then the best design for each row of weights, the first of equals."""
+        """Rows of a front's knee and ends, then of the best design (the first of equals) for each row of weights."""
         scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights[len(self.chosen) :]]
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
     def merits(self, row: int) -> str:
-        """What a design is best for: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        """The optima that a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
         places = np.flatnonzero(self.winners == row).tolist()
         marks = [self.marks[place] for place in places if place < len(self.chosen)]
         weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]
@@ -142,7 +142,7 @@ class Designs:
 
     @property
     def best(self) -> int:
-        """The optimum that is best on the whole; of a front its knee."""
+        """The optimum with the largest CPI; of a front its knee."""
         winners = self.winners
         return int(winners[0 if len(self.chosen) else np.argmax(self.cpi[winners])])
 
@@ -180,7 +180,7 @@ class Designs:
         return variable_unit(self.study, name)
 
     def unit_of_condition(self, condition: Goal) -> str:
-        """Unit of what a condition bounds; none of the scale of a shape."""
+        """Unit of the result that a condition bounds; the scale of a shape has none."""
         return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
@@ -188,14 +188,14 @@ class Designs:
         for name in self.variables:
             yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
         for goal in self.goals:
-            # A parameter that varies is a goal and a variable at once.
+            # A goal that is itself a variable has its column already.
             if goal.name not in self.variables:
                 kind, unit, meaning = self._kind(goal)
                 words = {"parameter": goal.name, "result": goal.name, "meaning of the result": meaning}
                 yield kind.column(self.found[goal][rows], unit, **words)
-        for each, error in self.errors.items() if errors else ():
-            if each in self.goals:
-                yield DESIGNS["<result>_error"].column(error[rows], self._kind(each)[1], result=each.name)
+        for goal, error in self.errors.items() if errors else ():
+            if goal in self.goals:
+                yield DESIGNS["<result>_error"].column(error[rows], self._kind(goal)[1], result=goal.name)
         for condition in self.conditions:
             if condition.outline is not None:
                 words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
@@ -225,7 +225,7 @@ class Designs:
 
 
 class Judge:
-    """Evaluates designs in chunks and keeps what is found; what a journal holds is not computed again.
+    """Evaluates designs in chunks and keeps the results; those that a journal holds are not computed again.
 
     `compute` evaluates chunks in their order: ``map(evaluator, chunks)``, or workers that do so.
     """
@@ -241,17 +241,17 @@ class Judge:
         self._names = tuple(study.optimize.variables)
         self._squares, self._compute, self._journal = evaluator.squares, compute, journal
         self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
-        # Words of an earlier run keep their numbers: this one meets them in the same order.
+        # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._asked: list[Floats] = []
         self._found: list[Floats] = []
 
     def parts(self) -> list[Part]:
-        """Which rows of an outcome belong to which goal or condition; those of assembly come last."""
+        """The rows of a result that belong to each goal or condition; the margins of assembly come last."""
         head, margins = self.layout.head, self.layout.margins
-        places = {each: slice(at.start - head, at.stop - head) for each, at in self.layout.rows.items()}
+        places = {goal: slice(at.start - head, at.stop - head) for goal, at in self.layout.rows.items()}
         found = [
-            Part(column, 1.0 if goal.smallest else -1.0, goal.absolute, places[goal], goal.bound, goal in self._squares)
+            Part(column, goal.sign, goal.absolute, places[goal], goal.bound, goal in self._squares)
             for column, goal in enumerate((*self.goals, *self.conditions))
             if goal in places and (column < len(self.goals) or goal not in self._squares)
         ]
@@ -261,7 +261,7 @@ class Judge:
 
     def known(self, u: Floats) -> Known:
         """Evaluate points of the unit cube."""
-        designs, given = from_cube(self.study, u)
+        designs, given, _ = from_cube(self.study, u)
         found = np.full((len(u), self.layout.width), np.nan)
         if given.any():
             found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
@@ -276,13 +276,13 @@ class Judge:
         )  # fmt: skip
 
     def nearest(self) -> int | None:
-        """The design, of those that are not feasible, that misses least; None where nothing is known of any."""
+        """The infeasible design with the smallest violation; None where no violation is known."""
         found = np.concatenate([np.empty((0, self.layout.head)), *self._found])
         merit = self._known(np.empty((len(found), 0)), found).merit(np.zeros(len(self.goals)))
         return int(merit.argmin()) if np.isfinite(merit).any() else None
 
     def evaluate(self, designs: Batch) -> Floats:
-        """Evaluate designs chunk by chunk; in rows of `layout`, whatever the workers and the journal."""
+        """Results of designs, in rows of `layout`, evaluated chunk by chunk unless the journal has them."""
         count, begun = len(designs[self._names[0]]), len(self._found)
         chunks = [
             {name: column[k : k + self._chunk] for name, column in designs.items()}
@@ -303,7 +303,7 @@ class Judge:
                 self._journal.add(key, rows, [*self._words])
             self.progress.update(len(rows))
         found = self._found[begun:]
-        # Only who asked needs the rows behind the values.
+        # The rows behind the goals are returned, but not kept.
         self._found[begun:] = [rows[:, : self.layout.head].copy() for rows in found]
         return np.concatenate(found) if found else np.empty((0, self.layout.width))
 
@@ -321,7 +321,7 @@ class Judge:
         return Designs(
             self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
             dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
-            {each: column for each, column in errors if not np.isnan(column).all()},
+            {goal: column for goal, column in errors if not np.isnan(column).all()},
             found[:, self.layout.code].astype(np.int32), [*self._words], found[:, self.layout.shortfall], weights,
             meanings,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Quadratic models of what an objective and its conditions are made of, from differences about a point."""
+"""Quadratic models of the smooth terms of an objective and its conditions, from differences about a point."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ import numpy as np
 from mechdesign.analyses.optimize.explorer import ASSEMBLY, Explorer, Part
 from mechdesign.numerics.arrays import Floats, Ints
 
-# Step of differences in parts of the ranges; where values are known to a tolerance, those over less are noise.
+# Step of differences in parts of the ranges; a longer one where values are known to a tolerance only.
 STEP, ROUGH_STEP = 1e-4, 1e-2
-# More variables than these make too many pairs for mixed second differences.
+# Most variables with which mixed second differences are evaluated.
 MOST_CROSSED = 24
-# Stands for a row that is not known: no bound comes near.
+# Value of a row that is not known, far from any bound.
 FAR = -1e9
 
 
 class Terms:
-    """What an objective and its conditions are made of, as smooth columns of evaluated points.
+    """The smooth terms of an objective and of its conditions, as columns of evaluated points.
 
     Attributes
     ----------
     edges : int
-        Goals that are the worst of rows.
+        Number of goals that are the worst of rows.
     owner : ndarray of int
-        Which of them each of the rows that bound a worst belongs to.
+        The goal among these to which each row belongs.
     squared : bool
-        Whether the objective is a root mean square, which is made small by its square.
+        Whether the objective is a root mean square, whose square is minimised.
     """
 
     def __init__(self, explorer: Explorer, objective: Floats) -> None:
@@ -45,7 +45,7 @@ class Terms:
                 squares += [part] if objective[part.column] > 0 else []
             elif objective[part.column] * part.sign > 0:
                 self._edged.append(part)
-        # A root mean square that is the only goal is made small by its square.
+        # The only goal is a root mean square: its square is minimised.
         self._residuals = squares[0] if len(squares) == np.count_nonzero(objective) == 1 else None
         self._smooth = objective.copy()
         self._smooth[[part.column for part in self._edged]] = 0.0
@@ -59,8 +59,11 @@ class Terms:
         return self._residuals is not None
 
     def __call__(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
-        """Columns of points, shape (lanes, points, columns): the smooth sum, or its residuals; what bounds each worst;
-        and what may not be positive; nan where that is not known."""
+        """Columns of points, shape (lanes, points, columns); nan where a value is not known.
+
+        They are the smooth sum, or its residuals; the rows of the goals that are worst of rows; and the functions of
+        the conditions, which must not be positive.
+        """
         known, flat = self._explorer.known, rows.ravel()
         lines, values, margins = known.rows[flat], known.values[flat], known.margins[flat]
 
@@ -77,23 +80,23 @@ class Terms:
             factor = self._objective[part.column]
             pieces.append(self._or_worst(part.pieces(lines) * abs(factor), values[:, part.column] * factor, rows))
         self.owner = np.repeat(np.arange(len(pieces)), [own.shape[1] for own in pieces])
-        limits, told = [], set()
+        limits, with_rows = [], set()
         for part in self._held:
             own, goal = part.pieces(lines), part.column - len(self._objective)
-            told.add(goal)
+            with_rows.add(goal)
             limits.append(own if part.column == ASSEMBLY else self._or_worst(own, -margins[:, goal], rows))
-        limits += [-margins[:, [k]] for k in range(margins.shape[1]) if k not in told]
+        limits += [-margins[:, [k]] for k in range(margins.shape[1]) if k not in with_rows]
         return plain, shaped(pieces), shaped(limits)
 
     @staticmethod
     def _or_worst(pieces: Floats, worst: Floats, rows: Ints) -> Floats:
-        """Pieces, and the worst of them where they are not known themselves."""
+        """Pieces, and their worst where the pieces are not known."""
         known = np.isfinite(pieces.reshape(*rows.shape, -1)[:, 0]).all(axis=1)
         return np.column_stack([pieces, np.where(np.repeat(known, rows.shape[1]), np.nan, worst)])
 
 
 class Stencil:
-    """Evaluated points about those of lanes, from which differences are taken; `rows`, shape (lanes, points)."""
+    """Points evaluated about the point of each lane, from which differences are taken; their `rows` (lanes, points)."""
 
     def __init__(self, explorer: Explorer, rows: Sequence[int]) -> None:
         n = explorer.dimensions
@@ -107,7 +110,10 @@ class Stencil:
         self.rows = explorer(points.reshape(-1, n)).reshape(points.shape[:2])
 
     def models(self, values: Floats) -> Models:
-        """Quadratic models about the centres of values, shape (lanes, points, columns); sides without one are left."""
+        """Quadratic models about the centres from values, shape (lanes, points, columns).
+
+        Where one side has no value the slope is that of the other.
+        """
         n, h = self.centre.shape[1], self.step
         middle, up, down = values[:, 0], values[:, 1 : n + 1], values[:, n + 1 : 2 * n + 1]
         with np.errstate(invalid="ignore"):
@@ -144,30 +150,25 @@ class Models:
         return Models(self.value[lanes], self.slope[lanes], self.bend[lanes])
 
     def highest(self, widths: Floats, most: int) -> Ints:
-        """Columns, at most so many of each lane, that may be the highest in boxes of these half widths."""
+        """At most `most` columns of each lane that may be the highest in a box of this half width."""
         lanes, count = self.value.shape
         if count <= most:
             return np.broadcast_to(np.arange(count), (lanes, count))
         width = widths[:, None]
         rise = width * np.abs(self.slope).sum(axis=2) + width**2 / 2 * np.abs(self.bend).sum(axis=(2, 3))
-        # Half of them for being high where it begins.
+        # Half of them are the highest ones at the centre.
         first = np.argpartition(-self.value, most // 2, axis=1)[:, : most // 2]
         value = self.value + rise
         np.put_along_axis(value, first, np.inf, 1)
         return np.asarray(np.argpartition(-value, most - 1, axis=1)[:, :most])
 
     def columns(self, chosen: Ints) -> Models:
-        """Some of each lane, shape (lanes, columns)."""
+        """Chosen columns of each lane, shape (lanes, columns)."""
         lane = np.arange(len(chosen))[:, None]
         return Models(self.value[lane, chosen], self.slope[lane, chosen], self.bend[lane, chosen])
 
-    @classmethod
-    def joined(cls, parts: Sequence[Models]) -> Models:
-        """The columns of several."""
-        return cls(*(np.concatenate([getattr(part, name) for part in parts], axis=1) for name in vars(parts[0])))
-
     def scaled(self, by: Floats) -> Models:
-        """In parts of a number for each value."""
+        """The models over a number for each value."""
         return Models(self.value / by, self.slope / by[..., None], self.bend / by[..., None, None])
 
 
@@ -180,7 +181,7 @@ def square(residuals: Models, x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def without_lost(models: Models) -> Models:
-    """Models in which a column that has no value is far from any bound."""
+    """Models in which columns without a value are far from any bound."""
     lost = np.isnan(models.value)
     return Models(
         np.where(lost, FAR, models.value), np.where(lost[..., None], 0.0, models.slope),

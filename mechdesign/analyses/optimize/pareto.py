@@ -1,4 +1,4 @@
-"""The Pareto front: designs none of which is surpassed in every goal at once, and its knee."""
+"""The Pareto front: designs that no other design surpasses in every goal at once, and its knee."""
 
 from __future__ import annotations
 
@@ -22,34 +22,38 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.numerics.evolution import offspring, simplex, survivors
 from mechdesign.results import Table
 
-# Most evaluations for each goal where the study says none; and where designs are evaluated one by one.
+# Most evaluations for each goal where the study gives none, and where also designs are evaluated one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
-# Parts of them, at most: for the best of each goal, for the best in the others there, for the weighted sums of a round.
+# One in so many of all evaluations is spent at most on the best of each goal, on the ends of the front, and on the
+# weighted sums of a round.
 BEST_PART, END_PART, SUMS_PART = 6, 20, 10
-# Size of a population of two goals; generations that it is given of the evaluations that are left, at least; and
-# divisions of each goal by which more goals are spread.
+# Size of a population for two goals, the least number of its generations, and the size of the smallest population. More
+# than two goals are spread by directions that divide each goal into this many parts, by the number of goals; else the
+# last.
 POPULATION, GENERATIONS, SMALLEST_POPULATION = 50, 25, 8
 DIVISIONS = {3: 12, 4: 6, 5: 4}
 MOST_DIVISIONS = 3
-# Weight of the other goals at the end of one: of designs that are equal in it the best on the whole.
+# Weight of the other goals at the end of one goal, which chooses among designs that are equal in that goal.
 BESIDE = 1e-6
-# Weighted sums in a round.
+# Number of weighted sums in a round.
 WEIGHTED_SUMS = 12
-# Designs nearer to each other than this part of the front's extent are one: descents end with many that hardly differ;
-# of more than two goals, whose fronts are surfaces of many thousand designs.
+# Designs nearer to each other than this part of the front's extent count as one, as descents end with many that hardly
+# differ. With more than two goals the front is a surface of many thousand designs, and the distance is larger.
 DESIGN_DISTANCE, SURFACE_DISTANCE = 1e-4, 2e-3
-# A population is spread until the last quarter of its designs adds no more than this part of the hypervolume, looked at
-# after so many generations; rounds of spreading and filling end when one adds no more, too.
+# A population is spread until the last quarter of its designs adds less than this part of the hypervolume, which is
+# computed every so many generations. Rounds of spreading and filling end when a round adds less, too.
 LEAST_GROWTH, LOOKS = 2e-4, 20
-# A front whose last tenth of designs adds more than this part of its hypervolume still grows.
+# A front still grows if the last tenth of the evaluated designs adds more than this part of its hypervolume.
 STILL_GROWING = 1e-3
-# Distances on a front, in parts of its extent, at which designs midway between neighbours are evaluated: the widest is
-# halved down to the finest, which is wider for more goals; and how many cells apart neighbours are at most.
+# Designs midway between neighbours on a front are evaluated: neighbours at the widest distance, in parts of the front's
+# extent, then at half of that, down to the finest, by the number of goals or else the last. Neighbours are at most so
+# many cells of this width apart.
 WIDEST_GAP, FINEST_GAPS, FINEST_GAP = 0.25, {2: 1 / 256, 3: 1 / 32}, 1 / 8
 BESIDE_CELL = 1.5
-# Part of a front's extent below which values of a goal are equal.
+# Part of a front's extent up to which values of a goal count as equal.
 ROUNDING = 1e-8
-# Corner of the hypervolume, in parts of the way from each goal's best value on the front to its worst, and rows of it.
+# Corner of the hypervolume, in parts of the way from each goal's best value on the front to its worst, and the number
+# of rows of its table.
 CORNER, VOLUME_ROWS = 1.1, 10
 
 
@@ -59,7 +63,7 @@ def allowance(goals: int, *, alone: bool) -> int:
 
 
 def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool) -> None:
-    """Find the front: the best design of each goal, with what is best in the others there, then designs between.
+    """Search the front: its ends, each the best design of one goal, then designs between them.
 
     Parameters
     ----------
@@ -70,18 +74,21 @@ def search_front(explorer: Explorer, signs: Floats, seed: int, *, use_all: bool)
     """
     budget, goals = explorer.left, np.eye(len(signs))
     explorer.left = budget // BEST_PART
-    search(explorer, (signs > 0).tolist(), goals.tolist(), seed, use_all=False)
+    search(explorer, signs, goals.tolist(), seed, use_all=False)
     explorer.left += budget - budget // BEST_PART
-    _end(explorer, signs, budget // END_PART)
+    # The ends of the front: the best of each goal; the others count as far as that leaves them free.
+    _descend(explorer, signs, goals + BESIDE, budget // END_PART)
     for k in count():
         before = explorer.evaluated
         _spread(explorer, signs, seed + k)
-        _descend_between(explorer, signs, budget // SUMS_PART, seed + k)
+        # Between the ends weighted sums of the goals find designs where the front is convex.
+        weights = np.random.default_rng(seed + k).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
+        _descend(explorer, signs, weights, budget // SUMS_PART)
         _fill(explorer, signs)
         if explorer.evaluated == before or not (use_all or _grows(explorer.known, signs, before)):
             break
     if use_all:
-        # Of a population that is larger than what is left nothing was evaluated.
+        # The evaluations that are left are too few for a population.
         explorer(np.random.default_rng(seed).random((explorer.left, explorer.dimensions)))
 
 
@@ -97,7 +104,7 @@ def _front_rows(known: Known, signs: Floats) -> Ints:
 
 
 def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
-    """Spread a population along the front, begun in the widest gaps so far, by half of the evaluations left."""
+    """Spread a population along the front with half of the evaluations left, begun at the widest gaps of the front."""
     divisions = _divisions(len(signs))
     size = POPULATION if len(signs) == 2 else comb(divisions + len(signs) - 1, divisions)
     half = explorer.left // 2
@@ -112,21 +119,10 @@ def _spread(explorer: Explorer, signs: Floats, seed: int) -> None:
     explorer.reserve = 0
 
 
-def _end(explorer: Explorer, signs: Floats, most: int) -> None:
-    """Descend to the ends of the front, each goal's best; the others count as far as that one leaves them free."""
-    _descend(explorer, signs, np.eye(len(signs)) + BESIDE, most)
-
-
-def _descend_between(explorer: Explorer, signs: Floats, most: int, seed: int) -> None:
-    """Descend to designs between the ends by weighted sums of the goals, which find them where the front is convex."""
-    weights = np.random.default_rng(seed).dirichlet(np.ones(len(signs)), WEIGHTED_SUMS)
-    _descend(explorer, signs, weights, most)
-
-
 def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> None:
-    """Descend from the front by sums of the normalised goals with weights, shape (sums, goals).
+    """Descend from the front by weighted sums of the normalised goals; at most `most` designs are evaluated.
 
-    At most so many designs are evaluated.
+    `weights` are of shape (sums, goals).
     """
     known = explorer.known
     rows = _front_rows(known, signs)
@@ -145,7 +141,7 @@ def _descend(explorer: Explorer, signs: Floats, weights: Floats, most: int) -> N
 def _fill(explorer: Explorer, signs: Floats) -> None:
     """Evaluate designs midway between neighbours on the front, at finer and finer distances.
 
-    Designs on a front are as a rule those of a smooth surface: midway between two of them lies nearly another.
+    Designs of a front mostly lie on a smooth surface, so that midway between two of them is nearly another one.
     """
     from scipy.spatial import cKDTree
 
@@ -169,8 +165,8 @@ def _fill(explorer: Explorer, signs: Floats) -> None:
 def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) -> None:
     """Spread a population along the front, from points of shape (points, dimensions), while its hypervolume grows.
 
-    Of two goals by NSGA-II [Deb et al., 2002], of more by NSGA-III [Deb & Jain, 2014]. It ends with the evaluations,
-    too, and where the population brings nothing new.
+    With two goals by NSGA-II [Deb et al., 2002], with more by NSGA-III [Deb & Jain, 2014]. It also ends when the
+    evaluations are used up, or the population finds no new design.
     """
     goals, random = len(signs), np.random.default_rng(seed)
     # No more directions than members of the population.
@@ -184,7 +180,7 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
             order = survivors(known.values * signs, known.merit(np.zeros(goals)), directions, random)[: len(first)]
             rows = np.unique(np.concatenate([rows[order], explorer(offspring(known.u[order], random))]))
             if generation % LOOKS == 0:
-                # Where all designs are known, generations cost nothing and bring nothing.
+                # Where all designs are evaluated already, further generations find nothing.
                 if explorer.evaluated == before:
                     return
                 before = explorer.evaluated
@@ -193,17 +189,17 @@ def evolve_front(explorer: Explorer, signs: Floats, first: Floats, seed: int) ->
 
 
 def _grows(known: Known, signs: Floats, begun: int) -> bool:
-    """Whether what was evaluated since row `begun` brought more than the least part of the front's hypervolume."""
+    """Whether the designs evaluated since row `begun` added more than `LEAST_GROWTH` of the front's hypervolume."""
     rows = np.flatnonzero(known.feasible)
     before, last = volumes(known.values[rows] * signs, np.searchsorted(rows, [begun, len(known.u)]))[1]
     return bool(last - before > LEAST_GROWTH * last)
 
 
 def volumes(values: Floats, counts: Ints) -> tuple[Ints, Floats]:
-    """Sizes and hypervolumes of the fronts of the first so many rows of values, shape (designs, goals).
+    """Sizes and hypervolumes of the fronts of the first `counts` rows of values, shape (designs, goals).
 
-    Less is better. Hypervolumes are in units of the box between each goal's best value on the front of all rows and its
-    worst, and reach a tenth beyond it [Zitzler & Thiele, 1999]; 0 where there is no front.
+    Less is better. The unit of a hypervolume is the box between each goal's best and worst value on the front of all
+    rows; its corner is a tenth beyond that box [Zitzler & Thiele, 1999]. It is 0 where there is no front.
     """
     sizes, hypervolumes = np.zeros(len(counts), dtype=np.intp), np.zeros(len(counts))
     if not len(values):
@@ -213,7 +209,7 @@ def volumes(values: Floats, counts: Ints) -> tuple[Ints, Floats]:
     shares = (values - low) / np.where(span > 0, span, 1.0)
     rows, done = np.empty(0, dtype=np.intp), 0
     for k in np.argsort(counts, kind="stable").tolist():
-        # What another design surpassed once stays off the front.
+        # A design that another one surpasses never comes back to the front.
         rows = np.concatenate([rows, np.arange(done, counts[k])])
         rows, done = rows[front(shares[rows])], int(counts[k])
         sizes[k], hypervolumes[k] = len(rows), fronts.hypervolume(shares[rows], CORNER)
@@ -223,7 +219,7 @@ def volumes(values: Floats, counts: Ints) -> tuple[Ints, Floats]:
 def front(values: Floats) -> Ints:
     """Rows of values, shape (designs, goals), that no other surpasses, less being better; of equals the first."""
     rows = np.flatnonzero(fronts.front(values))
-    # Of designs that rounding alone tells apart in one goal the better ones in the others.
+    # Of designs that differ only by rounding in one goal, those that are better in the other goals.
     settled = np.round(normalised(values[rows]) / ROUNDING) if len(rows) else values
     unique = np.unique(settled, axis=0, return_index=True)[1]
     return np.sort(rows[unique[fronts.front(settled[unique])]])
@@ -236,7 +232,7 @@ def normalised(values: Floats) -> Floats:
 
 
 def distinct(values: Floats) -> Ints:
-    """Rows of a front, its ends among them, of which no two are as near in every goal as counts as one."""
+    """Rows of a front without designs that count as one; the ends of the front stay."""
     from scipy.spatial import cKDTree
 
     share = normalised(values)
@@ -301,7 +297,7 @@ class Front:
 
 def signs_of(designs: Designs) -> Floats:
     """1 for each goal that is minimised, -1 for one that is maximised."""
-    return np.array([1.0 if goal.smallest else -1.0 for goal in designs.goals])
+    return np.array([goal.sign for goal in designs.goals])
 
 
 def front_of(designs: Designs) -> Front:
@@ -315,13 +311,14 @@ def front_of(designs: Designs) -> Front:
 
 
 def optima(designs: Designs, pareto_front: Front, typed: Floats) -> Designs:
-    """The designs with the optima of their front: its knee, its ends, and those of the weights that the study types.
+    """The designs with the optima of their front: its knee, its ends, and the best for the study's own weights.
 
     The weights of the knee are the factors of the goals in the plane from which it is the farthest.
 
     Parameters
     ----------
     typed : ndarray, shape (rows, goals)
+        The study's own weights.
     """
     inside = designs.values[designs.feasible]
     ranges, spans = np.ptp(inside, axis=0), np.ptp(pareto_front.values, axis=0)
@@ -345,7 +342,7 @@ def doubts(growth: Table, evaluations: int) -> Iterator[Caution]:
 
 
 def growth_table(designs: Designs) -> Table:
-    """Hypervolume of the front after so many designs, and how it grew."""
+    """Hypervolume of the front by the number of designs, and its growth."""
     rows = np.flatnonzero(designs.feasible)
     counts = np.unique(np.linspace(0, len(designs), VOLUME_ROWS + 1)[1:].astype(int))
     earlier = counts - counts // 10

@@ -1,4 +1,4 @@
-"""Thousands of designs at once: tables with as many rows of each, and how far their poses are from assembling."""
+"""Thousands of designs at once: tables with the same number of rows for each, and the poses' margins of assembly."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from mechdesign.analyses.kinematics.targets import followed
 from mechdesign.analyses.poses import SolvedPoses, alike, study_poses
 from mechdesign.analyses.reliability import analysis as reliability
 from mechdesign.analyses.stiffness import analysis as stiffness
+from mechdesign.analyses.stiffness.body import ask
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
@@ -49,11 +50,11 @@ class Stack(NamedTuple):
     reason : int8 array, shape (designs, poses)
         See `mechdesign.mechanism.Reason`.
     whole : bool array, shape (designs,)
-        Whether the motion has no gap between the poses, as far as they are those of one.
+        Whether the motion has no gap between the poses; True where poses are no motion.
     along : Along, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
-        The poses, where the command solves them as they are; else empty.
+        The solved poses of a motion; else empty.
     """
 
     result: Result
@@ -64,7 +65,7 @@ class Stack(NamedTuple):
 
 
 def complete(study: Study, command: str) -> bool:
-    """Whether these tables are all of a command's answer that costs much: not where methods sample."""
+    """Whether `TABLES` has all costly tables of a command's answer: not where methods sample."""
     return command != "reliability" or (
         study.reliability is not None and set(study.reliability.methods) == {"analytic"}
     )
@@ -73,13 +74,13 @@ def complete(study: Study, command: str) -> bool:
 def shared(study: Study, command: str, names: Collection[str]) -> bool:
     """Whether designs that differ in parameters or places share one mechanism and one set of sections.
 
-    They do not where what differs decides how the mechanism is put together: each is a study of its own then.
+    They do not where a parameter decides the structure of the mechanism; each design is then a study of its own.
     """
     if remeasured(study, names):
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
-    asked = [each for each in (getattr(study, command), study.kinematics) if each is not None]
-    return not any(each.at_nodes for each in asked) and not any(
+    asked = [section for section in (getattr(study, command), study.kinematics) if section is not None]
+    return not any(section.at_nodes for section in asked) and not any(
         study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
     )
 
@@ -87,9 +88,9 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
 def grouped(
     designs: Designs, command: str, rows: Ints, failed: Callable[[Ints, MechdesignError], None]
 ) -> Iterator[tuple[Ints, Study, Poses]]:
-    """Some designs in groups that share a study and have as many poses: their rows, the study, and the poses.
+    """Designs in groups that share a study and have the same number of poses: rows, study and poses of each group.
 
-    `failed` is told of designs whose numbers make no study or no poses.
+    `failed` is called with the designs whose numbers make no study or no poses.
     """
     if shared(designs.study, command, designs.changed):
         for some in alike(designs, command, rows):
@@ -142,7 +143,7 @@ def tables(
     elif command == "reliability":
         found, reason = reliability.first_order_tables(study, poses, wanted)
     else:
-        body = stiffness.ask(study)
+        body = ask(study)
         held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
         found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
@@ -152,14 +153,14 @@ def tables(
 def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:
     """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
 
-    Squares of lengths and angles in radians, smooth in the dimensions; nan where what comes before does not assemble.
-    `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
+    They are squares of lengths, or angles in radians, smooth in the dimensions; nan where a group before does not
+    assemble. `solved` are the poses as `mechdesign.analyses.poses.solve_poses` gives them.
     """
-    return np.concatenate([_margins(study.mechanism, each).reshape(poses.designs, -1) for each in solved], axis=1)
+    return np.concatenate([_margins(study.mechanism, part).reshape(poses.designs, -1) for part in solved], axis=1)
 
 
 def shortfall(margins: Floats) -> Floats:
-    """By how much designs miss their margins together, shape (designs,): each counts from 0 to 1, nan as 1."""
+    """Sum of the missed margins of designs, shape (designs,): each counts from 0 to 1, nan as 1."""
     missed = np.maximum(-margins, 0.0)
     return np.asarray(np.where(np.isnan(missed), 1.0, missed / (1.0 + missed)).sum(axis=1))
 
@@ -179,5 +180,5 @@ def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
             for bound in mechanism.bounds
             for _, margin in bound.margins(configuration, places)
         ]
-    columns = [np.broadcast_to(np.asarray(each, dtype=float), configuration.shape) for each in found]
+    columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in found]
     return np.stack(columns, axis=1) if columns else np.empty((*configuration.shape, 0))

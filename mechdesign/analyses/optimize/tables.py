@@ -14,17 +14,18 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-# Best designs that are listed for each row of weights, and how far apart they are in parts of each variable's range.
+# Number of best designs that are listed for each row of weights, and their least distance in parts of a variable's
+# range.
 MAX_BEST = 10
 BEST_DISTANCE = 0.05
-# How near a bound is at it, as a fraction of the variable's range, or of a condition's bound.
+# Distance from a bound up to which a design is at it, as a fraction of the variable's range, or of a condition's bound.
 AT_BOUND = 1e-4
-# Part of the mechanism's size below which the place of a shape is zero.
+# Part of the mechanism's size below which a coordinate of a shape's place is rounding error.
 PLACE_ROUNDING = 1e-9
 
 
 def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
-    """The best design for each row of weights; `places` are where each lets a shape lie that it is to contain."""
+    """The best design for each row of weights; `places` are those of the shapes that its workspace contains."""
     study, rows, variables = designs.study, designs.winners, designs.variables
     scores = [designs.score(row)[winner] for row, winner in zip(designs.weights, rows, strict=True)]
     parameters = {name: column[rows] for name, column in variables.items() if name in study.parameters.nominal}
@@ -38,7 +39,7 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
     centre_of, parameter = OPTIMUM["x of <shape>"], OPTIMUM["<parameter>"]
     return OPTIMUM.table([
         *OPTIMUM.columns({}, **marks),
-        *(OPTIMUM["w_<goal>"].column(column, goal=each.name) for each, column in weights),
+        *(OPTIMUM["w_<goal>"].column(column, goal=goal.name) for goal, column in weights),
         *designs.columns(rows),
         *(centre_of.column(_settled(study, part(centre)), length, f"{axis} of <shape>", shape=name)
           for name, centre in places.items() for axis, part in (("x", np.real), ("y", np.imag))),
@@ -49,7 +50,7 @@ def optimum_table(designs: Designs, places: Mapping[str, Complexes]) -> Table:
 
 
 def _settled(study: Study, places: Floats) -> Floats:
-    """Places without what rounding leaves of zero."""
+    """Places whose rounding errors about zero are removed."""
     return np.where(np.abs(places) < PLACE_ROUNDING * study.mechanism.size, 0.0, places)
 
 
@@ -60,7 +61,7 @@ def designs_table(designs: Designs) -> Table:
 
 
 def nearest_table(designs: Designs, row: int) -> Table:
-    """What a design that is not feasible has of each condition, and what it misses."""
+    """The value of each condition of an infeasible design, and by how much it misses the bound."""
     if word := designs.words[designs.codes[row]]:
         found = [(word, np.nan, np.nan, designs.shortfall[row], "")]
     else:
@@ -98,7 +99,7 @@ def bounds_table(designs: Designs) -> Table:
 
 
 def best_table(designs: Designs) -> Table:
-    """The best designs for each row of weights, of which none is next to a better one."""
+    """The best designs for each row of weights, without those next to a better one."""
     section = designs.study.optimize
     step = steps(designs.study, {name: column[designs.winners] for name, column in designs.variables.items()})
     gridded = section is not None and section.method == "grid"
@@ -112,7 +113,7 @@ def best_table(designs: Designs) -> Table:
             chosen.append((row + 1, rank + 1, k, float(score[k])))
             near = np.ones(len(score), dtype=bool)
             for name, column in designs.variables.items():
-                # Another choice is another design.
+                # Designs with another choice are never next to each other.
                 apart = 0.0
                 if name in step:
                     apart = max(BEST_DISTANCE * float(np.ptp(column)), gridded * float(step[name][row]) * (1 + 1e-6))
@@ -125,9 +126,9 @@ def best_table(designs: Designs) -> Table:
 
 
 def _active(designs: Designs) -> NDArray[np.object_]:
-    """Which bounds and conditions each optimum lies at, in words: ``l_a from, workspace.area at least 4``.
+    """Bounds and conditions at which each optimum lies, in words: ``l_a from, workspace.area at least 4``.
 
-    On a grid an upper bound holds a design that it leaves no further step.
+    On a grid a design is at the upper bound if no further step fits below it.
     """
     study, rows = designs.study, designs.winners
     assert study.optimize is not None

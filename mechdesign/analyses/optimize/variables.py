@@ -1,12 +1,12 @@
 """Design variables, whose bounds may depend on each other: their grid, their map to the unit cube, and their studies.
 
-A design is a number of each variable; of a variable whose choices are no numbers that is the number of the choice.
+A design is a number for each variable; for a variable whose choices are words it is the number of the choice.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from mechdesign.study.designs import variant
 from mechdesign.study.schema.variable import Variable, plainly
 from mechdesign.study.variants import entry_unit, faults, with_entries
 
-# A step that ends this little (as a fraction of it) beyond the bound is still taken, as in sweeps.
+# Fraction of a step by which the last step may end beyond the bound, as in sweeps.
 BOUND_ROUNDING = 1e-9
 MAX_DESIGNS = 50_000_000
 
@@ -39,15 +39,10 @@ def ranges(study: Study) -> list[str]:
     return [name for name, variable in variables_of(study).items() if variable.choices is None]
 
 
-def stepped(study: Study) -> Flags:
-    """Which variables have nothing between their values, shape (variables,): whole numbers and choices."""
-    return np.array([variable.stepped for variable in variables_of(study).values()])
-
-
 def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats]:
-    """Bounds of a range where the variables above it have these values; each of shape (count,).
+    """Bounds of a range, which may follow the variables above it in `designs`; each of shape (count,).
 
-    Those of whole numbers are the first and the last between the bounds given.
+    For a whole number they are the first and the last whole number within the given bounds.
     """
     variable = variables_of(study)[name]
     assert variable.from_ is not None
@@ -65,7 +60,7 @@ def bounds(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats,
 def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats, Floats, Floats]:
     """First value, step and number of values of a variable that has steps, each of shape (count,).
 
-    Of choices they number the choices. The number is 0 where no value lies between the bounds.
+    For choices they are the numbers of the choices. The number of values is 0 where none lies between the bounds.
     """
     variable = variables_of(study)[name]
     if variable.choices is not None:
@@ -82,33 +77,36 @@ def _spaced(study: Study, designs: Batch, name: str, count: int) -> tuple[Floats
 
 
 def _valued(variable: Variable, numbers: Floats) -> Floats:
-    """Values of a variable by what `_spaced` numbers them."""
+    """Values of a variable from the numbers of `_spaced`."""
     if variable.choices is None or not variable.numeric:
         return numbers
     return np.array(variable.choices, dtype=float)[numbers.astype(np.intp)]
 
 
-def from_cube(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags]:
-    """Designs at points of the unit cube, and which of them have a value for every variable.
+class CubeDesigns(NamedTuple):
+    """Designs at points of the unit cube.
 
     Parameters
     ----------
+    designs : dict of str to ndarray
+        Value of each variable.
+    given : ndarray of bool, shape (designs,)
+        Which designs have a value for every variable.
     u : ndarray, shape (designs, variables)
-        Fractions of the way from each lower bound to the upper one; whole numbers and choices have equal shares of it.
+        The points, moved to the middle of the shares of whole numbers and choices: two points of one design are equal.
     """
-    return _placed(study, u)[:2]
+
+    designs: dict[str, Floats]
+    given: Flags
+    u: Floats
 
 
-def snapped(study: Study, u: Floats) -> Floats:
-    """Points of the unit cube, shape (designs, variables), in the middle of the shares of whole numbers and choices.
+def from_cube(study: Study, u: Floats) -> CubeDesigns:
+    """Designs at points of the unit cube, shape (designs, variables).
 
-    Points that are the same design are the same point then.
+    A point has fractions of the way from each lower bound to the upper one; whole numbers and choices have equal shares
+    of that way.
     """
-    return _placed(study, u)[2]
-
-
-def _placed(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags, Floats]:
-    """See `from_cube` and `snapped`."""
     designs: dict[str, Floats] = {}
     given, middle = np.ones(len(u), dtype=bool), u.copy()
     for k, (name, variable) in enumerate(variables_of(study).items()):
@@ -123,10 +121,10 @@ def _placed(study: Study, u: Floats) -> tuple[dict[str, Floats], Flags, Floats]:
             low, high = bounds(study, designs, name, len(u))
             well = np.isfinite(low) & np.isfinite(high) & (high >= low)
             low, high = np.where(well, low, 0.0), np.where(well, high, 0.0)
-            # The upper bound itself, not what rounding makes of it.
+            # At the upper bound exactly, without rounding error.
             designs[name] = np.where(share == 1, high, low + share * (high - low))
         given &= well
-    return designs, given, middle
+    return CubeDesigns(designs, given, middle)
 
 
 def grid(study: Study) -> dict[str, Floats]:
@@ -154,7 +152,7 @@ def grid(study: Study) -> dict[str, Floats]:
 
 
 def steps(study: Study, at: Batch) -> dict[str, Floats]:
-    """A step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range there."""
+    """The step of each range at some designs: of the grid or of whole numbers, else a hundredth of the range."""
     found = {}
     for name in ranges(study):
         variable = variables_of(study)[name]
@@ -179,9 +177,9 @@ def unit_of(study: Study, name: str) -> str:
 
 
 def entry_of(study: Study, name: str, value: float | str) -> tuple[str, Any]:
-    """The entry that a value of a variable changes, by the name that ``--set`` takes, and what stands there then.
+    """The entry that a variable changes, by the name that ``--set`` takes, and its value there.
 
-    The value is a number, or the word of a choice.
+    `value` is a number, or the word of a choice.
     """
     variable = variables_of(study)[name]
     own = f"mechanism.parameters.{name}" if name in study.parameters.nominal else name
@@ -206,7 +204,7 @@ def parted(study: Study, design: Design) -> tuple[Study, dict[str, float]]:
 
 
 def study_of(study: Study, design: Design) -> Study:
-    """The study of a design; see `mechdesign.study.designs.Designs.one` of what it raises."""
+    """The study of a design; raises as `mechdesign.study.designs.Designs.one`."""
     return variant(*parted(study, design))
 
 
@@ -216,10 +214,10 @@ def check_choices(study: Study) -> None:
     Raises
     ------
     StudyError
-        Where the entry itself is wrong then, every mistake in one go; what is wrong only together with other choices
-        is the reason of an infeasible design.
+        Where the entry itself is wrong, every mistake in one go. A mistake that needs several choices makes a design
+        infeasible.
     """
-    # As they are written, for their units must fit.
+    # Choices are tried as they are written: the units must fit the entry.
     choices = {
         name: study.resolved["optimize"]["variables"][name]["choices"]
         for name, variable in variables_of(study).items()

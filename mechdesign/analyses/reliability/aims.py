@@ -8,7 +8,6 @@ better.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -30,14 +29,14 @@ _LEAST_FAILURE = 1e-300
 _LEAST_DISTANCE = 1e-6
 # Expected failures among the study's samples from which on plain Monte Carlo confirms a reliability.
 _ENOUGH_FAILURES = 100
-# Probability of failure assumed at most where a simulation saw no failure, as a share of the target.
+# Largest probability of failure that is assumed where no sample failed, as a share of the target.
 _UNSEEN = 0.01
 # Bisection steps in the search of a standard deviation.
 _HALVINGS = 60
 
 
 class Simulated(NamedTuple):
-    """Simulated measures and the worse and better end of their 99.7 % intervals, shape (limits, poses).
+    """Simulated measures, and the worse and the better end of their 99.7 % intervals, shape (limits, poses).
 
     `unseen` marks poses without a failed sample; `evaluations` are the mechanisms solved at each pose.
     """
@@ -50,99 +49,63 @@ class Simulated(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Aim(ABC):
-    """The target of an allocation, as a measure."""
+class Reliable:
+    """A reliability of all limits together; the measure is the probability of failure, `asked` that of the target."""
 
     asked: float
-
-    noun: ClassVar[str]
-
-    @abstractmethod
-    def level(self, measure: Number) -> Floats:
-        """Logarithms of distances from the limits, in standard deviations."""
-
-    @abstractmethod
-    def measure(self, level: Number) -> Floats:
-        """The inverse of `level`."""
-
-    @abstractmethod
-    def shown(self, measure: Floats) -> Floats:
-        """The measure as tables have it: a reliability or a Cpk."""
-
-    @abstractmethod
-    def in_words(self, measure: float) -> str:
-        """The same for a message."""
-
-    @abstractmethod
-    def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
-        """Measures by the linear model of the errors and that of the margins of assembly, shape (limits, poses)."""
-
-    @abstractmethod
-    def method(self, task: Task, section: ReliabilitySection) -> str:
-        """The simulation method that confirms the target."""
-
-    @abstractmethod
-    def simulate(self, task: Task, method: str) -> Simulated:
-        """Measures at the settings of a task by a simulation method."""
-
-    @abstractmethod
-    def safe(self, simulated: Simulated) -> Floats:
-        """Measures on the safe side of the simulated ones, from which the model's target is corrected."""
-
-    @abstractmethod
-    def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
-        """Largest standard deviation of an error of mean 0 that reaches `level` within [low, high]; 0 where none does.
-
-        Where several limits have to be kept together, each of them alone has to reach the level, too.
-        """
-
-
-class Reliable(Aim):
-    """A probability of failure: of all limits together, by pose."""
-
-    noun = "reliability"
+    noun: ClassVar[str] = "reliability"
 
     def level(self, measure: Number) -> Floats:
-        """Log of the distance, in standard deviations, of symmetric limits broken with this probability."""
+        """Logarithm of the distance, in standard deviations, of symmetric limits broken with this probability."""
         from scipy.special import ndtri
 
         return np.log(np.maximum(-ndtri(0.5 * np.maximum(measure, _LEAST_FAILURE)), _LEAST_DISTANCE))
 
     def measure(self, level: Number) -> Floats:
+        """The inverse of `level`."""
         from scipy.special import ndtr
 
         return np.asarray(2.0 * ndtr(-np.exp(level)))
 
     def shown(self, measure: Floats) -> Floats:
+        """The measure as tables have it: the reliability."""
         return 1.0 - measure
 
     def in_words(self, measure: float) -> str:
-        """The reliability with enough digits to differ from 1."""
+        """The measure as messages have it: the reliability with enough digits to differ from 1."""
         digits = 6 if measure <= 0 else max(6, math.ceil(-math.log10(measure)) + 3)
         return f"{1.0 - measure:.{digits}f}".rstrip("0").rstrip(".")
 
     def by_model(self, question: ReliabilityQuestion, linear: FirstOrder, closing: FirstOrder) -> Floats:
+        """Measures by the linear model of the errors and that of the margins of assembly, shape (limits, poses)."""
         # SciPy takes a quarter of a second to import, and a study without limits does not need it.
         from mechdesign.analyses.reliability.probability import made_failure
 
         return made_failure(linear, closing, question.bands, question.discs)[None]
 
     def method(self, task: Task, section: ReliabilitySection) -> str:
+        """The simulation method that confirms the target."""
         return "auto" if "auto" in section.methods or task.samples * self.asked < _ENOUGH_FAILURES else "monte_carlo"
 
     def simulate(self, task: Task, method: str) -> Simulated:
+        """Measures at the settings of a task by a simulation method."""
         result = methods.run(method, task)
         estimates = [result.estimates[setting.pose] for setting in task.settings]
         value, low, high = (np.array([[getattr(e, name) for e in estimates]]) for name in ("failure", "low", "high"))
         return Simulated(value, high, low, value == 0, [e.evaluations for e in estimates])
 
     def safe(self, simulated: Simulated) -> Floats:
-        # Where few failures are seen, or none, the interval's end keeps the correction on the safe side.
+        """Measures no better than the simulated ones, from which the model's target is corrected."""
+        # With few failures, or none, the end of the interval is used.
         few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.asked)
         seen = np.where(few, simulated.worst, simulated.value)
         return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.asked), seen)
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
+        """Largest standard deviation of an error of mean 0 that reaches `level` within [low, high]; 0 where none does.
+
+        Limits that have to be kept together reach a level only if each of them alone does.
+        """
         from mechdesign.numerics.statistics import outside
 
         allowed = self.measure(level)
@@ -156,13 +119,15 @@ class Reliable(Aim):
         return np.where((low < 0) & (high > 0), np.exp(most), 0.0)
 
 
-class Capable(Aim):
-    """A Cpk, of each limit by itself, by pose [ISO 22514]."""
+@dataclass(frozen=True)
+class Capable:
+    """A Cpk of each limit by itself [ISO 22514]; methods are those of `Reliable`."""
 
-    noun = "Cpk"
+    asked: float
+    noun: ClassVar[str] = "Cpk"
 
     def level(self, measure: Number) -> Floats:
-        """Log of the distance of the nearer limit."""
+        """Logarithm of the distance of the nearer limit, in standard deviations."""
         return np.log(np.maximum(3.0 * np.asarray(measure), _LEAST_DISTANCE))
 
     def measure(self, level: Number) -> Floats:
@@ -196,6 +161,9 @@ class Capable(Aim):
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         return np.maximum(np.minimum(high, -low), 0.0) / np.exp(level)
+
+
+Aim = Reliable | Capable
 
 
 def aim_of(allocate: Allocate) -> Aim:

@@ -27,14 +27,14 @@ from mechdesign.study.variants import rewritten
 
 # Most rounds of allocation and simulation.
 _MAX_ROUNDS = 14
-# Least share by which a correction shortens the bracket of the model's target.
+# Least share by which a correction narrows the bracket of the model's target.
 _BRACKET_PART = 0.1
 # Coefficient of variation to which `auto` confirms failures, where the study gives no precision.
 _PRECISION = 0.1
 # Distance between a pose's level and the model's target up to which its constraint is active.
 _ACTIVE = 1e-3
-# Largest step by which a round lowers the target level of grades: with the next choice the difference between
-# simulation and model may be smaller.
+# Largest step by which a round lowers the target level of grades, as the next choice may have a smaller difference
+# between simulation and model.
 _LEVEL_STEP = 0.1
 # Relative difference up to which costs are equal.
 _SAME = 1e-9
@@ -245,31 +245,33 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
 
 
 def _allocation(last: _Round) -> Table:
-    found, given = last.model.tolerances, [tolerance.given for tolerance in last.model.tolerances]
-    sizes = [tolerance.size(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)]
-    prices = [np.array([tolerance.price(size) for tolerance, size in zip(found, widths, strict=True)])
+    rows = last.model.tolerances
+    given = [tolerance.given for tolerance in rows]
+    sizes = [tolerance.size(scale) for tolerance, scale in zip(rows, last.scales.tolist(), strict=True)]
+    prices = [np.array([tolerance.price(size) for tolerance, size in zip(rows, widths, strict=True)])
               for widths in (given, sizes)]  # fmt: skip
-    names = np.array([tolerance.grade(scale) for tolerance, scale in zip(found, last.scales.tolist(), strict=True)])
+    names = np.array([tolerance.grade(scale) for tolerance, scale in zip(rows, last.scales.tolist(), strict=True)])
     return ALLOCATION.table(ALLOCATION.columns(
-        {}, source=np.array([tolerance.name for tolerance in found]),
-        kind=np.array([tolerance.kind for tolerance in found]), given=np.array(given), allocated=np.array(sizes),
-        unit=np.array([tolerance.unit for tolerance in found]), **({"grade": names} if last.model.steps else {}),
+        {}, source=np.array([tolerance.name for tolerance in rows]),
+        kind=np.array([tolerance.kind for tolerance in rows]), given=np.array(given), allocated=np.array(sizes),
+        unit=np.array([tolerance.unit for tolerance in rows]), **({"grade": names} if last.model.steps else {}),
         cost_given=prices[0], cost_allocated=prices[1],
         share=_shares(last.model, last.scales)[_worst(last.model.aim.level(last.analytic))[1]],
     ))  # fmt: skip
 
 
 def _confirmation(last: _Round) -> Table:
-    aim, said, task = last.model.aim, last.simulated, last.model.task
+    aim, simulated, task = last.model.aim, last.simulated, last.model.task
     # The worst limit at each pose.
-    place = np.argmin(aim.level(said.value), axis=0), np.arange(len(task.settings))
+    place = np.argmin(aim.level(simulated.value), axis=0), np.arange(len(task.settings))
     value, worst, best, analytic, target = (
-        aim.shown(part[place]) for part in (said.value, said.worst, said.best, last.analytic, aim.measure(last.wanted))
+        aim.shown(part[place])
+        for part in (simulated.value, simulated.worst, simulated.best, last.analytic, aim.measure(last.wanted))
     )
     poses = at_poses(task, np.array([setting.pose for setting in task.settings]))
     return CONFIRMATION.table(poses + CONFIRMATION.columns(
         {}, asked=aim.shown(np.full(len(value), aim.asked)), target=target, analytic=analytic, simulated=value,
-        low=worst, high=best, method=np.full(len(value), last.method), evaluations=said.evaluations,
+        low=worst, high=best, method=np.full(len(value), last.method), evaluations=simulated.evaluations,
         met=np.logical_not(last.missed().any(axis=0)),
     ))  # fmt: skip
 

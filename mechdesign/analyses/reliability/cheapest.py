@@ -147,7 +147,8 @@ class ToleranceModel:
     def reached(self, scales: Floats, which: Sequence[int]) -> Floats:
         """Measures by the linear model at some of the task's settings, shape (limits, settings).
 
-        Of `scales` of shape (sources, choices) those of the first choice at all settings come first, then the next's.
+        With `scales` of shape (sources, choices), measures of the first choice at all settings come first, then the
+        next.
         """
         poses = np.array([self.task.settings[k].pose for k in which])
         many = scales.shape[1] if scales.ndim > 1 else 1

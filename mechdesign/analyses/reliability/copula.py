@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.reliability.laws import Marginal, Normal, taken
+from mechdesign.analyses.reliability.laws import Marginal, Normal, at_rows
 from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
@@ -55,7 +55,7 @@ class Correlation:
         # All poses of a design, and often all designs, share the numbers: each distinct set is computed once.
         _, first, inverse = np.unique(np.stack(numbers), axis=1, return_index=True, return_inverse=True)
         distinct = [Correlation._of([law.take(row) for law in laws],
-                                    {pair: float(taken(value, row)) for pair, value in pairs.items()})
+                                    {pair: float(at_rows(value, row)) for pair, value in pairs.items()})
                     for row in first]  # fmt: skip
         rows = inverse.ravel()
         return Correlation(

@@ -22,11 +22,11 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.work.chunks import map_chunks
 
-# Ends the name of this module's streams of random numbers, the only ones of four numbers.
+# End of the names of this module's streams of random numbers, the only names of four numbers.
 _STREAM = (3, 0)
-# Mechanisms times poses of a chunk: about a second's work, so that an interrupt takes effect soon.
+# Mechanisms times poses of a chunk: about a second of work, so that an interrupt takes effect soon.
 _CHUNK_WORK = 1_500_000
-# Least mechanisms of a chunk.
+# Least number of mechanisms of a chunk.
 _CHUNK_LEAST = 200
 
 

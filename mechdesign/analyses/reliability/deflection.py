@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.analyses.reliability.question import Channel
-from mechdesign.analyses.stiffness.analysis import Body
+from mechdesign.analyses.stiffness.body import Body, ask, by_forces
 from mechdesign.analyses.stiffness.elements import corners_of
 from mechdesign.cautions import Caution
 from mechdesign.mechanism import Configuration, Mechanism
@@ -122,8 +122,6 @@ class Elasticity:
 
     def _rates(self, configuration: Configuration, asked: Body) -> tuple[Rates, Flags]:
         """Displacements by unit loads, which are the leading axis, and whether poses hold them."""
-        from mechdesign.analyses.stiffness.analysis import by_forces
-
         loaded = by_forces(asked, configuration)
         moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
         origin = configuration.point(asked.given.at)
@@ -151,13 +149,12 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
-    section, stiffness = study.reliability, study.stiffness
-    assert section is not None
-    section = section if poses is None else poses.section(section)
+    stiffness, poses = study.stiffness, Poses.single({}) if poses is None else poses
+    assert study.reliability is not None
     if stiffness is None:
         return None, []
-    resolved = stiffness if poses is None else poses.section(stiffness)
-    loads = resolved.loads if section.load is None else (section.load,)
+    section = poses.section(study.reliability)
+    loads = poses.section(stiffness).loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:
         notes.append(Caution(
@@ -168,10 +165,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
-    from mechdesign.analyses.stiffness.analysis import ask
-
-    asked, mechanism = ask(study), study.mechanism
-    asked = asked if poses is None else asked.at(poses, np.arange(poses.count))
+    asked, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
     network, graph, links = asked.network, mechanism.graph, mechanism.description.links
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
@@ -183,7 +177,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
         elif len(corners) == 2 and carried.keys() >= {*corners}:
             lines[link] = corners[0][1], corners[1][1]
         ends |= carried
-    # The ground's vertex where the ground has the point, else the first link's.
+    # A point named without its link is the ground's where the ground has it, else that of the first link.
     pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
     if stiffness.at == stiffness.point:
         pins[graph.node(stiffness.at)] = (network.asked,)
@@ -195,7 +189,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
 
 
 def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
-    """Warnings that name channels whose deflection is not known, and those that could be understood in two ways."""
+    """Warnings of channels whose deflection is not known, or whose name could mean two points or angles."""
     positions = [channel for channel in channels if channel.order == 0]
     warnings = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]

@@ -1,17 +1,16 @@
-"""Laws (distributions) of deviations from nominal, and of the places of pins in their holes.
+"""Laws (distributions) of deviations from nominal.
 
-Every law maps standard normal variables onto deviations or places, so that all methods share one space of independent
-standard normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
+Every law maps a standard normal variable onto a deviation, so that all methods share one space of independent standard
+normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -38,6 +37,17 @@ def _normal_quantile(share: Floats | float) -> Floats:
     return np.atleast_1d(ndtri(share))
 
 
+def normal_within(radius: float, rng: np.random.Generator, dimension: int, count: int) -> Floats:
+    """Standard normal points, shape (dimension, count), drawn again where they are farther from zero than `radius`."""
+    points = rng.standard_normal((dimension, count))
+    outside = np.flatnonzero((points * points).sum(axis=0) > radius * radius)
+    while len(outside):
+        again = rng.standard_normal((dimension, len(outside)))
+        points[:, outside] = again
+        outside = outside[(again * again).sum(axis=0) > radius * radius]
+    return points
+
+
 @dataclass(frozen=True)
 class Marginal(ABC):
     """The law of one deviation from its nominal value. For the first-order analysis its numbers may be arrays of poses.
@@ -62,7 +72,9 @@ class Marginal(ABC):
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
         """The law at these poses."""
-        return replace(self, low=taken(self.low, rows), high=taken(self.high, rows), nominal=taken(self.nominal, rows))
+        return replace(
+            self, low=at_rows(self.low, rows), high=at_rows(self.high, rows), nominal=at_rows(self.nominal, rows)
+        )
 
     @property
     def mean(self) -> Number:
@@ -106,8 +118,8 @@ class Marginal(ABC):
         return replace(self, low=factor * self.low, high=factor * self.high, nominal=factor * self.nominal)
 
 
-def taken(value: Number, rows: Sequence[int] | Ints) -> Number:
-    """A number at these poses; the number itself where it is the same at all poses."""
+def at_rows(value: Number, rows: Any) -> Number:
+    """A number at these poses (an index of the array of poses); the number itself where it is the same at all poses."""
     return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
 
 
@@ -148,13 +160,7 @@ class TruncatedNormal(Marginal):
     fourth = 3.0 * second - SIGMAS**2 * _TAIL
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        drawn = rng.standard_normal(count)
-        outside = np.flatnonzero(np.abs(drawn) > SIGMAS)
-        while len(outside):
-            again = rng.standard_normal(len(outside))
-            drawn[outside] = again
-            outside = outside[np.abs(again) > SIGMAS]
-        return np.asarray(self.mean + self.sigma * drawn)
+        return np.asarray(self.mean + self.sigma * normal_within(SIGMAS, rng, 1, count)[0])
 
     def at(self, u: Floats) -> Floats:
         from scipy.special import ndtri
@@ -286,7 +292,7 @@ class Beta(Marginal):
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
         a, b = self.shape
-        return replace(super().take(rows), shape=(taken(a, rows), taken(b, rows)))
+        return replace(super().take(rows), shape=(at_rows(a, rows), at_rows(b, rows)))
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:
@@ -365,137 +371,4 @@ LAWS: dict[str, type[Marginal]] = {
     "triangular": Triangular,
     "lognormal": Lognormal,
     "beta": Beta,
-}
-
-
-@dataclass(frozen=True)
-class PinLaw:
-    """Law of a pin's place in its hole for a radial clearance of 1, isotropic [S2, eqs. 6, 12, 13].
-
-    Parameters
-    ----------
-    variance, fourth : float
-        E[x^2] and E[x^4] of each coordinate.
-    stretch : callable
-        Ratio of the pin's offset to the length of two standard normal variables, from half that length squared.
-    """
-
-    variance: float
-    fourth: float
-    draw: Callable[[np.random.Generator, int], tuple[Floats, Floats]]
-    stretch: Callable[[Floats], Floats]
-
-    @property
-    def mixed(self) -> float:
-        """E[x^2 y^2]."""
-        return self.fourth / 3.0
-
-    def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """The place, in the direction (u, v), at values of two independent standard normal variables."""
-        ratio = self.stretch(0.5 * (u * u + v * v))
-        return ratio * u, ratio * v
-
-
-# Half the squared radius, in standard deviations, at which a normal pin of sigma 1/3 reaches the unit circle.
-_CUT = 4.5
-# Probability of the normal law outside the circle.
-_OUTSIDE = math.exp(-_CUT)
-
-
-def _normal(rng: np.random.Generator, count: int, cut: float = math.inf) -> tuple[Floats, Floats]:
-    """Normal places of sigma 1/3, drawn again where half the squared radius is beyond `cut`."""
-    x, y = rng.standard_normal((2, count))
-    outside = np.flatnonzero(x * x + y * y > 2.0 * cut) if math.isfinite(cut) else np.zeros(0, dtype=np.intp)
-    while len(outside):
-        again_x, again_y = rng.standard_normal((2, len(outside)))
-        x[outside], y[outside] = again_x, again_y
-        outside = outside[again_x * again_x + again_y * again_y > 2.0 * cut]
-    x *= 1.0 / 3.0
-    y *= 1.0 / 3.0
-    return x, y
-
-
-def _turned(rng: np.random.Generator, count: int, *, inside: bool) -> tuple[Floats, Floats]:
-    """Places uniform in the disc, or on its rim."""
-    radius = np.sqrt(rng.random(count)) if inside else 1.0
-    angle = rng.random(count)
-    angle *= 2.0 * np.pi
-    return radius * np.cos(angle), radius * np.sin(angle)
-
-
-def _stretch(squared: Callable[[Floats], Floats]) -> Callable[[Floats], Floats]:
-    """`PinLaw.stretch` from the squared offset as a function of half the squared length; a floor avoids 0/0."""
-
-    def ratio(half: Floats) -> Floats:
-        half = np.maximum(half, 1e-290)
-        return np.asarray(np.sqrt(squared(half) / (2.0 * half)))
-
-    return ratio
-
-
-def _squared_in_disc(half: Floats) -> Floats:
-    # P(offset > s) = (exp(-9 s^2/2) - outside)/(1 - outside) is that of the Rayleigh variable, exp(-half).
-    return -np.log1p((1.0 - _OUTSIDE) * np.expm1(-half)) / _CUT
-
-
-# Mean and mean square of the exponential law cut at _CUT: of the squared offset in units of 1/_CUT.
-_FIRST = (1.0 - (1.0 + _CUT) * _OUTSIDE) / (1.0 - _OUTSIDE)
-_SECOND = (2.0 - (_CUT**2 + 2.0 * _CUT + 2.0) * _OUTSIDE) / (1.0 - _OUTSIDE)
-
-# The variance of `normal_in_disc` is that of the cut law; S2 draws from it but uses the uncut variance in its formula.
-PIN_LAWS: Mapping[str, PinLaw] = {
-    "normal": PinLaw(1.0 / 9.0, 3.0 / 81.0, _normal, lambda half: np.full_like(half, 1.0 / 3.0)),
-    "normal_in_disc": PinLaw(
-        0.5 * _FIRST / _CUT, 0.375 * _SECOND / _CUT**2, partial(_normal, cut=_CUT), _stretch(_squared_in_disc)
-    ),
-    "uniform": PinLaw(1 / 4, 1 / 8, partial(_turned, inside=True), _stretch(lambda half: -np.expm1(-half))),
-    "contact": PinLaw(1 / 2, 3 / 8, partial(_turned, inside=False), _stretch(np.ones_like)),
-}
-
-
-class Wall(Marginal):
-    """At the low or the high end of the tolerance, each with probability 1/2."""
-
-    reach = 1.0
-    fourth = 1.0
-
-    def at(self, u: Floats) -> Floats:
-        return np.where(u < 0, self.low, self.high)
-
-
-@dataclass(frozen=True)
-class SlideLaw:
-    """Law of the two independent ends of a slider in its guide, for a clearance of 1 on either side."""
-
-    end: Marginal
-
-    @property
-    def variance(self) -> float:
-        """Variance of each end."""
-        return float(self.end.moments[1])
-
-    @property
-    def fourth(self) -> float:
-        """E[x^4] of each end."""
-        return float(self.end.moments[3])
-
-    @property
-    def mixed(self) -> float:
-        """E[x^2 y^2] of both ends."""
-        return self.variance**2
-
-    def draw(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
-        """Both ends, each of shape (count,)."""
-        return self.end.draw(rng, count), self.end.draw(rng, count)
-
-    def at(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Both ends at values of two independent standard normal variables."""
-        return self.end.at(u), self.end.at(v)
-
-
-SLIDE_LAWS: Mapping[str, SlideLaw] = {
-    "normal": SlideLaw(Normal(-1.0, 1.0)),
-    "normal_in_disc": SlideLaw(TruncatedNormal(-1.0, 1.0)),
-    "uniform": SlideLaw(Uniform(-1.0, 1.0)),
-    "contact": SlideLaw(Wall(-1.0, 1.0)),
 }

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import erfcx, ndtr, ndtri
 
 from mechdesign.analyses.reliability.first_order import FirstOrder, correlation
-from mechdesign.analyses.reliability.question import Band, Disc
+from mechdesign.analyses.reliability.question import Band, Disc, limits_at
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.statistics import MAX_DEVIATION, outside, rectangle_failure
 
@@ -22,20 +22,21 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _LATTICE_POINTS = 8191
 # Random shifts of the lattice.
 _LATTICE_SHIFTS = 8
-# Sum of the limits' probabilities below which a lattice has too few failures, and points are drawn beyond the limits.
+# Sum of the limits' probabilities below which too few lattice points fail, and points are drawn beyond the limits
+# instead.
 _RARE = 0.05
-# Points that are drawn beyond the limits.
+# Number of points that are drawn beyond the limits.
 _RARE_POINTS = 20_000
-# Probability of not being assembled that is neglected, as a share of the probability of failure.
+# Probability of no assembly that is neglected, as a share of the probability of failure.
 _NO_PART = 1e-6
-# The same as a probability.
+# Probability of no assembly that is neglected in any case.
 _LEAST_PART = 1e-15
-# Sides of the polygon in a circle whose half-spaces points are drawn from.
+# Sides of the polygon inside a circle, beyond whose sides points are drawn.
 _POLYGON_SIDES = 64
-# Steps round a circle for each least standard deviation b in its radius or in _OVAL times the largest deviation a.
+# Steps round a circle of radius R, for the least standard deviation b and the largest a: this times max(R, _OVAL a)/b.
 _STEPS = 9.0
 _OVAL = 4.0
-# Steps from which on the integral over the width of the circle is used instead.
+# Number of steps from which on the integral over the width of the circle is used instead.
 _MOST_STEPS = 4096
 
 
@@ -62,14 +63,9 @@ def made_failure(
         both = linear.beside(closing).take([pose])
         spread, middle = both.covariance()[0], both.shift()[:, 0]
         spread[:count, :count], middle[:count] = covariance[pose], mean[pose]
-        limits = [
-            replace(band, low=low[pose], high=high[pose])
-            for band in bands
-            for low, high in [[np.broadcast_to(end, failure.shape) for end in (band.low, band.high)]]
-        ]
-        limits += [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
-        circles = [replace(disc, radius=np.broadcast_to(disc.radius, failure.shape)[pose]) for disc in discs]
-        failure[pose] = failure_probability(spread, limits, circles, middle)
+        limits, circles = limits_at(bands, discs, pose)
+        margins = [Band(count + k, 0.0, np.inf) for k in np.flatnonzero(counts[:, pose]).tolist()]
+        failure[pose] = failure_probability(spread, [*limits, *margins], circles, middle)
     return failure
 
 
@@ -99,16 +95,12 @@ def failure_probability(
         return rectangle_failure(low, high, correlation(covariance[..., pair, :][..., pair]))
     finite = np.isfinite(covariance).all(axis=(-2, -1)) & np.isfinite(mean).all(axis=-1)
     failure = np.full(finite.shape, np.nan)
-    limits = [[np.broadcast_to(end, finite.shape) for end in (band.low, band.high)] for band in bands]
-    radii = [np.broadcast_to(disc.radius, finite.shape) for disc in discs]
     if len(discs) == 1 and not bands:
-        pair = [discs[0].x, discs[0].y]
-        failure[finite] = disc_failures(covariance[finite][:, pair][..., pair], radii[0][finite], mean[finite][:, pair])
+        pair, radius = [discs[0].x, discs[0].y], np.broadcast_to(discs[0].radius, finite.shape)
+        failure[finite] = disc_failures(covariance[finite][:, pair][..., pair], radius[finite], mean[finite][:, pair])
         return failure
     for place in filter(np.asarray(finite).__getitem__, np.ndindex(failure.shape)):
-        at_place = [replace(b, low=low[place], high=high[place]) for b, (low, high) in zip(bands, limits, strict=True)]
-        circles = [replace(d, radius=radius[place]) for d, radius in zip(discs, radii, strict=True)]
-        failure[place] = _of_several(covariance[place], at_place, circles, mean[place])
+        failure[place] = _of_several(covariance[place], *limits_at(bands, discs, place), mean[place])
     return failure
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.motion import default_outputs
 from mechdesign.analyses.poses import expand_outputs, radians
-from mechdesign.analyses.reliability.laws import taken
+from mechdesign.analyses.reliability.laws import at_rows
 from mechdesign.cautions import Caution
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism import Mechanism
@@ -78,8 +78,7 @@ class ReliabilityQuestion:
 
     def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
         """The question at these poses, where limits are arrays of poses."""
-        bands = tuple(replace(band, low=taken(band.low, poses), high=taken(band.high, poses)) for band in self.bands)
-        discs = tuple(replace(disc, radius=taken(disc.radius, poses)) for disc in self.discs)
+        bands, discs = limits_at(self.bands, self.discs, poses)
         return replace(self, bands=bands, discs=discs)
 
     @property
@@ -154,6 +153,14 @@ class ReliabilityQuestion:
         return np.stack(gradients)
 
 
+def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
+    """The limits at one pose or some, by an index of the arrays of poses."""
+    return (
+        tuple(replace(band, low=at_rows(band.low, poses), high=at_rows(band.high, poses)) for band in bands),
+        tuple(replace(disc, radius=at_rows(disc.radius, poses)) for disc in discs),
+    )
+
+
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
     mechanism = study.mechanism
@@ -203,7 +210,7 @@ def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
     return split_order(name, exists)
 
 
-def unsaid(study: Study, question: ReliabilityQuestion) -> list[Caution]:
+def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Caution]:
     """A warning for each output whose pin has a clearance, where the study does not say which link's point it is."""
     section: dict[str, Any] = study.resolved["reliability"]
     names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]

@@ -28,11 +28,11 @@ CHUNK = 20_000
 CELLS = 25
 # Half the width of the grid, in standard deviations.
 REACH = 3.0
-# Chunks over which the density is counted: a million samples.
+# Number of chunks over which the density is counted: a million samples.
 _DENSITY_CHUNKS = 50
 # Samples between two entries of the trend in the first chunks; after these it has entries at powers of two.
 _TREND_STEP = 1000
-# First chunks, whose errors are also kept for the histogram.
+# Number of first chunks, whose errors are also kept for the histogram.
 _TREND_CHUNKS = 16
 # Step of the difference quotients by the standard normal variables, in standard deviations.
 _SOURCE_STEP = 1e-5

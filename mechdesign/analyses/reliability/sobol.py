@@ -30,11 +30,11 @@ from mechdesign.work.chunks import map_chunks
 
 # Least number of replicates.
 _REPLICATES = 16
-# Points of a replicate from which on there are more replicates.
+# Most points of a replicate; more points make more replicates.
 _REPLICATE_POINTS = 4_000
 # Mechanisms solved at each pose where the study gives no number of points.
 _POSE_MECHANISMS = 8_000
-# Listed poses that have indices where the study gives no number of points.
+# Number of listed poses that have indices where the study gives no number of points.
 _POSES = 4
 # Name of this module's stream of random numbers; the methods have streams 1 and 2.
 _STREAM = 3
@@ -87,7 +87,7 @@ def sample(
         From standard normal variables, shape (dimension, n), to the values of the exact and of the linear model (zero
         where there is no linear one), shape (2, channels, n); nan where a mechanism is not assembled.
     rows : sequence of sequences of int
-        The variables of each source; empty for a source that gets no indices.
+        The variables of each source; empty for a source without indices.
     """
     independent = [k for k, variables in enumerate(rows) if len(variables)]
     points = np.empty((dimension, 2 + len(independent), count))
@@ -119,12 +119,12 @@ def combine(replicates: Sequence[Replicate], linear: tuple[Floats, Floats] | Non
     if len(full) < 2:
         missing = np.full((3, *replicates[0].products.shape[2:]), np.nan)
         return SobolIndices(missing, missing, points, points - kept)
-    # Products are taken about the common mean: a large mean would cost them their digits.
+    # Products are taken about the common mean, as a large mean would cost them digits.
     centre = sum((part.sums for part in full), np.zeros_like(full[0].sums)) / (2 * kept)
     first = np.stack([(part.products[0] - centre[..., None] * part.products[1]) / part.kept for part in full])
     total = np.stack([0.5 * part.products[2] / part.kept for part in full])
     whole = np.stack([part.squares / (2 * part.kept) - centre * (part.sums / part.kept - centre) for part in full])
-    # The linear model's variances are over all points, so they correct the sampled ones only if no point is left out.
+    # The linear model's variances are those of all points: they correct the sampled ones only where none is left out.
     if linear is not None and kept == points:
         first, total = (part[:, 0] - part[:, 1] + linear[0] for part in (first, total))
         whole = whole[:, 0] - whole[:, 1] + linear[1]

@@ -30,7 +30,7 @@ from mechdesign.results import Column, Table
 
 # Bins of a histogram.
 _BINS = 60
-# Largest distance of its errors from the mean, in standard deviations.
+# Largest distance of a histogram's errors from the mean, in standard deviations.
 _FARTHEST = 6.0
 # Standard deviation, as a share of the output's size, up to which it is rounding and the output constant.
 _CONSTANT = 1e-12
@@ -67,7 +67,7 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
-        {}, method=np.array([each.method for each in known])[method], **_channels(task, channel), nominal=nominal,
+        {}, method=np.array([result.method for result in known])[method], **_channels(task, channel), nominal=nominal,
         mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
         worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
         unit=task.labels[2][channel], valid=task.reason[pose] == 0,
@@ -80,25 +80,24 @@ def success(task: Task, results: Sequence[MethodResult]) -> Table:
     length = task.poses.count // task.poses.designs
     for design in range(task.poses.designs):
         first = design * length
-        entries += [(pose, each, each.estimates.get(pose, _UNKNOWN), each.used.get(pose, each.method), False)
-                    for pose in range(first, first + length) for each in results]  # fmt: skip
-        cycles = [(each, each.cycles[design]) for each in results if each.cycles]
-        entries += [(first, each, cycle, "monte_carlo" if cycle.samples else "bounds", True) for each, cycle in cycles]
+        entries += [(pose, result, result.estimates.get(pose, _UNKNOWN), result.used.get(pose, result.method), False)
+                    for pose in range(first, first + length) for result in results]  # fmt: skip
+        cycles = [(result, result.cycles[design]) for result in results if result.cycles]
+        entries += [
+            (first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True) for result, cycle in cycles
+        ]
     poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
     pose, whole = np.array(poses), np.array(cycle_of)
-    failure, low, high, error = (
-        np.array([getattr(e, name) for e in estimates]) for name in ("failure", "low", "high", "error")
-    )
-    samples, invalid, evaluations = (
-        np.array([getattr(e, name) for e in estimates], dtype=np.int64)
-        for name in ("samples", "invalid", "evaluations")
+    failure, low, high, error, samples, invalid, evaluations = (
+        np.array([getattr(e, name) for e in estimates])
+        for name in ("failure", "low", "high", "error", "samples", "invalid", "evaluations")
     )
     columns = [
         *RELIABILITY.columns({}, scope=np.where(whole, "cycle", "pose")),
         *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
         *RELIABILITY.columns(
             {"kind of interval": "99.7 %; of counted failures Clopper-Pearson"},
-            method=[each.method for each in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
+            method=[result.method for result in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
             failure=failure, failure_low=low, failure_high=high, error=error, samples=samples, invalid=invalid,
             evaluations=evaluations, used=np.array(used), sigma_level=_sigma_level(failure), ppm=1e6 * failure,
         ),
@@ -123,7 +122,7 @@ def _sigma_level(failure: Floats) -> Floats:
 def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     """Process capability of each limited output by itself, at every pose by every method that has moments [ISO 22514].
 
-    Limits of errors are those of the value about its nominal one.
+    Limits of an error are added to the nominal value.
     """
     known, question = _with_moments(task, results), task.question.at(task.nominal)
     single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
@@ -154,7 +153,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
     return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
-        {}, method=np.array([each.method for each in known])[method], output=output[limit], order=order[limit],
+        {}, method=np.array([result.method for result in known])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
         mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
         sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
@@ -201,8 +200,8 @@ def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> 
     columns: dict[str, Floats] = {}
     for kind in ("first", "total") if found else ():
         values = np.full((3, *shape), np.nan)
-        for pose, each in found.items():
-            values[:, pose] = getattr(each, kind)
+        for pose, indices in found.items():
+            values[:, pose] = getattr(indices, kind)
         columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
     return columns
 

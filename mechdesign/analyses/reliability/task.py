@@ -27,7 +27,7 @@ from mechdesign.study.schema.reliability import Precision
 
 Strings = NDArray[np.str_]
 
-# Most samples of `auto` where the study gives no number.
+# Most samples of `auto` where the study gives no number of samples.
 MAX_SAMPLES = 2_000_000
 # Its coefficient of variation of the probability of failure where the study gives no precision.
 RELATIVE_PRECISION = 0.05
@@ -46,11 +46,11 @@ class Task:
     linear : FirstOrder
         The linear error model of the channels.
     closing : FirstOrder
-        Margins of assembly, see `first_order.linear_margins`.
+        The linear model of the margins of assembly, see `first_order.linear_margins`.
     settings : sequence of Setting
         Poses that can be assembled, in their order; empty where only the first order is computed.
     most : int
-        Most samples of methods that end at a precision.
+        Most samples of methods that stop at a precision.
     """
 
     study: Study
@@ -111,7 +111,7 @@ class MethodResult:
     sums : dict of int to Sums
         Sums of the sampled errors, of methods that sample them.
     used : dict of int to str
-        The method that the value comes from, where it is another one.
+        The method that the value comes from, where it is not this one.
     rungs : dict of int to dict of str to Estimate
         Estimates of all methods that `auto` tried.
     normal : (ndarray, ndarray) or None

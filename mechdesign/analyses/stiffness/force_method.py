@@ -46,7 +46,7 @@ class Twists:
     compliance : ndarray, shape (n, freedoms)
         Compliances; 0 for free joints.
     free : ndarray of bool, shape (freedoms,)
-        Which freedoms are those of free joints.
+        Which freedoms belong to free joints.
     within : ndarray, shape (n or 1, edges, freedoms)
         1 where a freedom is a part of an edge, else 0. Edges along the beams of one link share the freedoms of the
         stretch that they have in common in each pose.
@@ -125,7 +125,7 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
-    # Of each freedom the edges (1 or 0), the twist and the compliance.
+    # A row for each freedom: the edges that have it (1 or 0), the twist and the compliance.
     rows = [(np.eye(len(network.edges))[k][:, None], *freedom) for k, edge in enumerate(network.edges) if not edge.beam
             for freedom in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
     for edges in network.edges_along_beams:

@@ -75,7 +75,7 @@ def _pieces(edges: Sequence[NetworkEdge], asked: str) -> Iterator[list[NetworkEd
 
 
 def _path(piece: list[NetworkEdge], asked: str) -> list[str] | None:
-    """Vertices from the ground to the asked body; None where they are no plain path. Sorts `piece` likewise."""
+    """Vertices from the ground to the asked body; None where they are no plain path. Sorts `piece` in this order."""
     path, remaining = [GROUND], list(piece)
     piece.clear()
     while path[-1] != asked:

@@ -147,7 +147,7 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     StudyError
         If nothing gives: every stiffness would be infinite.
     """
-    from mechdesign.analyses.stiffness.analysis import ask, hold
+    from mechdesign.analyses.stiffness.body import ask, hold
 
     section = study.stiffness
     assert section is not None

@@ -280,6 +280,13 @@ def has(data: Any, key: Any) -> bool:
     return isinstance(data, Mapping) and key in data
 
 
+def value_at(data: Any, path: KeyPath) -> Any:
+    """The value at a path of data; None where there is none."""
+    for key in path:
+        data = data[key] if has(data, key) else None
+    return data
+
+
 def leaves(data: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Any]]:
     """Every value of data that is neither a mapping nor a list, with its path."""
     if isinstance(data, Mapping | list):

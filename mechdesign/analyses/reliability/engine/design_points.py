@@ -1,7 +1,7 @@
-"""Design points: where each limit is broken nearest to the mean, found from many starts at once.
+"""Design points: the points of each limit that are nearest to the mean, searched from many starts at once.
 
-A direction (`Problem.circles`) costs no distance: each is turned against the slope of its limit, where that is nearest
-if it is linear in cosine and sine, and the nearest point is sought again.
+A random direction (`Problem.circles`) adds no distance. It is turned to where the limit is nearest (against the slope,
+if the margin is linear in its cosine and sine), and the nearest point is searched again.
 """
 
 from __future__ import annotations
@@ -11,49 +11,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechdesign.analyses.reliability.engine.descent import alike, descend, sizes
 from mechdesign.analyses.reliability.engine.problem import Problem, failed
 from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 
-# Standard deviations of the samples that starts are taken from, and how many of each.
+# Standard deviations of the explored samples, among which starts are chosen, and the number of samples of each.
 SPREADS = (1.0, 1.5, 2.0, 3.0, 4.5)
 _SPREAD_SAMPLES = 160
 EXPLORED = len(SPREADS) * _SPREAD_SAMPLES
-# Starts of one limit: as many as leave no wide gap on a circle, all of which is as near.
+# Most starts for one limit, enough to leave no wide gap on a limit that is a circle about the mean.
 _STARTS = 24
-# Fewer where directions count, for these have starts of their own, and where margins end: tangents are rough there.
+# The same with random directions, which have starts of their own, and where margins end, whose tangents are rough.
 _FEW_STARTS = 8
-# Starts of each limit near the mean where directions count: each has its own.
+# Starts of each limit near the mean with random directions, each with directions of its own.
 _DIRECTED_STARTS = 6
-# Halvings of a ray on which a limit is sought.
+# Halvings of a ray on which the edge of failure is searched.
 _HALVINGS = 10
-# Rounds in which ends of the margins come nearer, and points (at least, of this spread) about each.
+# Rounds in which an edge where margins end is moved nearer to the mean; least number of points drawn about it, and
+# their standard deviation.
 _WALKS = 3
 _WALK_POINTS = 60
 _WALK_SPREAD = 0.5
-# Two points in directions nearer than this (cosine), at like distances, are one.
+# Two normals with a larger cosine between them count as parallel.
 _SAME_COSINE = 0.95
 MAX_POINTS = 96
-# How often failures that no tangent explains are searched from, and the part of its distance from which on one does.
+# Rounds of searches from failures that lie beyond no tangent. A failure lies beyond one from this part of its distance
+# on.
 _SEARCHES = 8
 _NEARLY = 0.98
-# So many times as far from the mean as a design point is beyond it.
+# Factor of a design point's distance with which a point is safely beyond it.
 _BEYOND = 1.02
-# In place of a limit: whatever fails.
+# In place of a limit's number: failure of any kind.
 _ANY = -1
-# How often directions are turned to the worst, and what is no turn (distance on the circle).
+# Most turns of the directions towards failure, and the distance on the circle below which they have settled.
 _TURNS = 6
 _NO_TURN = 0.02
-_ITERATIONS = 30
-# Fractions of a step that are tried where the whole of it does not improve.
-_FRACTIONS = np.array([0.5, 0.25, 0.0625])
-# A point is a design point where a step is shorter than this, or nothing improves, and the margin is this small.
-_SHORT_STEP = 5e-3
-_ZERO_MARGIN = 1e-2
-# A step that leaves more than this share of the merit gains little.
-_LITTLE_GAIN = 0.95
-# Directions farther from each other than this (distance on the circle) are two.
-_DIRECTIONS_APART = 0.5
-# Design points farther than the nearest one by this many standard deviations bring nothing.
+# Design points farther than the nearest one by this many standard deviations are neglected.
 _FARTHEST = 4.0
 # Points, limits, normals and pulls as in `DesignPoints`, the points and normals of shape (dimension, points).
 _Found = tuple[Floats, Ints, Floats, Floats]
@@ -61,21 +54,21 @@ _Found = tuple[Floats, Ints, Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class DesignPoints:
-    """Points where a limit is broken, nearest to the mean, nearest first.
+    """Points of limits that are nearest to the mean, the nearest first.
 
     Parameters
     ----------
     u : ndarray, shape (points, dimension)
     limit : ndarray of int, shape (points,)
-        Which limit; -1 where it has no slope, or the margins end.
+        Number of the limit; -1 where it has no slope, or the margins end.
     normal : ndarray, shape (points, dimension)
-        Unit vectors into the failure; zero where directions alone decide.
+        Unit vectors towards failure; zero where the directions alone decide.
     pull : ndarray, shape (points, directions, 2)
-        Directions that bring the limit nearest, as long as the probability is concentrated about them.
+        Directions in which the limit is nearest, with the concentration of the failures about them as their length.
     seen : ndarray, shape (dimension, n)
-        Failures among the samples of all spreads.
+        Failures among the explored samples.
     always : bool
-        Whether all of these samples break a limit that has no such point: it is nowhere kept.
+        Whether all explored samples break a limit that has no design point.
     """
 
     u: Floats
@@ -92,12 +85,12 @@ class DesignPoints:
 
     @property
     def near(self) -> Flags:
-        """Which points count: those farther than the nearest one by `_FARTHEST` bring nothing."""
+        """Which points are not farther than the nearest one by more than `_FARTHEST`."""
         return np.asarray(self.distance <= self.distance.min(initial=np.inf) + _FARTHEST)
 
 
 def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
-    """Look for the design points of all limits, again and again from failures that no tangent explains."""
+    """Design points of all limits; the search is repeated from failures that lie beyond no tangent so far."""
     d = problem.dimension
     near = problem.draw(rng, _DIRECTED_STARTS if len(problem.circles) else 1, 0.1 / np.sqrt(d))
     u = np.concatenate([near, _explored(problem, rng)], axis=1)
@@ -119,7 +112,7 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
         margins = problem.margins(starts)
         limit = np.argmin(np.nan_to_num(margins, nan=np.inf), axis=0)
         nearest, normal, good = descend(problem, limit, starts, sizes(problem), together=False)
-        # On a jump of the margins the slope is not that of the way to the mean.
+        # Where margins jump, the way to the mean is not along their slope.
         good &= (nearest * normal).sum(axis=0) >= _SAME_COSINE * np.linalg.norm(nearest, axis=0)
         found.append((nearest[:, good], limit[good], normal[:, good], np.zeros((int(good.sum()), 0, 2))))
         good |= _explained(_distinct(problem, found, seen, lost), starts)
@@ -133,12 +126,12 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
 
 
 def _explored(problem: Problem, rng: np.random.Generator) -> Floats:
-    """Samples of all spreads."""
+    """The explored samples: points of all spreads."""
     return np.concatenate([problem.draw(rng, _SPREAD_SAMPLES, spread) for spread in SPREADS], axis=1)
 
 
 def _exchanged(problem: Problem, points: DesignPoints) -> Floats:
-    """Failures among the design points with two variables exchanged, a little beyond: like parts fail alike."""
+    """Failures among design points with two variables exchanged: of parts that are alike either may fail."""
     u = _BEYOND * points.u[points.near]
     first, second = np.triu_indices(problem.dimension, 1)
     point, pair = (index.ravel() for index in np.indices((len(u), len(first))))
@@ -155,17 +148,20 @@ def _explained(points: DesignPoints, u: Floats) -> Flags:
 
 
 def _ended(problem: Problem, ends: Floats, rng: np.random.Generator) -> _Found:
-    """Ends of what is kept, as near to the mean as they come without a slope."""
+    """Design points on edges where margins end, moved nearer to the mean without a slope."""
     ends = _nearer(problem, ends, rng)
-    straight = np.where(problem.straight[:, None], ends, 0.0)
-    length = np.linalg.norm(straight, axis=0)
+    at = np.where(problem.is_normal[:, None], ends, 0.0)
+    length = np.linalg.norm(at, axis=0)
     count = ends.shape[1]
-    normal = straight / np.where(length > 0, length, 1.0)
+    normal = at / np.where(length > 0, length, 1.0)
     return ends, np.full(count, _ANY), normal, np.zeros((count, len(problem.circles), 2))
 
 
 def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]:
-    """Limits (`_ANY` where margins end) and their edges to samples, shape (dimension, starts), that lie far apart."""
+    """Starts far apart, shape (dimension, starts), on the rays to samples that fail, and their limits.
+
+    The limit is `_ANY` where margins end.
+    """
     nowhere = np.isnan(margins).any(axis=0)
     broken = [(margin < 0) & ~nowhere for margin in margins]
     most = _FEW_STARTS if len(problem.circles) else _STARTS
@@ -175,35 +171,35 @@ def _starts(problem: Problem, u: Floats, margins: Floats) -> tuple[Ints, Floats]
 
 
 def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
-    """Where limits (`_ANY`: where any is broken) are on the rays to points beyond them, shape (dimension, points)."""
+    """Points of limits on the rays from the mean to failures `far`, shape (dimension, points); `_ANY` is any limit."""
     low, high = np.zeros(len(limit)), np.ones(len(limit))
-    straight = problem.straight[:, None]
+    is_normal = problem.is_normal[:, None]
     for _ in range(_HALVINGS if len(limit) else 0):
         middle = 0.5 * (low + high)
-        found = problem.margins(np.where(straight, middle * far, far))
+        found = problem.margins(np.where(is_normal, middle * far, far))
         out = np.where(
             limit < 0, failed(found), np.isnan(found).any(axis=0) | (found[limit, np.arange(len(limit))] < 0)
         )
         high, low = np.where(out, middle, high), np.where(out, low, middle)
-    return np.where(straight, high * far, far)
+    return np.where(is_normal, high * far, far)
 
 
 def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
-    """Ends of what is kept nearer to the mean, shape (dimension, ends).
+    """Points on an edge where margins end, moved nearer to the mean, shape (dimension, ends).
 
-    In place of the slope there is the direction that separates what is kept from what fails.
+    The direction that separates failures from the other points about an edge takes the place of the slope.
     """
     d, count = ends.shape
     about = max(_WALK_POINTS, 4 * d)
     for _ in range(_WALKS if count else 0):
-        shift = rng.standard_normal((d, count, about)) * problem.straight[:, None, None]
+        shift = rng.standard_normal((d, count, about)) * problem.is_normal[:, None, None]
         found = problem.margins((ends[:, :, None] + _WALK_SPREAD * shift).reshape(d, -1))
         gone = failed(found).reshape(count, about)
         steep = np.einsum("dca,ca->dc", shift, gone - gone.mean(axis=1, keepdims=True))
         size = (steep * steep).sum(axis=0)
-        # A little farther than where the tangent plane is nearest.
+        # A little beyond the nearest point of the tangent plane.
         far = 1.25 * steep * (steep * ends).sum(axis=0) / np.where(size > 0, size, 1.0)
-        far = np.where(problem.straight[:, None], far, ends)
+        far = np.where(problem.is_normal[:, None], far, ends)
         beyond = failed(problem.margins(far))
         near = _edges(problem, np.full(count, _ANY), far)
         ends = np.where(beyond & ((near * near).sum(axis=0) < (ends * ends).sum(axis=0)), near, ends)
@@ -211,11 +207,11 @@ def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _apart(problem: Problem, u: Floats, most: int) -> Floats:
-    """The nearest point, and one after the other, `most` in all, that whose direction is farthest from those chosen."""
+    """The nearest point, then each time the one whose direction is farthest from all chosen, up to `most`."""
     if not u.shape[1]:
         return u
     size = np.linalg.norm(u[problem.normals], axis=0)
-    directions = np.where(problem.straight[:, None], u / np.where(size > 0, size, 1.0), u)
+    directions = np.where(problem.is_normal[:, None], u / np.where(size > 0, size, 1.0), u)
     directions /= np.linalg.norm(directions, axis=0)
     chosen = [int(np.argmin(size))]
     cosine = directions[:, chosen[0]] @ directions
@@ -226,7 +222,7 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
 
 
 def _distinct(problem: Problem, found: Sequence[_Found], seen: Floats, lost: Ints) -> DesignPoints:
-    """Nearest first, each place once; `lost` are limits that no sample keeps."""
+    """Design points, the nearest first and each once; `lost` are limits that every explored sample breaks."""
     u, normal = (np.concatenate([part[k] for part in found], axis=1) for k in (0, 2))
     limit, pull = (np.concatenate([part[k] for part in found]) for k in (1, 3))
     order = np.argsort((u * normal).sum(axis=0), kind="stable")
@@ -234,7 +230,7 @@ def _distinct(problem: Problem, found: Sequence[_Found], seen: Floats, lost: Int
     for k in order.tolist():
         if len(kept) == MAX_POINTS:
             break
-        if not any(_alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
+        if not any(alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
             kept.append(k)
     always = bool(np.setdiff1d(lost, limit[kept]).size)
     return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], seen, always)
@@ -245,7 +241,7 @@ def _along(one: Floats, other: Floats) -> bool:
 
 
 def explored_weights(problem: Problem, u: Floats) -> Floats:
-    """Density of the law over that of the samples of all spreads, at `u` of shape (dimension, n): shape (n,)."""
+    """Density of the law over that of the explored samples, at `u` of shape (dimension, n): shape (n,)."""
     normal = u[problem.normals]
     half, d = 0.5 * (normal * normal).sum(axis=0), len(normal)
     logs = np.stack([half * (1 - spread**-2) - d * np.log(spread) for spread in SPREADS])
@@ -254,10 +250,10 @@ def explored_weights(problem: Problem, u: Floats) -> Floats:
 
 
 def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
-    """Descend with directions held, and turn these to the worst, one after the other until they stay.
+    """Descend with fixed directions and turn these towards failure, in turns until they settle.
 
-    Arguments as of `descend`; answers as in `DesignPoints`, but `u` and `normal` of shape (dimension, points). Where
-    directions alone break a limit, the point is at the mean of all else.
+    Arguments are those of `descend`, results those of `DesignPoints`, but `u` and `normal` of shape (dimension,
+    points). Where the directions alone break a limit, all normal variables of the point are at their means.
     """
     found, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
     if not len(problem.circles):
@@ -268,8 +264,8 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
         found, at, normal = _points(problem, at, turned, scale)
         if moved < _NO_TURN:
             break
-    # What directions do alone, all normal variables at their means.
-    alone = np.where(problem.straight[:, None], 0.0, u)
+    # Failures by the directions alone, all normal variables at their means.
+    alone = np.where(problem.is_normal[:, None], 0.0, u)
     for _ in range(_TURNS):
         alone, margin, _ = _turned(problem, limit, alone)
     alone, by = alone[:, margin < 0], limit[margin < 0]
@@ -277,8 +273,9 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
     normal = np.concatenate([normal, np.zeros_like(alone)], axis=1)
     _, margin, slope = _turned(problem, at, found)
     steep = np.linalg.norm(slope[problem.normals], axis=0)
-    # A direction counts by how much the logarithm of the probability changes as it turns: the slope by the direction
-    # over that by the distance, times how fast the logarithm falls with the distance.
+    # The concentration of failures about a direction is the slope of the logarithm of their probability by the
+    # direction: the margin's slope by the direction over that by the distance, times the logarithm's slope by the
+    # distance.
     away = (found * normal).sum(axis=0)
     width = np.where(away > 0, steep / _hazard(away), steep * (1.0 - away) + np.maximum(-margin, 0.0))
     pull = np.moveaxis(-slope[problem.circles], 2, 0) / np.where(width > 0, width, 1.0)[:, None, None]
@@ -286,13 +283,13 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
 
 
 def _points(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:
-    """Starts that came to their limits: points, limits and normals."""
+    """Points, limits and normals of the starts that came to their limits."""
     u, normal, good = descend(problem, limit, u, scale)
     return u[:, good], limit[good], normal[:, good]
 
 
 def _turned(problem: Problem, limit: Ints, u: Floats) -> tuple[Floats, Floats, Floats]:
-    """Points with their directions against the slope of their limits; margins and slopes before."""
+    """Points with their directions turned against the slope of their limits; margins and slopes before the turn."""
     if not len(problem.circles) or not len(limit):
         return u, np.zeros(len(limit)), np.zeros_like(u)
     margins, gradients = problem.gradients(u)
@@ -310,104 +307,3 @@ def _hazard(distance: Floats) -> Floats:
     from scipy.special import log_ndtr
 
     return np.asarray(np.exp(-0.5 * distance**2 - log_ndtr(-distance)) / np.sqrt(2.0 * np.pi))
-
-
-def sizes(problem: Problem) -> Floats:
-    """Margins at the mean as sizes by which others are large or small, shape (limits,); 1 where they are none."""
-    scale = np.abs(problem.margins(np.zeros((problem.dimension, 1))))[:, 0]
-    return np.asarray(np.where((scale > 0) & np.isfinite(scale), scale, 1.0))
-
-
-def descend(
-    problem: Problem, limit: Ints, u: Floats, scale: Floats, *, together: bool = True
-) -> tuple[Floats, Floats, Flags]:
-    """Step all starts to the nearest point of their limits; directions stay as they are.
-
-    [Hasofer & Lind, Exact and invariant second-moment code format, 1974; Zhang & Der Kiureghian, Two improved
-    algorithms for reliability analysis, 1995, whose merit function makes the iteration converge.]
-
-    Parameters
-    ----------
-    limit, u : ndarray, shape (starts,) and (dimension, starts)
-        Limits, and points to start from.
-    scale : ndarray, shape (limits,)
-        Those of `sizes`.
-    together : bool
-        Whether starts that have come together go on as one.
-
-    Returns
-    -------
-    u, normal, good
-        Points and unit vectors into the failure, shape (dimension, starts), and which came to their limit, once where
-        several came together.
-    """
-    u = u.copy()
-    straight = problem.straight[:, None]
-    active = np.ones(len(limit), dtype=bool)
-    good = np.zeros(len(limit), dtype=bool)
-    normal = np.zeros_like(u)
-    for _ in range(_ITERATIONS):
-        lanes = np.flatnonzero(active)
-        if not lanes.size:
-            break
-        margins, gradients = problem.gradients(u[:, lanes])
-        rows, k = limit[lanes], np.arange(len(lanes))
-        # Of a limit out of all proportion they are infinite, and its nearest point is not known.
-        with np.errstate(over="ignore"):
-            g, slope = margins[rows, k] / scale[rows], straight * gradients[rows, :, k].T / scale[rows]
-            size = (slope**2).sum(axis=0)
-        known = np.isfinite(g) & np.isfinite(size) & (size > 0)
-        active[lanes[~known]] = False
-        if not known.any():
-            continue
-        lanes, g, slope, size = lanes[known], g[known], slope[:, known], size[known]
-        at = u[:, lanes]
-        step = slope * (((slope * at).sum(axis=0) - g) / size) - straight * at
-        normal[:, lanes] = -slope / np.sqrt(size)
-        weight = 2 * np.linalg.norm(at, axis=0) / np.sqrt(size) + 1.0
-        before = 0.5 * (at**2).sum(axis=0) + weight * np.abs(g)
-        trial = at + step
-        merit = _merit(problem, trial, limit[lanes], scale, weight)
-        far = np.linalg.norm(step, axis=0) >= _SHORT_STEP * (1 + np.linalg.norm(at, axis=0))
-        # A whole step that gains little swings about the nearest point.
-        worse = np.flatnonzero(~(merit < np.where(far, _LITTLE_GAIN, 1.0) * before))
-        if worse.size:
-            shorter = at[:, None, worse] + _FRACTIONS[:, None] * step[:, None, worse]
-            often = np.tile(worse, len(_FRACTIONS))
-            merits = _merit(problem, shorter.reshape(len(at), -1), limit[lanes[often]], scale, weight[often])
-            merits = merits.reshape(len(_FRACTIONS), -1)
-            best, k = np.argmin(merits, axis=0), np.arange(len(worse))
-            nearer = merits[best, k] < merit[worse]
-            worse, best, k = worse[nearer], best[nearer], k[nearer]
-            merit[worse], trial[:, worse] = merits[best, k], shorter[:, best, k]
-        done = ~far | ~(merit < before)
-        good[lanes[done]] = np.abs(g[done]) < _ZERO_MARGIN
-        active[lanes[done]] = False
-        better = merit < before
-        u[:, lanes[better]] = trial[:, better]
-        for i, lane in enumerate(lanes if together else ()):
-            others = lanes[:i][active[lanes[:i]] | good[lanes[:i]]]
-            if active[lane] and any(limit[lane] == limit[o] and _alike(problem, u[:, lane], u[:, o]) for o in others):
-                active[lane] = False
-    # Those that came near in the time that they had are good enough to sample about.
-    lanes = np.flatnonzero(active)
-    if lanes.size:
-        margins = problem.margins(u[:, lanes])
-        good[lanes] = np.abs(margins[limit[lanes], np.arange(len(lanes))] / scale[limit[lanes]]) < _ZERO_MARGIN
-    return u, normal, good
-
-
-def _merit(problem: Problem, u: Floats, limit: Ints, scale: Floats, weight: Floats) -> Floats:
-    """What the iteration makes smaller, shape (n,); infinite where there are no margins."""
-    value = problem.margins(u)[limit, np.arange(len(limit))] / scale[limit]
-    merit = 0.5 * (u**2).sum(axis=0) + weight * np.abs(value)
-    return np.asarray(np.where(np.isfinite(merit), merit, np.inf))
-
-
-def _alike(problem: Problem, one: Floats, other: Floats) -> bool:
-    """Whether two points are one."""
-    gap = one - other
-    if (np.hypot(*gap[problem.circles.T]) > _DIRECTIONS_APART).any():
-        return False
-    size, straight = float(np.linalg.norm(gap[problem.normals])), float(np.linalg.norm(one[problem.normals]))
-    return size < 0.3 or size < 0.2 * straight

@@ -1,4 +1,4 @@
-"""Densities that points are drawn from: many normal ones, and all that lies beyond a distance from the mean.
+"""Mixtures of densities that points are drawn from: normal ones, and the law itself beyond a distance from the mean.
 
 Directions (`Problem.circles`) have von Mises densities beside them [Mardia & Jupp, Directional Statistics, 2000].
 """
@@ -13,7 +13,7 @@ import numpy as np
 from mechdesign.analyses.reliability.engine.problem import Problem
 from mechdesign.numerics.arrays import Floats
 
-# Samples of the law itself, a dimension, that a learned density counts besides those seen.
+# Samples of the law itself, for each dimension, that are added to the samples from which a density is learned.
 _PRIOR_SAMPLES = 0.25
 
 
@@ -24,12 +24,12 @@ class Mixture:
     Parameters
     ----------
     weight : ndarray, shape (parts,)
-        The law beyond has the rest to 1.
+        The part beyond has the rest to 1.
     centre : ndarray, shape (parts, normal variables)
     root : ndarray, shape (parts, normal variables, normal variables)
         Cholesky factors of the covariances.
     heading : ndarray, shape (parts, directions, 2)
-        Mean directions, as long as they are concentrated.
+        Mean directions, with the concentration about them as their length.
     beyond : float
         Distance in standard deviations.
     """
@@ -43,7 +43,7 @@ class Mixture:
 
     @property
     def rest(self) -> float:
-        """Weight of what is beyond."""
+        """Weight of the part beyond."""
         return max(1.0 - float(self.weight.sum()), 0.0)
 
     @cached_property
@@ -53,7 +53,7 @@ class Mixture:
 
     @cached_property
     def _outside(self) -> float:
-        """Probability of normal variables beyond."""
+        """Probability of the law beyond the distance."""
         from scipy.special import gammaincc
 
         d = len(self.problem.normals)
@@ -81,7 +81,7 @@ class Mixture:
         return u
 
     def logs(self, u: Floats) -> Floats:
-        """Logarithm of each part's weighted density over the law's own, that beyond last: shape (parts + 1, n)."""
+        """Logarithms of the parts' weighted densities over that of the law, (parts + 1, n); the part beyond is last."""
         from scipy.special import i0e
 
         normal, directions = u[self.problem.normals], u[self.problem.circles.ravel()]
@@ -106,7 +106,7 @@ class Mixture:
             return np.asarray(np.exp(-most) / np.exp(logs - most).sum(axis=0))
 
     def joined(self, other: Mixture, share: float) -> Mixture:
-        """Both mixtures, the other with this share."""
+        """The mixture of both, in which the other has this share."""
         return replace(
             self, weight=np.concatenate([(1 - share) * self.weight, share * other.weight]),
             centre=np.concatenate([self.centre, other.centre]), root=np.concatenate([self.root, other.root]),
@@ -115,21 +115,22 @@ class Mixture:
 
     @property
     def widened(self) -> Mixture:
-        """Parts with covariances halfway to those of the law: above half of these the weights' variance is finite."""
+        """Parts with covariances halfway to that of the law, with which the variance of weights is finite."""
         covariance = 0.5 * (self.root @ self.root.swapaxes(1, 2) + np.eye(self.root.shape[1]))
         return replace(self, root=np.asarray(np.linalg.cholesky(covariance), dtype=np.float64))
 
     def about(self, u: Floats) -> Mixture:
-        """One part about the point `u`, shape (dimension,), and nothing beyond."""
+        """A single part about the point `u`, shape (dimension,), without a part beyond."""
         return replace(
             self, weight=np.ones(1), centre=u[self.problem.normals][None],
             root=np.eye(len(self.problem.normals))[None], heading=u[self.problem.circles][None],
         )  # fmt: skip
 
     def fitted(self, u: Floats, worth: Floats, least: float) -> Mixture:
-        """Parts with the moments of their own points `u`, shape (dimension, n); those below a share `least` of all end.
+        """Parts with the weighted moments of their own points among `u`, shape (dimension, n).
 
-        Of so many parts that all are as small it is half of what is even.
+        Parts with less than the share `least` of the weights `worth` are dropped; with many parts, with less than half
+        of an equal share.
         """
         logs = self.logs(u)
         share = np.exp(logs - logs.max(axis=0, initial=-np.inf))
@@ -154,7 +155,7 @@ class Mixture:
             headings.append(_heading(directions @ own / (mass * (1.0 + prior / effective))))
         if not weight:
             return self
-        # What is beyond keeps the points that are its own.
+        # The part beyond keeps the share of the points that are its own.
         kept = 1.0 - float(share[-1].sum()) / total
         return replace(
             self, weight=kept * np.array(weight) / sum(weight), centre=np.array(centres), root=np.array(roots),
@@ -169,9 +170,10 @@ def _heading(mean: Floats) -> Floats:
 
 
 def _without_chance(covariance: Floats, ratio: float) -> Floats:
-    """Principal variances 1 where so few samples a dimension (`ratio` is one over it) may show what they do by chance.
+    """The covariance with principal variances of 1 where they differ from 1 by no more than chance.
 
-    [Marchenko & Pastur, 1967: the limits of the principal variances of standard normal samples.]
+    `ratio` is the number of dimensions over the number of samples. [Marchenko & Pastur, 1967: the limits of the
+    principal variances of standard normal samples.]
     """
     squares, axes = np.linalg.eigh(covariance)
     chance = (squares > max(0.0, 1 - np.sqrt(ratio)) ** 2) & (squares < (1 + np.sqrt(ratio)) ** 2)

@@ -14,30 +14,30 @@ import numpy as np
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study.schema.reliability import Precision
 
-# Of all intervals.
+# Probability with which an interval holds the true value.
 CONFIDENCE = 0.997
-# Half the width of such an interval in standard errors.
+# Half the width of this interval for a normal estimate, in standard errors.
 WIDTH = 2.97
 
 
 def _half_wanted(precision: Precision, value: float) -> float:
-    """Half of the widest interval that is narrow enough."""
+    """Half the width of the widest interval that meets a precision."""
     return precision.half_width if precision.half_width is not None else WIDTH * (precision.relative or 0.0) * value
 
 
 def reached(precision: Precision, value: float, low: float, high: float) -> bool:
-    """Whether an interval is narrow enough."""
+    """Whether an interval meets a precision."""
     return 0.5 * (high - low) <= _half_wanted(precision, value)
 
 
 def needed(precision: Precision, value: float, variance: float) -> float:
-    """Samples that reach a precision, from the value and the variance of one sample."""
+    """Number of samples that meets a precision, from the mean and the variance of one sample."""
     half = _half_wanted(precision, value)
     return WIDTH**2 * variance / half**2 if half > 0 else float("inf")
 
 
 def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    """Clopper-Pearson interval of the probability of an event that was seen `events` times in `samples`."""
+    """Clopper-Pearson interval of the probability of an event that occurred in `events` of `samples`."""
     from scipy.special import betaincinv
 
     if samples == 0:
@@ -51,8 +51,8 @@ def binomial(events: int, samples: int, confidence: float = CONFIDENCE) -> tuple
 def weighted(total: float, squares: float, most: float, samples: int) -> tuple[float, float]:
     """Interval of the mean of positive weights, many of them zero, from their sum, sum of squares and the largest.
 
-    That of a gamma law with the mean's moments, for the upper end with one more of the largest weight. [Fay & Feuer,
-    Confidence intervals for directly standardized rates, 1997.]
+    Its ends are quantiles of a gamma law with the mean and the variance of the estimate; for the upper end one more
+    sample of the largest weight is counted. [Fay & Feuer, Confidence intervals for directly standardized rates, 1997.]
     """
     mean = total / samples
     if mean <= 0:
@@ -68,7 +68,7 @@ def _gamma(mean: float, variance: float, share: float) -> float:
     """Quantile of a gamma law."""
     from scipy.special import gammaincinv
 
-    # Below the rounding of the sums the law is its mean.
+    # A variance below the rounding error of the sums counts as zero.
     if variance <= 1e-20 * mean * mean:
         return mean
     return float(gammaincinv(mean * mean / variance, share)) * variance / mean
@@ -86,22 +86,22 @@ def replicated(means: Floats) -> tuple[float, float]:
 
 # Step of a difference quotient of margins, in standard deviations: the third root of their rounding.
 _MARGIN_STEP = 1e-4
-# Points evaluated at once: their intermediate values then stay in the cache.
+# Points evaluated in one call, few enough that intermediate values stay in the processor's cache.
 POINTS_TOGETHER = 20_000
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A probability of failure by one method, and its interval at 99.7 %, of no width where none is claimed.
+    """A probability of failure by one method, and its 99.7 % interval; `low` = `high` where the method gives none.
 
     Parameters
     ----------
     evaluations : int
-        Points at which margins were evaluated in all.
+        Number of points at which margins were evaluated.
     samples : int
-        Those that the value is a mean over; 0 where it is none.
-    invalid : int
-        Samples without margins; they are failures.
+        Number of samples whose mean is the value; 0 where it is not a mean.
+    failures, invalid : int
+        Samples that failed, and those among them whose margins are nan.
     """
 
     failure: float
@@ -134,10 +134,11 @@ class Problem:
         From points, shape (dimension, n), to margins, shape (limits, n). A limit is broken where its margin is
         negative; nan is a failure of its own kind (what cannot be assembled has no margins).
     gradients : callable, optional
-        From points to margins and their derivatives, shape (limits, dimension, n); left out, difference quotients.
+        From points to margins and their derivatives, shape (limits, dimension, n). Without it difference quotients are
+        used.
     circles : sequence of (int, int)
-        Variables that are no normal ones: the cosine and the sine of a direction that is as likely as any other.
-        Derivatives by them are those of margins that go on off the circle.
+        Pairs of variables that are not normal but the cosine and the sine of a direction, uniform over the circle.
+        Margins are defined off the circle, too, so that they have derivatives by these variables.
     """
 
     def __init__(
@@ -155,8 +156,8 @@ class Problem:
         self._gradients = gradients
 
     def draw(self, rng: np.random.Generator, count: int, spread: float = 1.0) -> Floats:
-        """Points, shape (dimension, count), normal variables with this standard deviation and all directions."""
-        u = np.where(self.straight[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
+        """Random points, shape (dimension, count): normal variables of this standard deviation, and directions."""
+        u = np.where(self.is_normal[:, None], spread, 1.0) * rng.standard_normal((self.dimension, count))
         for pair in self.circles:
             length = np.linalg.norm(u[pair], axis=0)
             u[pair[0]] = np.where(length > 0, u[pair[0]], 1.0)
@@ -164,8 +165,8 @@ class Problem:
         return u
 
     @property
-    def straight(self) -> Flags:
-        """Which of the variables are normal."""
+    def is_normal(self) -> Flags:
+        """Which variables are normal, shape (dimension,)."""
         return np.isin(np.arange(self.dimension), self.normals)
 
     def margins(self, u: Floats) -> Floats:

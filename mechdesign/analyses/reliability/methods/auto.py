@@ -1,4 +1,4 @@
-"""The cheapest method that reaches the precision, checked by the cheaper ones; moments from plain Monte Carlo."""
+"""The cheapest method that meets the precision, checked by the cheaper ones; moments from plain Monte Carlo."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.study.schema.methods import METHODS
 from mechdesign.study.schema.reliability import Precision
 
-# Plain Monte Carlo samples that every rung is checked against.
+# Plain Monte Carlo samples that are drawn first, and that every other method is checked against.
 PILOT = 4000
-# Plain samples up to which no other method is tried.
+# Number of plain samples up to which no other method is tried.
 FEW = 40_000
 # Failures from which on their share is precise enough to predict the samples needed.
 _ENOUGH_FAILURES = 30
-# A step beyond plain samples: from the problem, its design points, a generator, the most samples and the precision to
-# an estimate, or None where the step does not apply. An estimate without samples has no interval and is only a check.
+# A method that is tried after plain samples: from the problem, its design points, a generator, the most samples and the
+# precision to an estimate, or None where it does not apply. An estimate without samples is only a check.
 Rung = Callable[[Problem, DesignPoints, np.random.Generator, int, Precision], Estimate | None]
-# Ratio of the ends of two methods' intervals from which on they disagree.
+# Ratio of the nearest ends of two methods' intervals from which on they disagree.
 FACTOR = 1.5
 
 
 def rungs() -> dict[str, Rung]:
-    """Rungs of the methods that the schema declares as steps, in their order."""
+    """The methods that the schema declares as steps of `auto`, in their order."""
     steps = sorted((method for method in METHODS.values() if method.step), key=lambda method: method.step)
     return {method.name: import_module(method.place).rung for method in steps}
 
 
 def run(task: Task) -> MethodResult:
-    """Plain samples first, then the steps, until one is precise enough."""
+    """Plain samples first, then the other methods, until one is precise enough."""
     return pose_by_pose("auto", task, _at_pose)
 
 
@@ -53,7 +53,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
         plain(min(FEW, task.most))
         return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
     rng = generator(task.seed, setting.pose, SEARCH, 2)
-    # Plain samples at all poses together are at most about `task.most`.
+    # All poses share about `task.most` plain samples.
     problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
     estimate, used, tried = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
     pose = setting.pose
@@ -69,7 +69,7 @@ def climb(
     most: int,
     most_plain: int,
 ) -> tuple[Estimate, str, dict[str, Estimate]]:
-    """Probability of failure with a given precision.
+    """Probability of failure with a given precision, by the first method that meets it.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def climb(
             if estimate is None:
                 continue
             tried[name] = estimate
-            # Plain samples miss no kind of failure; an estimate below their interval does.
+            # Plain samples miss no kind of failure: an estimate below their interval has missed one.
             if estimate.failures and estimate.high >= best.low:
                 candidates[name] = estimate
                 if precise(estimate):

@@ -2,8 +2,8 @@
 
 [Hohenbichler & Rackwitz, First-order concepts in system reliability, 1983.]
 
-A direction has no tangent: limits have tangents at every choice of directions, and the probability is the mean over
-these.
+A random direction (`Problem.circles`) has no tangent: tangents are taken with the directions fixed, and the probability
+is the mean over random directions.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from mechdesign.analyses.reliability.engine.design_points import DesignPoints, descend, find, sizes
+from mechdesign.analyses.reliability.engine.descent import descend, sizes
+from mechdesign.analyses.reliability.engine.design_points import DesignPoints, find
 from mechdesign.analyses.reliability.engine.mixture import Mixture
 from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
 from mechdesign.analyses.reliability.methods import SEARCH, of_limits
@@ -24,21 +25,22 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.reliability import Precision
 
-# Directions drawn in each round of learning which ones count, and for the value.
+# Choices of all directions that are drawn in each round of learning which of them fail most, the number of these
+# rounds, and the choices drawn for the value.
 _LEARNING_CHOICES = 96
 _LEARNING_ROUNDS = 2
 _VALUE_CHOICES = 384
-# Design points that each choice begins at, and points drawn for its half-spaces.
+# Design points from which the tangents of each choice are searched, and points drawn in their half-spaces.
 _POINTS_BEGUN = 8
 _POINTS_DRAWN = 16
-# Share of the directions that are drawn from all alike.
+# Share of the choices that are drawn uniformly.
 _UNIFORM_SHARE = 0.1
-# Least share of a part of the mixture.
+# Least share of one part of the learned mixture.
 _LEAST_SHARE = 0.02
 
 
 def run(task: Task) -> MethodResult:
-    """Of every pose."""
+    """Probability of failure at every pose."""
     return of_limits("form", task, _at_pose)
 
 
@@ -50,16 +52,16 @@ def _at_pose(task: Task, setting: Setting) -> Estimate:
 def rung(
     problem: Problem, points: DesignPoints, rng: np.random.Generator, most: int, precision: Precision
 ) -> Estimate | None:
-    """A check of what is sampled about the design points."""
-    # The mean of tangents over directions costs more than what it checks.
+    """The step of `auto`: a check of importance sampling."""
+    # With random directions the check would cost more than the sampling.
     return None if len(problem.circles) else form(problem, points)
 
 
 def form(problem: Problem, points: DesignPoints) -> Estimate:
-    """Probability that any tangent half-space is entered.
+    """Probability that a point lies beyond any of the tangents.
 
-    Where no design point was found nothing breaks a limit within reach, and the value is 0; nan if samples fail all the
-    same, or all of them by one of the limits, for example by one that nothing random moves.
+    It is 0 where no design point was found and no sample failed. It is nan where samples failed although no design
+    point was found, or where all samples break one limit, for example one that no random source moves.
     """
     if points.always or (not len(points.u) and points.seen.shape[1]):
         return Estimate(math.nan, math.nan, math.nan, problem.evaluations)
@@ -71,7 +73,7 @@ def form(problem: Problem, points: DesignPoints) -> Estimate:
 
 
 def _mean(problem: Problem, points: DesignPoints) -> float:
-    """Mean over directions, which are drawn where they count."""
+    """Mean of the tangents' probability over random directions, drawn more often where failures are likely."""
     rng = np.random.Generator(np.random.SFC64(0))
     count, d = len(points.u), len(problem.normals)
     ones = np.full(count, (1.0 - _UNIFORM_SHARE) / count)
@@ -94,11 +96,11 @@ def _mean(problem: Problem, points: DesignPoints) -> float:
 
 
 def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.Generator) -> Floats:
-    """Probability of failure by tangents at the directions of `u`, shape (dimension, n): shape (n,)."""
+    """Probability of failure by tangents, with the directions that the points `u`, shape (dimension, n), have: (n,)."""
     count, begun = u.shape[1], points.u[:_POINTS_BEGUN]
     limit = points.limit[:_POINTS_BEGUN]
-    starts = np.where(problem.straight[:, None, None], begun.T[:, :, None], u[:, None])
-    at_mean = problem.margins(np.where(problem.straight[:, None], 0.0, u))
+    starts = np.where(problem.is_normal[:, None, None], begun.T[:, :, None], u[:, None])
+    at_mean = problem.margins(np.where(problem.is_normal[:, None], 0.0, u))
     normal = np.repeat(points.normal[:_POINTS_BEGUN].T[:, :, None], count, axis=2)
     distance = np.repeat(points.distance[:_POINTS_BEGUN, None], count, axis=1)
     sloped = limit >= 0
@@ -107,17 +109,17 @@ def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.G
     )
     shape = (len(u), int(sloped.sum()), count)
     normal[:, sloped] = normals.reshape(shape)
-    # Where no normal variable leads to the limit, it is broken at the mean or not at all.
+    # Where the descent does not reach the limit, it is broken everywhere or nowhere: the mean tells which.
     broken = np.where(at_mean[limit[sloped]] < 0, -np.inf, np.inf)
     distance[sloped] = np.where(good.reshape(shape[1:]), (found * normals).reshape(shape).sum(axis=0), broken)
     chance = ndtr(-distance)
     total = chance.sum(axis=0)
-    # As in `half_spaces`, for each choice.
+    # The estimate of `half_spaces`, for each choice of directions.
     share = np.cumsum(chance / np.where(total > 0, total, 1.0), axis=0)
     half = np.minimum((rng.random((_POINTS_DRAWN, 1, count)) > share).sum(axis=1), len(share) - 1)
     lanes = np.arange(count)
     own = normal[:, half, lanes]
-    z = rng.standard_normal((len(u), _POINTS_DRAWN, count)) * problem.straight[:, None, None]
+    z = rng.standard_normal((len(u), _POINTS_DRAWN, count)) * problem.is_normal[:, None, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = -ndtri(chance[half, lanes] * (1.0 - rng.random((_POINTS_DRAWN, count))))
         z += own * np.nan_to_num(depth - (own * z).sum(axis=0))

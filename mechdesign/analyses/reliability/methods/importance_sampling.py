@@ -33,39 +33,42 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats
 from mechdesign.study.schema.reliability import Precision
 
-# Rounds of learning, from all failures so far, and their samples a dimension, each part besides, and at least.
+# Most rounds of learning; samples of a round for each dimension, further ones for each dimension and part, and the
+# least samples of a round.
 _ROUNDS = 12
 _ROUND_SAMPLES = 40
 _PART_SAMPLES = 10
 _ROUND_LEAST = 1600
-# Learned enough where the relative variance of a round's weights is below this, or below the number of rounds.
+# Learning ends where the relative variance of a round's weights is below this, or below the number of rounds.
 _GOOD_VARIANCE = 2.0
-# A part more, of this weight, where a failure adds so much to that variance and lacks so many times its samples.
+# A new part of the mixture is added about a failure that adds at least this much to that variance and is this many
+# times less likely in the mixture than it should be; and the weight of the new part.
 _PART_WEIGHT = 0.05
 _PART_VARIANCE = 0.1
 _PART_LACK = 10.0
-# Parts up to which more are added.
+# Most parts up to which new ones are added.
 _MAX_PARTS = 24
-# Explored failures, by their weights, from which on they add parts before the first round.
+# Effective number of failures among the explored samples from which on they add parts before the first round.
 _EXPLORED_MANY = 5
 # Share of the learned parts' samples that are drawn widely, so that the variance of the weights is finite.
 _WIDE_SHARE = 0.2
-# Share of the samples that stay with the design points, and with the least of them.
+# Share of the samples that are always drawn about the design points, and the least share of one design point.
 _FIXED_SHARE = 0.1
 _LEAST_SHARE = 0.02
-# Share of these beyond so much of the distance of the nearest design point: what was not found lies there too.
+# Share of these that are drawn anywhere beyond this part of the nearest design point's distance, where failures that
+# were not found may lie.
 _BEYOND_SHARE = 0.2
 _BEYOND_FROM = 0.9
-# First samples of the value, by which the rest is planned, and how many times those needed are drawn.
+# Samples by which the number of all samples is planned, and the factor by which more than planned are drawn.
 _FIRST_SAMPLES = 3000
 _MARGIN = 1.1
-# Least density that counts, and the largest logarithm of a density.
+# Least density and largest logarithm of a density; smaller and larger ones are clipped against overflow.
 _LEAST_DENSITY = 1e-200
 _MAX_LOG_DENSITY = 600.0
 
 
 def run(task: Task) -> MethodResult:
-    """Of every pose; where no failure was seen, plain samples bound what was missed."""
+    """Probability of failure at every pose; where no sample failed, the bound that plain samples give."""
     return of_limits("importance_sampling", task, _at_pose)
 
 
@@ -88,9 +91,9 @@ def importance_sampling(
     samples: int,
     precision: Precision | None = None,
 ) -> Estimate:
-    """Probability of failure; 0 with the interval [0, 1] where no failure was seen, or no design point is known.
+    """Probability of failure; 0 with the interval [0, 1] where no sample failed, or no design point was found.
 
-    Besides those that the mixture learns from at most `samples` are drawn, all of them where no precision is given.
+    At most `samples` are drawn besides those that the mixture learns from; all of them where no precision is given.
     """
     if not len(points.u):
         return Estimate(0.0, 0.0, 1.0, problem.evaluations)
@@ -114,7 +117,7 @@ def importance_sampling(
                 more = _MARGIN * needed(precision, mean, max(squares / done, square) - mean * mean)
                 wanted = int(min(samples, max(1.2 * done, more)))
     low, high = weighted(total, max(squares, done * square), most, done)
-    # Weights are 1 on the average only.
+    # The mean weight of all samples is 1 only in expectation, so that the estimate can exceed 1.
     return Estimate(min(total / done, 1.0), low, high, problem.evaluations, done, failures, invalid)
 
 
@@ -122,11 +125,11 @@ rung = importance_sampling
 
 
 def _about(problem: Problem, points: DesignPoints) -> Mixture:
-    """Parts about the design points, weighted by the tangents' probabilities, and what is beyond the nearest one."""
+    """Parts about the design points, weighted by the tangents' probabilities, and a part beyond the nearest one."""
     from scipy.special import i0e, log_ndtr
 
     near = points.near
-    # A mean that fails itself is where most of the failures are.
+    # Where the mean itself fails, most failures lie about the mean.
     centre = np.where(points.distance[near, None] > 0, points.u[near][:, problem.normals], 0.0)
     logs = log_ndtr(-points.distance[near]) + np.log(i0e(np.linalg.norm(points.pull[near], axis=2))).sum(axis=1)
     weight = np.exp(logs - logs.max())
@@ -144,14 +147,15 @@ def _least(normal: Floats) -> float:
 
 
 def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -> tuple[Mixture, float, float]:
-    """The mixture nearest to the failures, beside the fixed one: one step of expectation and maximisation a round.
+    """The learned mixture joined with the fixed one about the design points, and the mean square and largest weight.
 
-    With it, from all failures of the rounds: the mean square and the largest of the weights of its own samples.
+    Each round is one step of expectation and maximisation over all failures so far. Mean square and largest weight are
+    estimated from these failures for samples of the returned mixture.
     """
     fixed = _about(problem, points)
     parts = replace(fixed, weight=(1.0 - _LEAST_SHARE) * fixed.weight / fixed.weight.sum())
     explored = explored_weights(problem, points.seen)
-    # Where many of them count, the samples that starts were taken from know of places without a design point.
+    # Failures among the explored samples may show regions that have no design point.
     if float(explored.sum()) ** 2 > _EXPLORED_MANY * float(explored @ explored):
         parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
     count = max(_ROUND_LEAST, (_ROUND_SAMPLES + _PART_SAMPLES * len(fixed.weight)) * problem.dimension)
@@ -161,7 +165,7 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
         u = mixture.draw(rng, count)
         u = u[:, failed(problem.margins(u))]
         weights = mixture.worth(u)
-        # What is nearer than the nearest design point was not found before.
+        # A failure nearer to the mean than all before moves the edge of the part beyond inwards.
         beyond = min(fixed.beyond, _BEYOND_FROM * _least(u[problem.normals]))
         fixed, parts = replace(fixed, beyond=beyond), replace(parts, beyond=beyond)
         seen.append(u)
@@ -179,14 +183,14 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
 
 
 def _covering(fixed: Mixture, parts: Mixture, u: Floats, worth: Floats, drawn: int) -> Mixture:
-    """`parts`, and more of them about failures, shape (dimension, n), that both mixtures have far too few samples of.
+    """`parts` with new parts about failures `u`, shape (dimension, n), that both mixtures draw far too seldom.
 
-    `worth` are the weights of the failures when they were seen among `drawn` samples.
+    `worth` are the weights that the failures had when they were drawn, among `drawn` samples.
     """
     total = float(worth.sum())
     if not total > 0:
         return parts
-    held, own = (np.exp(np.minimum(each.logs(u), _MAX_LOG_DENSITY)).sum(axis=0) for each in (fixed, parts))
+    held, own = (np.exp(np.minimum(mixture.logs(u), _MAX_LOG_DENSITY)).sum(axis=0) for mixture in (fixed, parts))
     while len(parts.weight) < max(len(fixed.weight), _MAX_PARTS):
         # Density of failures over that of the mixture: its mean over failures is 1 and the weights' relative variance.
         density = _FIXED_SHARE * held + (1 - _FIXED_SHARE) * own

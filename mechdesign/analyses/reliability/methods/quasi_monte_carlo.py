@@ -1,4 +1,4 @@
-"""Scrambled Sobol points, in replicates that give the interval.
+"""Scrambled Sobol points, in independent replicates whose spread gives the interval.
 
 [Sobol, 1967; Owen, Randomly permuted (t,m,s)-nets, 1995; Joe & Kuo, Constructing Sobol sequences with better
 two-dimensional projections, 2008 (scipy.stats.qmc).]
@@ -24,7 +24,7 @@ _FEW_FAILURES = 200
 
 
 def run(task: Task) -> MethodResult:
-    """About as many points at each pose as the study gives samples."""
+    """Results at every pose, with about the study's number of samples as points."""
     return pose_by_pose(NAME, task, _at_pose)
 
 
@@ -39,7 +39,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
             for block, u in enumerate(points(len(sources.owners), count, seed))
         ])  # fmt: skip
     total = Sums.total([part for replicate in parts for part in replicate])
-    # Evenly spread points have no trend with their number.
+    # Points of a Sobol sequence are not independent: their trend with the number of samples is left out.
     result = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
     if task.question.limited:
         broken = [sum(part.failures for part in replicate) for replicate in parts]
@@ -48,7 +48,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
 
 
 def replicates(samples: int) -> list[int]:
-    """Points of each replicate: the power of two that makes about `samples` in all."""
+    """Number of points of each replicate: the power of two with which all together have about `samples`."""
     exponent = max(1, round(np.log2(max(samples / REPLICATES, 2))))
     return [2**exponent] * REPLICATES
 

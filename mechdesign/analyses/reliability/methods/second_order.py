@@ -22,12 +22,12 @@ from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.work.chunks import map_chunks
 
-# Longest step of the differences, as a part of the mechanism's size or in radians: the fourth root of rounding, at
-# which a second derivative has about seven digits.
+# Longest step of the differences, as a part of the mechanism's size or in radians: the fourth root of the rounding
+# error, at which a second derivative has about seven digits.
 _LONGEST = 1e-4
-# Shortest step likewise; of finely made mechanisms fewer digits count.
+# Shortest step, in the same units. With small tolerances the second order is small, and fewer digits suffice.
 _SHORTEST = 1e-6
-# Step between these, as a part of the standard deviation.
+# Step between these limits, in standard deviations.
 _PART = 0.3
 
 
@@ -35,8 +35,8 @@ _PART = 0.3
 class Cumulants:
     """Joint cumulants of the components: the scalars, then x and y of each pin's offset.
 
-    Of third and fourth order those that are not zero: components, shape (terms, order), and values; every order of
-    unlike components is a term.
+    `third` and `fourth` list those that are not zero: components, shape (terms, order), and values. Each permutation of
+    different components is a term of its own.
     """
 
     mean: Floats
@@ -47,7 +47,7 @@ class Cumulants:
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """Errors of all channels as quadratic functions of the components: each array has the channels first."""
+    """Errors of all channels as quadratic functions of the components; arrays of shape (channels, ...)."""
 
     value: Floats
     gradient: Floats
@@ -96,7 +96,7 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
     places = np.arange(len(i))
     pairs[i, places], pairs[j, places] = steps[i], steps[j]
     z = np.concatenate([np.zeros((count, 1)), single, -single, pairs, -pairs], axis=1)
-    # A pin's place is counted as that of a radial clearance of 1.
+    # Each pin gets a radial clearance of 1, so that its components are its place.
     drawn = np.insert(z, range(len(sources.scalars), count, 2), 1.0, axis=0)
     errors, valid = errors_of(setting, sources.made(drawn), z.shape[1])
     found = np.where(valid, errors, np.nan)
@@ -111,7 +111,7 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
 
 
 def step_sizes(sources: Sources, sigma: Floats) -> Floats:
-    """Step of each component, from its standard deviation and from how far it moves the mechanism."""
+    """Step of each component, from its standard deviation `sigma` and from how far it moves the mechanism."""
     length = sources.study.mechanism.size or 1.0
     scale = np.full(len(sigma), length)
     for k, scalar in enumerate(sources.scalars):
@@ -120,7 +120,7 @@ def step_sizes(sources: Sources, sigma: Floats) -> Floats:
         scale[k] = min(reach, default=1.0)
     for k, pin in enumerate(sources.pins):
         first = len(sources.scalars) + 2 * k
-        # A slider's end moves its offset, and its angle (the last of its places) by the inverse of its length.
+        # The end of a slider moves its offset, and turns it (the last of its places) by 1/length.
         turn = abs(float([*pin.directions[0].values()][-1])) if len(pin.directions[0]) > 1 else 0.0
         scale[first : first + 2] = min(length, 1.0 / turn) if turn else length
     steps = np.clip(_PART * sigma, _SHORTEST * scale, _LONGEST * scale)
@@ -134,8 +134,8 @@ def cumulants(sources: Sources) -> Cumulants:
     """Cumulants with the pins' laws of the analytic method.
 
     A clearance's radius R multiplies the place for a unit clearance (x, y) of its pin or slider: E[(R x)^2] =
-    E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^2 y^2], and all odd moments are zero. Of
-    correlated dimensions that are not normal the cumulants of two are counted, those of three and more together not.
+    E[R^2] E[x^2], E[(R x)^4] = E[R^4] E[x^4], E[R^4 x^2 y^2] = E[R^4] E[x^2 y^2], and all odd moments are zero. Joint
+    cumulants of two correlated dimensions that are not normal are included, those of three or four are neglected.
     """
     laws = [[float(moment) for moment in scalar.law.moments] for scalar in sources.scalars]
     count = len(laws)
@@ -186,5 +186,5 @@ def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Float
         if value
         for permutation in sorted(set(permutations(places)))
     ]
-    index = np.array([each for each, _ in terms], dtype=np.intp).reshape(-1, order)
+    index = np.array([components for components, _ in terms], dtype=np.intp).reshape(-1, order)
     return index, np.array([value for _, value in terms], dtype=float)

@@ -26,7 +26,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.analyses.reliability.first_order import linear_errors, linear_margins, nominal_values
     from mechdesign.analyses.reliability.probability import made_failure
     from mechdesign.analyses.reliability.question import ask
-    from mechdesign.analyses.reliability.sources import find_sources
+    from mechdesign.analyses.reliability.study_sources import find_sources
 
     assert study.reliability is not None
     mechanism, sources, question = study.mechanism, find_sources(study)[0], ask(study, study.reliability)

@@ -20,7 +20,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.analyses.reliability.deflection import elasticity
     from mechdesign.analyses.reliability.first_order import linear_errors
     from mechdesign.analyses.reliability.question import Channel
-    from mechdesign.analyses.reliability.sources import find_sources
+    from mechdesign.analyses.reliability.study_sources import find_sources
 
     assert study.workspace is not None
     mechanism, point = study.mechanism, study.workspace.point
