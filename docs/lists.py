@@ -6,14 +6,16 @@ What `mechdesign docs WORD` prints in a terminal stands here, a page a subject.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import groupby
+from pathlib import Path
 
 import yaml
 
 from mechdesign.cautions import KINDS
+from mechdesign.mechanism.configuration import REASONS
 from mechdesign.reference import Entry, entries, tables
 from mechdesign.reference.messages import PART, messages
 from mechdesign.results import TableKind
@@ -36,14 +38,15 @@ LISTS = {
     ),
     "exit_codes": ("Exit codes", "What a command ends with; of several questions the largest.", ("exit code",)),
 }
-# Parts of a group of messages: title, and exit codes.
+# Messages of a page: title, and exit codes.
 MESSAGES: dict[str, tuple[int | None, ...]] = {
     "Errors in the study or the command (exit code 2)": (2,),
     "The mechanism cannot do it (exit code 3)": (3,),
     "Failures (exit code 4)": (4,),
     "Warnings: the results are there": (None,),
-    "Parts of these messages": (PART,),
+    "Parts of messages, and further texts": (PART,),
 }
+DOCS = Path(__file__).parent
 LINE = 80  # characters of a line of an example
 _APART = ("key", "table", "column", "local index", "result of workspace", "exit code")
 _SPECIAL = re.compile(r"([\\*_<>\[\]$|#])")
@@ -177,24 +180,32 @@ def table_page(command: str, found: Iterable[TableKind]) -> str:
     return _page(f"Tables of {command}", parts)
 
 
-def messages_page() -> str:
-    """The page of errors and warnings."""
+def messages_page(known: Mapping[str, str]) -> str:
+    """The page of errors and warnings; titles of other pages are those of `known`, or of files of the site."""
     parts = [
-        "Every error and warning, in the order in which one meets them; `…` stands for what differs. Behind an "
-        "arrow stands what mends it, where the message does not say so itself. `mechdesign docs TEXT` finds those that "
-        'contain a text, for example `mechdesign docs "singular position"`, or a whole message as it was printed.',
-        "An error of a study begins with the file, the line, the column and the key. Exit codes are those of "
-        "[](exit_codes.md): with 2 nothing was computed.",
+        "Every error and warning, under the page that tells more of what it is about; `…` stands for what differs. "
+        "`mechdesign docs TEXT` finds those that contain a text, for example "
+        '`mechdesign docs "singular position"`, or a whole message as it was printed.',
+        "An error of a study begins with the file, the line, the column and the key; `mechdesign docs KEY` has what "
+        "the key takes and an example. One of an option begins with it; `mechdesign COMMAND --help` lists them. "
+        "Exit codes are those of [](exit_codes.md): with 2 nothing was computed.",
     ]
     kinds = (f"- {code(kind)}: {each.meaning}. See [](../../{each.page}.md)." for kind, each in KINDS.items())
     parts += ["## Kinds of warnings", "What `fail_on` lists, and the page that tells more.", "\n".join(kinds)]
-    for group, about in groupby(messages(), key=lambda message: message.group):
-        parts += [f"## {group.group}", group.about]
+    reasons = (f"- {code(reason)}: {cure}" for reason, cure in REASONS.items())
+    parts += [
+        "## Poses that fail",
+        "A listed pose that fails ends with exit code 3, one of a sweep is a warning. The reasons:",
+        "\n".join(reasons),
+    ]
+    for page, about in groupby(messages(), key=lambda message: message.page):
+        text = known.get(f"{page}.md") or (DOCS / f"{page}.md").read_text(encoding="utf-8")
+        heading = text.partition("\n")[0].partition("# ")[2]
+        parts += [f"## {heading or page.rpartition('/')[2].capitalize()}", f"See [](../../{page}.md)."]
         told = list(about)
         for title, codes in MESSAGES.items():
             lines = [
                 f"- {code(each.text)}" + f" ([{each.kind}](#kinds-of-warnings))" * bool(each.kind)
-                + f" \N{RIGHTWARDS ARROW} {each.mend}" * bool(each.mend)
                 for each in told if each.code in codes
             ]  # fmt: skip
             if lines:
@@ -229,5 +240,5 @@ def pages() -> dict[str, str]:
     for name, (title, before, kinds) in LISTS.items():
         found = [entry for entry in known if (entry.kind in kinds if kinds else entry.kind not in _APART)]
         text[f"reference/lists/{name}.md"] = listed(title, before, found)
-    text["reference/lists/messages.md"] = messages_page()
+    text["reference/lists/messages.md"] = messages_page(text)
     return text

@@ -1,4 +1,4 @@
-"""Warnings as values: of what kind, a sentence, and the place that it is about."""
+"""Warnings as values: a kind, a sentence, and the table, row and pose concerned."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of warning: what it is of, and the page of the documentation that tells more, without its suffix."""
+    """A kind of warning: its meaning, and the page of the documentation that explains it, without ``.md``."""
 
     meaning: str
     page: str
@@ -19,11 +19,17 @@ KINDS = {
         "poses, samples or designs that cannot be assembled, or that a limit of motion forbids", "theory/limits"
     ),
     "singular": Kind(
-        "the mechanism is at, near or passes a singularity, dead centre or change point", "theory/kinematics"
+        "the mechanism is at, near or passes a singularity, dead centre or change point, where rates and forces lose "
+        "digits or have no bound; nothing is wrong with a dead centre where the output shall turn back",
+        "theory/kinematics",
     ),
-    "disagree": Kind("methods of reliability that disagree", "theory/reliability"),
+    "disagree": Kind(
+        "methods of reliability that disagree; trust those that count samples (monte_carlo, auto)", "theory/reliability"
+    ),
     "unconverged": Kind(
-        "a number is known less exactly than asked, or a search or simulation ended too early", "theory/limits"
+        "a number is known less exactly than asked, or a search or simulation ended too early; more samples, rays or "
+        "evaluations help, or a wider tolerance",
+        "theory/limits",
     ),
     "undefined": Kind("numbers that have no value where they are asked", "theory/conventions"),
     "incomplete": Kind("a part of what was asked is left out", "theory/limits"),
@@ -55,15 +61,15 @@ class Caution:
 
     kind: str  #: one of `KINDS`
     message: str  #: the sentence
-    table: str = ""  #: the table of the result that it is about; empty where it is about no single one
-    row: int | None = None  #: the first of its rows, from 0
-    pose: str = ""  #: the first pose, or the case, in words
+    table: str = ""  #: name of the table concerned; empty if the warning concerns the whole result
+    row: int | None = None  #: first row concerned, from 0
+    pose: str = ""  #: first pose or case concerned, in words
 
     def __str__(self) -> str:
         return self.message
 
     def as_data(self) -> dict[str, str | int]:
-        """Plain data, as a manifest has it: the kind, the sentence, and of the place what is known."""
+        """Plain data for a manifest; empty fields are left out."""
         return {name: value for name, value in asdict(self).items() if value not in ("", None)}
 
 

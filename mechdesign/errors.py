@@ -20,6 +20,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mechdesign.results import Result
 
+HELP_PAGE = "reference/commands"
+
 
 EXIT_CODES = {
     0: "done, every requirement met",
@@ -32,8 +34,8 @@ EXIT_CODES = {
 }
 
 
-# Mistakes that a message lists, the names of one study that are compared with those known, and the characters of a
-# text that a message repeats.
+# Most mistakes listed in one message, most misspelt names compared with the known ones, and most characters of a
+# quoted text.
 MAX_LISTED = 100
 MAX_COMPARED = 20
 MAX_ECHO = 60
@@ -45,7 +47,7 @@ _LONG_SEGMENT = re.compile(rf"[^.]{{{MAX_ECHO + 1},}}")
 
 @contextmanager
 def few_comparisons() -> Iterator[None]:
-    """Within, `nearest` looks for the first `MAX_COMPARED` names only: of thousands it would take minutes."""
+    """Inside this context `nearest` compares `MAX_COMPARED` names only: thousands would take minutes."""
     token = _compared.set(set())
     try:
         yield
@@ -54,7 +56,7 @@ def few_comparisons() -> Iterator[None]:
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that resembles this one most, None where none does."""
+    """The known name most similar to this one; None if no name is similar."""
     compared = _compared.get()
     if compared is not None:
         if len(compared) >= MAX_COMPARED and name not in compared:
@@ -66,10 +68,10 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
 
 
 def printable(text: str, escape: Callable[[str], str] = ascii) -> str:
-    """A text in one line, without characters that a terminal, an XML or a CSV file would take for more than letters.
+    """A text in one line, safe in a terminal, an XML or a CSV file.
 
-    Those of control, of direction, and of no meaning are written as escapes, such as ``\\x1b``; `escape` gives one with
-    a quotation mark on either side.
+    Control, direction and unassigned characters are written as escapes, such as ``\\x1b``; `escape` returns one
+    between quotation marks.
     """
     if text.isprintable():
         return text
@@ -77,17 +79,17 @@ def printable(text: str, escape: Callable[[str], str] = ascii) -> str:
 
 
 def printable_lines(text: str, escape: Callable[[str], str] = ascii) -> str:
-    """The same of a text of several lines, which it keeps."""
+    """As `printable`, line by line."""
     return "\n".join(printable(line, escape) for line in text.split("\n"))
 
 
 def cut(text: str, most: int = MAX_ECHO) -> str:
-    """A text that is echoed in a message, at most this long."""
+    """A text shortened to at most `most` characters."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def _brief(message: str) -> str:
-    """A message in one line, in which quoted texts are cut."""
+    """A message in one line, with long quotations shortened."""
 
     def shorter(found: re.Match[str]) -> str:
         text = found[0]
@@ -97,7 +99,7 @@ def _brief(message: str) -> str:
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Give ``; did you mean 'x'?`` where a known name resembles this one, or else nothing."""
+    """``; did you mean 'x'?`` if a known name is similar to this one, else an empty text."""
     near = nearest(name, known)
     return f"; did you mean {near!r}?" if near is not None else ""
 
@@ -181,7 +183,7 @@ class AssemblyError(MechdesignError):
     exit_code = 3
 
     def __init__(self, message: str, result: Result | None = None) -> None:
-        self.result = result  #: of an optimisation without a feasible design: the one that misses least
+        self.result = result  #: of an optimisation without a feasible design: the design closest to feasible
         super().__init__(message)
 
 
@@ -202,12 +204,12 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(result.interrupted)
 
 
-# What libraries say where memory runs out while they are loaded, or begin a thread.
+# Messages of libraries that run out of memory while they are loaded or start a thread.
 _NO_MEMORY = ("failed to map segment", "Cannot allocate memory", "can't start new thread")
 
 
 def _out_of_memory(error: BaseException | None) -> bool:
-    """Whether it came of a lack of memory, also where clearing up failed after it."""
+    """Whether lack of memory caused an error, directly or through another error."""
     while error is not None:
         if isinstance(error, MemoryError) or any(text in str(error) for text in _NO_MEMORY):
             return True
@@ -216,7 +218,7 @@ def _out_of_memory(error: BaseException | None) -> bool:
 
 
 def explain(error: Exception) -> tuple[int, str]:
-    """Exit code and message of an exception; what nobody foresaw asks to be reported."""
+    """Exit code and message of an exception; an unexpected one asks the user to report it."""
     if isinstance(error, MechdesignError):
         return error.exit_code, printable_lines(str(error))
     if _out_of_memory(error):

@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import cut
 from mechdesign.numerics.arrays import Floats
 
+HELP_PAGE = "reference/expressions"
+
 Number = float | Floats
 
 # Longest text accepted, in characters, and its deepest nesting of parentheses.
@@ -152,7 +154,7 @@ class Expression:
         result: Number = self._run(float, lambda name: self._variable(env, name), self._apply)
         # A variable that is nan has its own message already.
         if type(result) is float and not math.isfinite(result) and not any(np.isnan(env[n]).any() for n in self.names):
-            raise ExpressionError(f"{self.text!r} has no finite value")
+            raise ExpressionError(f"{self.text!r} has no finite value: a division by zero, or too large a power")
         return result
 
     def derivatives(self, env: Mapping[str, ArrayLike]) -> dict[str, Number]:
@@ -368,7 +370,9 @@ class _Parser:
     def _operand_chain(self, binding: int) -> None:
         self.depth += 1
         if self.depth > MAX_NESTING:
-            raise ExpressionError(f"an expression nested deeper than {MAX_NESTING} levels")
+            raise ExpressionError(
+                f"an expression nested deeper than {MAX_NESTING} levels; name its parts as parameters"
+            )
         self._operand()
         while True:
             kind, token = self._peek()

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, folders of one process, and formats of pictures."""
+"""Files written whole or not at all, folders locked by one process, and formats of pictures."""
 
 from __future__ import annotations
 
@@ -16,21 +16,23 @@ from typing import TextIO
 
 from mechdesign.errors import OutputError, StudyError
 
+HELP_PAGE = "reference/commands"
+
 try:
     import fcntl
 except ImportError:
     fcntl = None  # type: ignore[assignment]
 
-# Of pictures; the first is drawn where none is asked.
+# Formats of pictures; the first is the default.
 FORMATS = ("png", "svg", "pdf")
-# In a folder of results: who writes there, and the names of what is just changing.
+# In a folder of results: the lock of the process that writes there, and the names of files that are being replaced.
 _LOCK = ".mechdesign.lock"
 _UNSETTLED = ".mechdesign.unsettled"
-_MOST_BYTES = 10_000_000  # in which the mark of a file is looked for
+_MOST_BYTES = 10_000_000  # most bytes searched for the mark of a file
 
 
 def formats_of(listed: str | None, option: str) -> str:
-    """Formats of pictures as an option lists them, each once, with commas between.
+    """Formats of pictures that an option lists, without repetitions, separated by commas.
 
     Raises
     ------
@@ -62,9 +64,9 @@ def replace(path: Path, blocks: Iterable[bytes]) -> str:
 
 
 class Transaction:
-    """Files of a folder that are written aside, all of them, before the first is put in place.
+    """Files of a folder, all written under temporary names before the first gets its own name.
 
-    What cannot be written leaves the folder as it was. Used as a context, which clears up.
+    A failed write leaves the folder unchanged. Used as a context, which removes the temporary files.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -80,7 +82,7 @@ class Transaction:
                 temporary.unlink(missing_ok=True)
 
     def stage(self, name: str, blocks: Iterable[bytes]) -> str:
-        """Write a file aside, and return its SHA-256."""
+        """Write a file under a temporary name, and return its SHA-256."""
         temporary = self._staged[name] = self.directory / f".{name}.{os.getpid()}.tmp"
         digest = hashlib.sha256()
         with temporary.open("wb") as stream:
@@ -90,14 +92,14 @@ class Transaction:
         return digest.hexdigest()
 
     def commit(self, own: Collection[str] = (), kept: Collection[str] = (), *, voucher: str | None = None) -> None:
-        """Put the files in place, and remove of the folder's `own` ones all but those `kept`.
+        """Give the files their names, and remove the folder's `own` files except those `kept`.
 
-        While it goes on there is no voucher. Where it is cut off, the names of all stay in a file: `unsettled`.
+        The voucher is removed first and written last. If the process is killed meanwhile, `unsettled` lists the files.
 
         Raises
         ------
         StudyError
-            If a file has to be replaced that is none of the folder's own; then nothing has changed.
+            If a file would be replaced that is not one of the folder's own; then nothing has changed.
         """
         if voucher is not None:
             check_own(self.directory, self._staged, own)
@@ -112,7 +114,7 @@ class Transaction:
 
 
 def unsettled(directory: Path) -> set[str]:
-    """Names of files that a transaction was changing when it was cut off."""
+    """Names of files that a killed transaction was replacing."""
     try:
         names = json.loads((directory / _UNSETTLED).read_bytes())
     except (OSError, ValueError, RecursionError):
@@ -121,19 +123,19 @@ def unsettled(directory: Path) -> set[str]:
 
 
 def settle(directory: Path) -> None:
-    """Note that a folder's files belong together."""
+    """Mark a folder's files as belonging together."""
     (directory / _UNSETTLED).unlink(missing_ok=True)
 
 
 def proper(name: object) -> bool:
-    """Whether a text is the name of a file in a folder, and leads nowhere else."""
+    """Whether a text is a plain file name, not a path to elsewhere."""
     return isinstance(name, str) and name not in {"", ".", ".."} and not {"/", os.sep, "\0"}.intersection(name)
 
 
 def check_own(directory: Path, names: Iterable[str], own: Collection[str], read: Iterable[Path] = ()) -> None:
-    """Find out that results would take the place of files in a folder that are none of its own, or that are `read`.
+    """Check that results would replace only the folder's own files, and none that is `read`.
 
-    `names` are patterns. A link is nobody's, and is not followed.
+    `names` are patterns. A symbolic link is never the folder's own, and is not followed.
 
     Raises
     ------
@@ -146,7 +148,7 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
             path for path in directory.iterdir() if any(fnmatchcase(path.name, pattern) for pattern in patterns)
         )
     except OSError:
-        # There is no folder, as a rule; else who writes there says why not.
+        # Usually the folder does not exist; otherwise writing will give the reason.
         return
     kept = [file for file in read if os.path.exists(file)]
     for path in there:
@@ -157,9 +159,9 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
 
 
 def check_marked(path: Path, mark: bytes) -> None:
-    """Find out that a file stands in the place of another that is known by a mark; one without content is in no way.
+    """Check that a file may be replaced: it contains the mark of our files, or is empty.
 
-    Devices and pipes take what is written. A link to a file is not followed.
+    Devices and pipes may be written to. A link to a file is not followed.
 
     Raises
     ------
@@ -173,12 +175,12 @@ def check_marked(path: Path, mark: bytes) -> None:
 
 
 def flowing(path: Path) -> bool:
-    """Whether a device or a pipe stands there, or a link to one."""
+    """Whether a path is a device or a pipe, or a link to one."""
     return os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path)
 
 
 def marked(path: Path, mark: bytes) -> bool:
-    """Whether a file, no link, holds a mark."""
+    """Whether a path is a file, not a link, that contains a mark."""
     try:
         if path.is_symlink() or not path.is_file():
             return False
@@ -194,7 +196,7 @@ def _foreign(path: Path) -> StudyError:
 
 
 def check_writable(directory: Path) -> None:
-    """Find out before a long computation that its results could not be written; creates nothing.
+    """Check before a long computation that its results can be written; creates nothing.
 
     Raises
     ------
@@ -214,10 +216,10 @@ def check_writable(directory: Path) -> None:
 
 @contextmanager
 def owned(directory: Path) -> Iterator[None]:
-    """Keep a folder, made where there is none, to this process; clears up what a killed one left in it.
+    """Lock a folder for this process, creating it if needed; removes what a killed process left in it.
 
-    The operating system drops the lock with the process that holds it, however that ends; the file says who that is.
-    Where files cannot be locked, nobody is kept out.
+    The operating system releases the lock when the process ends; the lock file names the process. Where files cannot
+    be locked, other processes are not kept out.
 
     Raises
     ------
@@ -240,13 +242,13 @@ def owned(directory: Path) -> Iterator[None]:
             yield
     finally:
         for place in made:
-            # One that holds something stays.
+            # A folder with files stays.
             with suppress(OSError):
                 place.rmdir()
 
 
 def _locked(path: Path) -> TextIO:
-    """The file of a lock, which no other process holds."""
+    """The open lock file, locked by this process."""
     while True:
         stream = open(path, "a+", encoding="utf-8", opener=_unlinked)  # noqa: SIM115
         try:
@@ -260,7 +262,7 @@ def _locked(path: Path) -> TextIO:
             raise OutputError(message) from None
         except OSError:
             return stream
-        # Unless its owner removed it in between.
+        # Its owner may have removed it in between.
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(stream.fileno()), path.stat()):
                 return stream
@@ -275,7 +277,7 @@ def _unlinked(path: str, flags: int) -> int:
 def _held(stream: TextIO, path: Path) -> Iterator[None]:
     try:
         with suppress(OSError):
-            # On a full disk the owner has no name.
+            # On a full disk the lock file stays empty.
             os.truncate(stream.fileno(), 0)
             os.write(stream.fileno(), f"process {os.getpid()} on {platform.node()}".encode())
         yield
@@ -285,7 +287,7 @@ def _held(stream: TextIO, path: Path) -> Iterator[None]:
 
 
 def _temporaries(directory: Path, name: str = ".+") -> list[Path]:
-    """Files that were being written, aside from where they belong."""
+    """Temporary files of unfinished writes."""
     pattern = re.compile(rf"\.{name}\.\d+\.tmp")
     try:
         return [path for path in directory.iterdir() if pattern.fullmatch(path.name)]

@@ -15,6 +15,8 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.results import Result, Table
 from mechdesign.statistics import STATISTICS, Asked, Course, Interval, Part, RowSpread
 
+HELP_PAGE = "reference/study/requirements"
+
 # Number of a column's values that a message names.
 MOST_VALUES = 12
 # Stands in the meaning of a column whose rows have different units; the table's column `unit` has them.

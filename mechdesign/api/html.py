@@ -54,7 +54,7 @@ def study_html(study: Study, picture: bytes | None) -> str:
         "questions": list(study.questions),
         "changed": list(study.overrides),
     }
-    return _render("study.html.j2", name=study.name, facts=facts, warnings=study.cautions, picture=_inline(picture))
+    return _render("study.html.j2", name=study.name, facts=facts, warnings=[*study.cautions], picture=_inline(picture))
 
 
 def answer_html(

@@ -1,4 +1,4 @@
-"""Mistakes and warnings as GitHub shows them beside the lines of a change, where it is GitHub that runs the command."""
+"""Mistakes and warnings as annotations that GitHub shows beside the lines of a change."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _PROPERTY = _DATA | str.maketrans({":": "%3A", ",": "%2C"})
 
 
 def annotate(level: str, problems: Iterable[Problem]) -> None:
-    """Say an ``error`` or ``warning`` on stderr for each problem, if GitHub listens."""
+    """Write an ``error`` or ``warning`` annotation for each problem to stderr, if GitHub runs the command."""
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     for problem in problems:
-        # A text has a name in brackets, what an option says its name.
+        # The name of a study given as a text is in brackets, that of an option begins with a dash.
         file = "" if problem.file.startswith(("<", "-")) else problem.file
         place = {"file": _in_repository(file), "line": problem.line or "", "col": problem.column or ""}
         where = ",".join(f"{name}={str(value).translate(_PROPERTY)}" for name, value in place.items() if value)
@@ -32,14 +32,14 @@ def annotate(level: str, problems: Iterable[Problem]) -> None:
 
 
 def _in_repository(file: str) -> str:
-    """A file as GitHub looks for it: from the top of what is checked out, wherever in it the command was given."""
+    """Path of a file from the root of the repository, whatever the working directory."""
     top = os.environ.get("GITHUB_WORKSPACE", "")
     path = Path(os.path.abspath(file))
     return str(path.relative_to(top)) if file and top and path.is_relative_to(top) else file
 
 
 def of_error(error: Exception, message: str, study: Study | None = None) -> Sequence[Problem]:
-    """What went wrong, with its places where it has any, else that of the study's file."""
+    """Problems of an error with their places, else one problem of the whole study file."""
     if isinstance(error, StudyError) and any(problem.file for problem in error.problems):
         return error.problems
     file = str(study.path) if study is not None and study.path is not None else ""
@@ -47,7 +47,7 @@ def of_error(error: Exception, message: str, study: Study | None = None) -> Sequ
 
 
 def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iterator[Problem]:
-    """The requirements of a command that are not met, also those on warnings, with their places in the study."""
+    """Requirements and barred warnings of a command that are not met, with their places in the study."""
     places = [("requirements", index) for index in judged_by(study, command)] + [("fail_on",)] * len(study.barred)
     for place, verdict in zip(places, verdicts, strict=True):
         if not verdict.met:
@@ -55,7 +55,7 @@ def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iter
 
 
 def of_warnings(study: Study, command: str, warnings: Sequence[Caution]) -> Iterator[Problem]:
-    """Warnings of a command with their places; what the study's file is warned of stands there."""
+    """Warnings of a command with their places: line and column if they concern the study file."""
     known = {str(problem): problem for problem in study.warnings}
     for warning in warnings:
         file = str(study.path) if study.path is not None else ""

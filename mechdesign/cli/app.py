@@ -1,4 +1,4 @@
-"""The Typer application: one thin function a command; whatever is heavy is imported by the command that needs it."""
+"""The Typer application: one short function a command, which imports NumPy and the like only when it is called."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ app = typer.Typer(
     help="Design studies of planar mechanisms: one study file, five questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
-    # Rich would cost --help a tenth of a second.
+    # Without Rich, whose import takes a tenth of a second.
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -32,7 +32,7 @@ app = typer.Typer(
 
 @contextmanager
 def _guard() -> Iterator[None]:
-    """Turn what is raised inside into a message on stderr and an exit code; nobody sees a traceback."""
+    """Turn an exception into a message on stderr and an exit code, without a traceback."""
     try:
         yield
     except KeyboardInterrupt:
@@ -78,7 +78,7 @@ def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], shor
     app.command(name, short_help=short, help=long)(command)
 
 
-# What the commands do; it is imported when they are called.
+# The actions of the commands.
 
 
 def _ask(command: str, study: Path | None, **said: Any) -> int:
@@ -127,7 +127,7 @@ def _compare(**said: Any) -> int:
 
 
 def _placed(options: Options) -> AbstractContextManager[None]:
-    """The workers that long computations go to."""
+    """Context in which long computations run on the workers of `--executor`."""
     if options.executor is None:
         return nullcontext()
     from mechdesign.work.chunks import on
@@ -228,7 +228,7 @@ def new(
 
 
 def _words(incomplete: str) -> list[str]:
-    """Commands and options that a word may become; those of the study would take a second to find."""
+    """Commands and options that complete a word; completing keys of the study would take a second."""
     commands = _group().commands
     options = {
         flag for command in commands.values() for param in command.params for flag in param.opts if flag[0] == "-"

@@ -20,7 +20,6 @@ from mechdesign.cli.batch_record import BatchRecord, End, Said, Task, failure, n
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     Outcome,
-    Source,
     answer,
     interrupted,
     load_source,
@@ -39,6 +38,7 @@ from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
 from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
+from mechdesign.study.loading import Source
 from mechdesign.work import interrupts, shards
 from mechdesign.work.chunks import worker_count
 from mechdesign.work.pool import LOOK
@@ -48,13 +48,13 @@ from mechdesign.work.threads import one_thread
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
-_SUFFIXES = (".yaml", ".yml")  # of studies in a folder
+_SUFFIXES = (".yaml", ".yml")  # of study files in a folder
 
 
 def questions(study: Study) -> tuple[str, ...]:
-    """The commands a study asks for: those with a section or a requirement; how it moves, if it asks for nothing.
+    """Commands that a study asks for, by a section or a requirement; kinematics if it asks for nothing.
 
-    Last what is asked of cases of the whole study.
+    Sweeps and sensitivities, which compute the whole study many times, come last.
     """
     judged = {command_of(requirement) for requirement in study.requirements}
     asked = [command for command in COMMANDS if command in study.questions or command in judged]
@@ -63,9 +63,9 @@ def questions(study: Study) -> tuple[str, ...]:
 
 
 def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
-    """Files of studies, each once: those that are named, all of a folder (``*.yaml``, ``*.yml``), and of a pattern.
+    """Study files without repetitions: those named, those in a folder (``*.yaml``, ``*.yml``), those of a pattern.
 
-    A folder or pattern without any stands for itself.
+    A folder or pattern without study files is returned itself.
     """
     if not paths:
         return [None]
@@ -115,7 +115,7 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
 
 
 def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, only: Sequence[str]) -> list[Task]:
-    """Read the studies, and keep no more of them than their texts."""
+    """Read and check the studies; only their texts are kept."""
     tasks: list[Task] = []
     owners: dict[str, Path | None] = {}
     for number, path in enumerate(paths):
@@ -144,7 +144,7 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
 
 
 def _as_in_shards(label: str, root: Path, options: Options) -> Options:
-    """The options with the changes and the seed of a study's shards, or of the results that they were merged to."""
+    """The options with the overrides and seed of a study's shards, or of the results merged from them."""
     if options.overrides or options.seed is not None:
         return options
     folders = [root, *sorted(each for each in root.glob("*") if each.is_dir())]
@@ -160,7 +160,7 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
 
 
 def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
-    """The questions of a study with their folders; of shards that one command computed, that alone."""
+    """Questions of a study with their folders; if its shards are of a single command, that command alone."""
     found = tuple((command, place(root / command, options)) for command in commands)
     if options.command != MERGE:
         return found
@@ -174,15 +174,15 @@ def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tupl
 
 
 def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:
-    """Answer the questions of the studies, side by side if there are several and the system forks processes.
+    """Answer the questions of the studies, in parallel if there are several and the system can fork processes.
 
     Raises
     ------
     KeyboardInterrupt
-        When what an interrupt has left is told.
+        When the run was interrupted, after its outcomes are recorded.
     """
     jobs = worker_count(options.jobs)
-    # Work that goes elsewhere goes from this process.
+    # Work for an executor is sent from this process.
     count = min(jobs, len(tasks)) if sys.platform == "linux" and options.executor is None else 1
     if count > 1:
         tasks = [replace(task, options=replace(task.options, jobs=jobs // count)) for task in tasks]
@@ -200,7 +200,7 @@ def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> Non
         return
     processes = [TaskProcess(work)]
     try:
-        # Fewer where the system has no room for more.
+        # The system may not allow so many processes.
         with suppress(OSError):
             while len(processes) < count:
                 processes.append(TaskProcess(work))
@@ -216,9 +216,9 @@ def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> Non
 
 
 def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], record: BatchRecord) -> None:
-    """Give each process one study after the other, until none waits or the run stops, and note what they tell.
+    """Give each process one study after the other until none is left or the run stops, and record their messages.
 
-    One that was killed is replaced.
+    A process that was killed is replaced.
     """
     while True:
         for process in processes:
@@ -240,7 +240,7 @@ def _finish(work: Work, processes: list[TaskProcess], waiting: Iterator[int], re
                 process.close()
                 processes[processes.index(process)] = TaskProcess(work)
             if record.stopped and not stopped:
-                # The first failure does not wait for the others.
+                # With --fail-fast the other processes are stopped at once.
                 _interrupt([other for other in processes if other is not process])
         interrupts.check()
         if record.interrupted and not record.stopped:
@@ -254,7 +254,7 @@ def _interrupt(processes: Sequence[TaskProcess]) -> None:
 
 
 def _import(tasks: Sequence[Task], options: Options) -> None:
-    """Import what answers the questions, once for all processes that are forked."""
+    """Import the modules of the questions once, before processes are forked."""
     for command in {command for task in tasks for command, _ in task.questions}:
         import_module(QUESTIONS[command].module)
         if not options.no_plots:
@@ -262,15 +262,15 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
 
 
 def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
-    """Answer the questions of a study, and write its page however that ends."""
+    """Answer the questions of a study, and write its report even if that fails or is interrupted."""
     task = tasks[index]
     options = task.options
     words = io.StringIO()
-    told: list[Outcome] = []
+    outcomes: list[Outcome] = []
     ended = End()
 
-    def say(given: Outcome | None = None) -> None:
-        hear(Said(words.getvalue(), given))
+    def say(outcome: Outcome | None = None) -> None:
+        hear(Said(words.getvalue(), outcome))
         words.seek(0)
         words.truncate()
 
@@ -282,16 +282,16 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
             return ended
         try:
             for command, directory in task.questions:
-                given = _question(study, command, directory, options, Reported(command, hear))
-                told.append(given)
-                say(given)
-                if given.exit_code and options.fail_fast:
+                outcome = _question(study, command, directory, options, Reported(command, hear))
+                outcomes.append(outcome)
+                say(outcome)
+                if outcome.exit_code and options.fail_fast:
                     break
         except KeyboardInterrupt as error:
-            told.append(interrupted(study, command, directory, error))
+            outcomes.append(interrupted(study, command, directory, error))
             ended = End(interrupted=True)
         try:
-            ended = replace(ended, entry=_page(study, task, told, several=several))
+            ended = replace(ended, entry=_page(study, task, outcomes, several=several))
         except Exception as error:
             code, message = explained(error)
             terminal.say(f"{study.label}: report: {message}")
@@ -301,36 +301,36 @@ def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:
 
 
 def _question(study: Study, command: str, directory: Path, options: Options, progress: Reported) -> Outcome:
-    """Answer one question and say what came out; what goes wrong is its outcome."""
+    """Answer one question and report its outcome, also if it fails."""
     try:
         with owned(directory):
-            given = answer(study, command, directory, options, progress)
-        tell(given, study, options)
+            outcome = answer(study, command, directory, options, progress)
+        tell(outcome, study, options)
     except Exception as error:
         return failure(study.label, command, directory, error, study)
-    return replace(given, table=None)
+    return replace(outcome, table=None)
 
 
-def _page(study: Study, task: Task, told: Sequence[Outcome], *, several: bool) -> Entry | None:
-    """Write the page of a study, and give its line of the index of several; without the option an older one goes."""
+def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:
+    """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None
-    left = [command for command, _ in task.questions if command not in {given.command for given in told}]
-    write_report(task.root, study, told, options, left)
+    left = [command for command, _ in task.questions if command not in {outcome.command for outcome in outcomes}]
+    write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
     from mechdesign.report.page.page import Entry, thumbnail
 
-    verdicts = [verdict for given in told for verdict in given.verdicts]
+    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
     return Entry(
         study.name,
         study.label,
-        [(given.command, given.word, given.exit_code) for given in told],
+        [(outcome.command, outcome.word, outcome.exit_code) for outcome in outcomes],
         met=sum(verdict.met for verdict in verdicts),
         required=sum(number_of(study, command) for command, _ in task.questions),
-        warnings=len({warning for given in told for warning in given.warnings}),
+        warnings=len({warning for outcome in outcomes for warning in outcome.warnings}),
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
     )

@@ -1,4 +1,4 @@
-"""What becomes of many studies: told in their order, summed up in one table, and judged by the worst."""
+"""The outcomes of many studies: messages in the order of the studies, one summary, the highest exit code."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from mechdesign.cli import summary, terminal
 from mechdesign.cli.annotations import annotate, of_error
 from mechdesign.cli.docs import explained
-from mechdesign.cli.execution import Outcome, Source
+from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.options import Options
 from mechdesign.cli.places import PAGE, RESULTS, SUMMARY
@@ -22,39 +22,40 @@ from mechdesign.report.page import pages
 from mechdesign.report.tables import to_csv
 from mechdesign.report.writer import write_file
 from mechdesign.study import Study
+from mechdesign.study.loading import Source
 from mechdesign.work.pool import LostWorkerError
 
 if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
-_HEADER = to_csv(summary.summary(())).encode()  # by which a summary is known
-_LOST = "run"  # in place of the commands that a killed process did not come to
+_HEADER = to_csv(summary.summary(())).encode()  # first line of every summary
+_LOST = "run"  # in place of the commands of a study whose process was killed
 _KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
 
 
 @dataclass(frozen=True)
 class Task:
-    """A study that could be read, for who reads it again and answers its questions."""
+    """A study that was read without mistakes; a worker reads it again and answers its questions."""
 
-    number: int  # in the order of the studies
+    number: int  # index among the studies
     source: Source
     label: str
-    root: Path  # of the folders of its questions
-    questions: tuple[tuple[str, Path], ...]  # commands, and the folders of their results
+    root: Path  # folder that contains those of its questions
+    questions: tuple[tuple[str, Path], ...]  # commands and folders of results
     options: Options
 
 
 @dataclass(frozen=True)
 class Said:
-    """Messages about a study, and the question that they are about where it is answered."""
+    """Messages about a study, and the outcome of a question if one is finished."""
 
     words: str
-    given: Outcome | None = None
+    outcome: Outcome | None = None
 
 
 @dataclass(frozen=True)
 class End:
-    """The end of a study: what an index of the reports says of it, an exit code of the report, an interrupt."""
+    """The end of a study: its line of the index, the exit code of its report, whether it was interrupted."""
 
     entry: Entry | None = None
     exit_code: int = 0
@@ -62,28 +63,28 @@ class End:
 
 
 class BatchRecord:
-    """What becomes of studies: told in their order, in whatever order it is heard, and written in the end."""
+    """Collects the outcomes of studies in any order, shows them in that of the studies, and writes the summary."""
 
     def __init__(self, options: Options, asked: Sequence[Path | None], live_table: LiveTable) -> None:
         self.options = options
         self.live_table = live_table
         self.several = len(asked) > 1
         self.interrupted = False
-        self.stopped = False  # nothing more is begun
+        self.stopped = False  # no further question is started
         self._asked = asked
         self._root = options.out or RESULTS
         self._check()
-        self._answers: list[list[Outcome]] = [[] for _ in asked]
+        self._outcomes: list[list[Outcome]] = [[] for _ in asked]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
-        self._first = 0  # task that is not ended
+        self._first = 0  # first task that has not ended
         self._left = len(asked)  # studies without an answer
         self._exit_code = 0
 
     def _check(self) -> None:
-        """Find out before the first study is answered that a file about all would replace another."""
+        """Check before the first study is answered that the summary, JUnit and index files replace no others."""
         if self.options.junit is not None:
             check_marked(self.options.junit, summary.mark(self.options.junit))
         if self.several:
@@ -91,39 +92,39 @@ class BatchRecord:
             if self.options.report:
                 check_marked(self._root / pages.INDEX, PAGE)
 
-    def missing(self, number: int, given: Outcome) -> None:
-        """Note a study that could not be read, or was lost."""
-        self._answers[number].append(given)
+    def missing(self, number: int, outcome: Outcome) -> None:
+        """Record a study that could not be read, or whose process was killed."""
+        self._outcomes[number].append(outcome)
         self._left -= 1
         self.stopped |= self.options.fail_fast
         if self.options.report and self.several:
             from mechdesign.report.page.page import Entry
 
-            self._entries[number] = Entry(given.study, given.study, [], failed=given.failed)
+            self._entries[number] = Entry(outcome.study, outcome.study, [], failed=outcome.failed)
 
     def begin(self, tasks: Sequence[Task]) -> None:
-        """Begin with the questions."""
+        """Start with the tasks."""
         self._tasks = tasks
         self._words = [[] for _ in tasks]
         self.live_table.start([task.label for task in tasks])
 
     def note(self, index: int, note: ProgressNote | Said) -> None:
-        """Hear of a task how far it is, or a question's outcome."""
+        """Record the progress of a task, or the outcome of one of its questions."""
         task = self._tasks[index]
         if isinstance(note, ProgressNote):
             self.live_table.advance(index, note)
             great = terminal.announced(note.total, note.stage) if not note.done and not self.options.quiet else ""
             note = Said(f"{task.label}: {note.command}: {great}\n" if great else "")
         self._words[index].append(note.words)
-        if note.given is not None:
-            self._answers[task.number].append(note.given)
-            self.live_table.done(index, note.given)
-            self.stopped |= self.options.fail_fast and note.given.exit_code > 0
+        if note.outcome is not None:
+            self._outcomes[task.number].append(note.outcome)
+            self.live_table.done(index, note.outcome)
+            self.stopped |= self.options.fail_fast and note.outcome.exit_code > 0
         if index == self._first:
             self._say()
 
     def end(self, index: int, end: End | None) -> None:
-        """Note the end of a task; it may be heard once more."""
+        """Record the end of a task; a second call changes nothing."""
         if index in self._ended:
             return
         self._ended.add(index)
@@ -132,9 +133,9 @@ class BatchRecord:
         if end is None:
             if not self.stopped:
                 with redirect_stderr(io.StringIO()) as words:
-                    given = failure(self._tasks[index].label, _LOST, Path(), LostWorkerError(_KILLED))
+                    outcome = failure(self._tasks[index].label, _LOST, Path(), LostWorkerError(_KILLED))
                 self._words[index].append(words.getvalue())
-                self.missing(number, given)
+                self.missing(number, outcome)
         else:
             self._exit_code = max(self._exit_code, end.exit_code)
             self._left -= not end.interrupted
@@ -151,19 +152,19 @@ class BatchRecord:
         self._words[self._first].clear()
 
     def close(self) -> int:
-        """Tell what came out, write the summary, the JUnit file and the index, and give the exit code."""
+        """Show the outcomes, write summary, JUnit file and index, and return the exit code."""
         options = self.options
         ended = [Outcome("", "", Path(), Interrupted.exit_code, 0, failed="interrupted")] if self.interrupted else []
-        answers = [*(given for study in self._answers for given in study), *ended]
-        lost = f"; {self._left} of {len(self._answers)} studies were not answered" if self.several else ""
+        outcomes = [*(outcome for study in self._outcomes for outcome in study), *ended]
+        lost = f"; {self._left} of {len(self._outcomes)} studies were not answered" if self.several else ""
         if self.interrupted:
             terminal.say(f"interrupted; what was finished is whole{lost}")
         elif self.stopped and self._left:
             terminal.say(f"stopped at the first failure{lost}")
         if options.junit is not None:
             self._file(options.junit, summary.junit([*self._with_left(), *ended]).encode(), summary.mark(options.junit))
-        table = summary.summary(answers)
-        if self.several and any(given.written for given in answers):
+        table = summary.summary(outcomes)
+        if self.several and any(outcome.written for outcome in outcomes):
             self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)
         terminal.show(table, as_json=options.json)
         if any(entry.link for entry in self._entries.values()):
@@ -172,26 +173,26 @@ class BatchRecord:
             path = self._root / pages.INDEX
             if self._file(path, index([entry for _, entry in sorted(self._entries.items())]), PAGE):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
-        told = [summary.in_brief(given) for given in answers if given.command and given.exit_code]
+        told = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
         if len(table) > 1 and told:
             terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
-        return max(self._exit_code, *(given.exit_code for given in answers))
+        return max(self._exit_code, *(outcome.exit_code for outcome in outcomes))
 
     def _with_left(self) -> Iterator[Outcome]:
-        """The answers in the order of the studies, and what the run ended before."""
+        """Outcomes in the order of the studies, with those of questions that were not reached."""
         tasks = {task.number: task for task in self._tasks}
-        for number, (path, answers) in enumerate(zip(self._asked, self._answers, strict=True)):
-            yield from answers
-            told = {given.command for given in answers}
+        for number, (path, outcomes) in enumerate(zip(self._asked, self._outcomes, strict=True)):
+            yield from outcomes
+            told = {outcome.command for outcome in outcomes}
             if (task := tasks.get(number)) is not None:
                 left = [command for command, _ in task.questions if not {command, _LOST} & told]
             else:
-                left = [] if answers else ["check"]
+                left = [] if outcomes else ["check"]
             label = name_of(path) if task is None else task.label
             yield from (Outcome(label, command, Path(), 0, 0, left=True) for command in left)
 
     def _file(self, path: Path, data: bytes, mark: bytes) -> bool:
-        """Write a file about all studies; whether it is there, for the run goes on without it."""
+        """Write a file about all studies; False, after a message, if that fails."""
         try:
             write_file(path, data, mark)
         except MechdesignError as error:
@@ -202,12 +203,12 @@ class BatchRecord:
 
 
 def name_of(path: Path | None) -> str:
-    """A study in words that could not be read."""
+    """Name of a study by its file."""
     return printable(path.stem) if path else "study"
 
 
 def failure(label: str, command: str, directory: Path, error: Exception, study: Study | None = None) -> Outcome:
-    """Say why a question has no answer; returns that as its outcome."""
+    """Show why a question failed, and return its outcome."""
     code, message = explained(error)
     terminal.say(message if code == 2 else f"{label}: {command}: {message}")
     annotate("error", of_error(error, message, study))

@@ -1,4 +1,4 @@
-"""`check`: what studies say, and what is wrong with them, before anything is computed."""
+"""`check`: describe studies and find their mistakes without computing anything."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
 
 
 def _foresee(study: Study) -> None:
-    """Find what requirements, matrix and sensitivities name and no result has: every such mistake in one go."""
+    """Check that results named by requirements, matrix and sensitivities exist; all mistakes are raised together."""
     looks: list[Callable[[], object]] = [partial(foresee, study, COMMANDS, goals=True)]
     if study.matrix is not None:
         looks.append(partial(sweep.prepared, study))

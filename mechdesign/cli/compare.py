@@ -1,4 +1,4 @@
-"""Baselines: `compare` says what moved between two folders of results, `run --verify` whether they come out again."""
+"""Baselines: `compare` shows what differs between two folders of results, `run --verify` repeats a run and compares."""
 
 from __future__ import annotations
 
@@ -25,11 +25,13 @@ from mechdesign.study.loading import load_data
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work.threads import one_thread
 
+HELP_PAGE = "howto/batch"
+
 # Files in the folder of differences.
 _TABLE = "differences.csv"
 _PICTURE = "differences.png"
 _HEADER = to_csv(Comparison().table).encode()
-# Differences that are told beside the table.
+# Changes that are printed as messages, not in the table.
 _SAID = ("verdict", "outcome")
 _SHOWN = 12  # digits of a hash
 _EXACTLY = Tolerances(Tolerance(0.0, 0.0))
@@ -74,7 +76,7 @@ def compare(
 
 @one_thread()
 def verify(studies: Sequence[Path] | None, options: Options) -> int:
-    """Repeat what manifests say was computed and compare the tables; returns 1 where one is another, else 0.
+    """Repeat the computations of manifests and compare the tables; returns 1 if one differs, else 0.
 
     Raises
     ------
@@ -107,7 +109,7 @@ def verify(studies: Sequence[Path] | None, options: Options) -> int:
 
 
 def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options) -> None:
-    """Compute again what a manifest describes and write its tables."""
+    """Repeat the computation that a manifest describes and write its tables."""
     command = content.get("command")
     if command not in mechdesign.commands.QUESTIONS:
         raise StudyError(f"{where}: of no command that there is: {command!r}")
@@ -129,8 +131,8 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
 
 
 def _verify(found: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
-    """Add differences of the kept tables and those that were computed again, and of the bytes of all files."""
-    # The study that is repeated has its overrides in it.
+    """Add the differences between the stored and the repeated tables, and between the bytes of all files."""
+    # The repeated study contains its overrides.
     before, after = content | {"overrides": []}, folders.results(there)["."]
     found.notes += [f"{folder}: {note}" for note in folders.notes(before, after)]
     folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
@@ -139,7 +141,7 @@ def _verify(found: Comparison, folder: str, kept: Path, content: dict[str, Any],
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
         table, digest = name.removesuffix(".csv"), listed.get(name, "")
-        # Other texts and pictures follow from the tables and the text of the study, which the manifest has not.
+        # Other texts and pictures also depend on the study's text, which the manifest does not contain.
         here_alone = (name in again) != (name in listed) and not name.endswith(drawn)
         wanted = again.get(name, "") if name in after["tables"] or here_alone else digest
         known = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
@@ -152,7 +154,7 @@ def _write(out: Path, found: Comparison) -> None:
     creator = writer.CREATOR.encode()
     writer.write_file(out / _TABLE, to_csv(found.table).encode(), _HEADER)
     if not found.moved:
-        # None of an older comparison stays.
+        # Files of an older comparison are removed.
         if marked(out / _PICTURE, creator):
             (out / _PICTURE).unlink()
         return
@@ -166,7 +168,7 @@ def _write(out: Path, found: Comparison) -> None:
 
 
 def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
-    """Show what was found and return the exit code."""
+    """Show a comparison and return the exit code."""
     for note in found.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
     for difference in found.differences:
@@ -185,7 +187,7 @@ def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool,
 
 
 def _junit(found: Comparison, command: str) -> str:
-    """JUnit XML: a suite a folder, a case a table, and a case for what is otherwise besides tables."""
+    """JUnit XML: a suite for each folder, with a case for each table and one for all other differences."""
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")

@@ -1,4 +1,4 @@
-"""`mechdesign docs`: the reference in the terminal, and which words of it a study's mistakes are about."""
+"""`mechdesign docs`: the reference in the terminal, and the hint to it below error messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mechdesign.errors import AssemblyError, StudyError, explain
 from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
 
 _INDENT = "  "
-# Words of mistakes that are named to be looked up.
+# Most keys named in the hint below a study's mistakes.
 _NAMED = 3
 # Three words or more without a name or a number.
 _WORDS = re.compile(r"(?<![\w.])[a-z]+(?: [a-z]+){2,}(?![\w.])")
@@ -50,7 +50,7 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
 
 
 def explained(error: Exception) -> tuple[int, str]:
-    """Exit code and message of an exception; after the mistakes of a study how to look up what they are about."""
+    """Exit code and message of an exception, with the command that explains the keys or words in it."""
     code, message = explain(error)
     if isinstance(error, AssemblyError):
         return code, f"{message}\n{look_up(message)}".rstrip("\n")
@@ -60,7 +60,7 @@ def explained(error: Exception) -> tuple[int, str]:
 
 
 def look_up(message: str) -> str:
-    """The command that tells more of a message: by the first of its words that are the same in every such message."""
+    """The command that explains a message, found by its first three or more words without a name or a number."""
     words = _WORDS.search(message)
     return f"(mechdesign docs {words[0]!r})" if words else ""
 
@@ -83,7 +83,7 @@ def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
 
 
 def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
-    """Entries with the same to say are told together; of a single one also the keys below it."""
+    """Lines of the entries; those with equal explanations share one, and a single key lists the keys below it."""
     alike: dict[Entry, list[Entry]] = {}
     for hit in hits:
         alike.setdefault(replace(hit, word=""), []).append(hit)
@@ -133,6 +133,6 @@ def _overview(known: Sequence[Entry]) -> Iterator[str]:
 
 
 def _wrapped(line: str, width: int) -> str:
-    """A line no longer than the terminal is wide, its rest below it, indented further."""
+    """A line wrapped to the width of the terminal, its rest indented further."""
     indent = " " * (len(line) - len(line.lstrip())) + _INDENT
     return textwrap.fill(line, width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)

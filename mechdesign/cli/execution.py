@@ -33,7 +33,7 @@ from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_
 from mechdesign.report.tables import from_csv
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study, load, template_path
-from mechdesign.study.loading import load_bytes, read_file
+from mechdesign.study.loading import Source, load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES
 from mechdesign.study.text.inputs import Folder
 from mechdesign.work import shards
@@ -43,7 +43,7 @@ from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
-_ROWS_AT_ONCE = 20_000  # of a table that is read from its file
+_ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 OUTCOMES = {
     0: "done",
     1: "requirement not met",
@@ -52,15 +52,6 @@ OUTCOMES = {
     4: "failed",
     Interrupted.exit_code: "interrupted",
 }
-
-
-@dataclass(frozen=True)
-class Source:
-    """A study as it was read, once, and the folder of the files that it names, with what was read of them."""
-
-    text: bytes
-    path: Path | None
-    folder: Folder
 
 
 @dataclass(frozen=True)
@@ -77,15 +68,15 @@ class Outcome:
     verdicts: Sequence[Verdict] = ()
     seconds: float = 0.0
     kept: bool = False
-    written: bool = False  # whether the directory holds what was found
-    table: Table | None = None  # the main one
-    shard: str = ""  # what became of a part of it, where no more was asked
-    left: bool = False  # whether the run ended before it
-    reached: bool = True  # whether what was to be reached by changes was, where all poses assemble
+    written: bool = False  # whether the results are in the directory
+    table: Table | None = None  # the main table
+    shard: str = ""  # what became of the shard, with --shard
+    left: bool = False  # whether the run ended before this question
+    reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
 
     @property
     def word(self) -> str:
-        """What came of it, in a word or two."""
+        """The outcome in a word or two."""
         return OUTCOMES[self.exit_code] if self.reached else "not reached"
 
 
@@ -103,8 +94,8 @@ def source(path: Path | None, options: Options) -> Source:
         what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
         terminal.say(f"study: {what}", quiet=options.quiet)
     if path == STANDARD_INPUT:
-        return Source(sys.stdin.buffer.read(MAX_BYTES + 1), None, Folder(anywhere=options.allow_files))
-    return Source(read_file(path), path, Folder(path.parent, options.allow_files))
+        return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
+    return Source(path, Folder(path.parent, options.allow_files), read_file(path))
 
 
 def load_source(source: Source, options: Options) -> Study:
@@ -148,7 +139,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
         return kept
     elif merging:
-        # A mistake of the study is why there are none.
+        # A mistake in the study explains the missing shards.
         requirements.foresee(study, [command] if command in LONG else [])
         raise shards.missing(directory)
     if command in LONG:
@@ -183,7 +174,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if journal is not None:
         journal.discard()
     shards.remove(directory)
-    warnings = [*(Caution("suspect", str(warning)) for warning in study.warnings), *result.warnings, *undrawn]
+    warnings = _placed(study, [*study.cautions, *result.warnings, *undrawn])
     code, seconds = _exit_code(result.failed, verdicts, result.main), time.perf_counter() - begun
     return Outcome(
         study.label, command, directory, code, len(result.main), warnings, result.failed, verdicts, seconds,
@@ -208,10 +199,10 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
     except Divided:
         pass
     except Interrupted:
-        # A part of a part is nothing.
+        # An interrupted shard is not kept.
         raise KeyboardInterrupt from None
     except MechdesignError:
-        # Merge comes to the same, and tells it.
+        # `merge` will meet and report the same error.
         taken.write(directory, origin, options.command)
         raise
     taken.write(directory, origin, options.command)
@@ -220,7 +211,7 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
-    """The result of the study before; its errors begin with its name."""
+    """The result of the `--before` study; its errors begin with its name."""
     try:
         result: Result = getattr(mechdesign, command)(before, seed=options.seed, jobs=options.jobs)
     except MechdesignError as error:
@@ -230,7 +221,7 @@ def _earlier(before: Study, command: str, options: Options) -> Result:
 
 
 def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
-    """The answer that an earlier run left whole in the directory, if this run would give the same."""
+    """The outcome of an earlier run in the directory, if it is complete and this run would give the same."""
     content = manifest.is_current(directory, study, command, asked)
     if content is None:
         return None
@@ -243,7 +234,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
         table = _main_table(directory, content)
         warnings, failed = [Caution(**each) for each in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
-        # Damaged: of another hand than ours.
+        # The manifest was changed by hand.
         return None
     if len(judged) != len(judged_by(study, command)):
         return None
@@ -251,9 +242,15 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
     settle(directory)
     code = _exit_code(failed, verdicts, table)
     return Outcome(
-        study.label, command, directory, code, len(table), warnings, failed, verdicts, kept=True, written=True,
-        table=table,
+        study.label, command, directory, code, len(table), _placed(study, warnings), failed, verdicts, kept=True,
+        written=True, table=table,
     )  # fmt: skip
+
+
+def _placed(study: Study, warnings: Sequence[Caution]) -> list[Caution]:
+    """Warnings of a result, those of the study with file, line and column."""
+    places = study.cautions
+    return [dataclasses.replace(each, message=str(places.get(each, each))) for each in warnings]
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
@@ -263,7 +260,7 @@ def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
 
 
 def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
-    """The main table of the results in a folder with this manifest, read from its file where its rows are wanted."""
+    """The main table of a folder with this manifest; its rows are read from the file when they are needed."""
     file, about = next(iter(content["tables"].items()))
 
     def blocks() -> Iterator[Table]:
@@ -286,7 +283,7 @@ def _judged_and_written(
         verdicts = requirements.requirements(study, result)
     except StudyError:
         if result.command in LONG:
-            # What took long is not lost to a requirement that names a row it has not.
+            # A requirement that names a missing row must not lose a long computation.
             writer.write(directory, study, result, (), asked)
         raise
     undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress)
@@ -294,7 +291,7 @@ def _judged_and_written(
 
 
 def _journal(study: Study, command: str, directory: Path, options: Options) -> Journal:
-    """Where finished designs or cases are kept, with those of an earlier run if this one is to go on from there."""
+    """Journal of finished designs or cases; with --resume it begins with those of the earlier run."""
     journal = Journal(directory / NAME, manifest.computed_from(study, command), resume=options.resume)
     if options.resume and not journal.usable:
         there = f"{journal.path} is of another study, seed or version" if journal.path.exists() else "nothing to resume"
@@ -302,33 +299,33 @@ def _journal(study: Study, command: str, directory: Path, options: Options) -> J
     return journal
 
 
-def tell(given: Outcome, study: Study, options: Options) -> None:
-    """Say on stderr, and to GitHub, what came out; what is not met or failed is said even where quiet is wanted."""
-    who = f"{given.study}: {given.command}:"
-    for warning in given.warnings:
+def tell(outcome: Outcome, study: Study, options: Options) -> None:
+    """Report an outcome on stderr and to GitHub; with --quiet only failures and requirements that are not met."""
+    who = f"{outcome.study}: {outcome.command}:"
+    for warning in outcome.warnings:
         terminal.say(f"{who} warning: {warning} [{warning.kind}]", quiet=options.quiet)
-    for verdict in given.verdicts:
+    for verdict in outcome.verdicts:
         terminal.say(f"{who} requirement: {verdict}", quiet=options.quiet and verdict.met)
-    if given.command == SWEEP.name and given.table is not None and (best := best_of(given.table)) is not None:
+    if outcome.command == SWEEP.name and outcome.table is not None and (best := best_of(outcome.table)) is not None:
         terminal.say(f"{who} {best}", quiet=options.quiet)
-    if given.failed:
+    if outcome.failed:
         from mechdesign.cli.docs import look_up
 
-        terminal.say(f"{who} {given.failed}\n{look_up(given.failed)}".rstrip("\n"))
-        annotate("error", of_error(AssemblyError(given.failed), "", study))
-    annotate("error", of_verdicts(study, given.command, given.verdicts))
-    annotate("warning", of_warnings(study, given.command, given.warnings))
-    if given.shard:
-        terminal.say(f"{who} {given.shard}", quiet=options.quiet)
+        terminal.say(f"{who} {outcome.failed}\n{look_up(outcome.failed)}".rstrip("\n"))
+        annotate("error", of_error(AssemblyError(outcome.failed), "", study))
+    annotate("error", of_verdicts(study, outcome.command, outcome.verdicts))
+    annotate("warning", of_warnings(study, outcome.command, outcome.warnings))
+    if outcome.shard:
+        terminal.say(f"{who} {outcome.shard}", quiet=options.quiet)
         return
-    kept = "; they are whole, and not computed again" if given.kept else ""
-    terminal.say(f"{who} {counted(given.rows, 'row')} in {given.directory}{kept}", quiet=options.quiet)
+    kept = "; they are whole, and not computed again" if outcome.kept else ""
+    terminal.say(f"{who} {counted(outcome.rows, 'row')} in {outcome.directory}{kept}", quiet=options.quiet)
 
 
 def write_report(
-    directory: Path, study: Study, answers: Sequence[Outcome], options: Options, left: Sequence[str] = ()
+    directory: Path, study: Study, outcomes: Sequence[Outcome], options: Options, left: Sequence[str] = ()
 ) -> None:
-    """Write a study's page from what its questions left in their folders; `left` are questions that were not asked.
+    """Write a study's report from the files of its questions; `left` are questions that were not answered.
 
     Raises
     ------
@@ -338,19 +335,21 @@ def write_report(
     from mechdesign.report.page import page
 
     told = []
-    for given in answers:
-        path = given.directory / pages.SECTION
-        part = json.loads(path.read_text(encoding="utf-8")) if given.written and path.exists() else None
-        told.append(page.Answered(given.command, given.word, given.exit_code, given.failed, given.verdicts, part))
+    for outcome in outcomes:
+        path = outcome.directory / pages.SECTION
+        part = json.loads(path.read_text(encoding="utf-8")) if outcome.written and path.exists() else None
+        told.append(
+            page.Answered(outcome.command, outcome.word, outcome.exit_code, outcome.failed, outcome.verdicts, part)
+        )
     told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
-    below = any(given.directory != directory for given in answers)
+    below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:
-    """The outcome of a question that was interrupted; what was finished of it may be a result."""
+    """The outcome of an interrupted question, which may have a partial result."""
     code = Interrupted.exit_code
     words = str(error) or "interrupted"
     return Outcome(study.label, command, directory, code, 0, failed=words, written=isinstance(error, Interrupted))
@@ -358,22 +357,22 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
 
 @one_thread()
 def ask(command: str, path: Path | None, options: Options) -> Outcome:
-    """One command from end to end."""
+    """Load a study, answer one question, write and show the result."""
     study = load_study(path, options)
     directory = place(folder(study, command, options), options)
     with owned(directory):
         try:
-            given = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
+            outcome = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
         except Interrupted as error:
             if options.report:
                 write_report(directory, study, [interrupted(study, command, directory, error)], options)
             raise
         if options.report:
-            write_report(directory, study, [given], options)
-    if given.shard:
-        tell(given, study, options)
-        return given
-    assert given.table is not None
-    terminal.show(given.table, as_json=options.json, rest=directory / f"{given.table.name}.csv")
-    tell(given, study, options)
-    return given
+            write_report(directory, study, [outcome], options)
+    if outcome.shard:
+        tell(outcome, study, options)
+        return outcome
+    assert outcome.table is not None
+    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv")
+    tell(outcome, study, options)
+    return outcome

@@ -1,4 +1,4 @@
-"""A table of studies on a terminal that shows what is under way, and what failed, while they are answered."""
+"""A live table on the terminal: the questions that are computed, failed, or were answered last."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.table import Table as Grid
 
-_OFTEN = 0.1  # seconds between two notes of how far something is, and between two pictures of the table
-_LAST = 5  # questions that were answered last and are shown
+_OFTEN = 0.1  # seconds between two progress notes, and between two updates of the table
+_LAST = 5  # number of questions shown that were answered last
 _WIDTH = 24  # of a bar, in characters
 
 
 @dataclass(frozen=True)
 class ProgressNote:
-    """How far a question is: steps done of a total in a stage; none of them before its first stage."""
+    """Progress of a question: steps done of the total of a stage; total 0 before the first stage."""
 
     command: str
     stage: str = ""
@@ -35,7 +35,7 @@ class ProgressNote:
 
 
 class Reported(Progress):
-    """Tells how far a question is, now and then."""
+    """Progress that sends a note at most every `_OFTEN` seconds."""
 
     def __init__(self, command: str, tell: Tell) -> None:
         self._command = command
@@ -46,13 +46,13 @@ class Reported(Progress):
         self._say()
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage; a place for an interrupt."""
+        """Begin a stage; an interrupt is raised here."""
         interrupts.check()
         self._stage, self._done, self._total = what, 0, total
         self._say()
 
     def update(self, n: int) -> None:
-        """`n` more steps are done; a place for an interrupt."""
+        """Add `n` finished steps; an interrupt is raised here."""
         interrupts.check()
         self._done += n
         if time.monotonic() - self._told > _OFTEN:
@@ -71,12 +71,12 @@ class LiveTable:
 
     def __init__(self, *, quiet: bool) -> None:
         self._wanted = not quiet and terminal.lively()
-        # What writes to stderr meanwhile may have put another stream in its place.
+        # sys.stderr may be redirected later.
         self._stream = sys.stderr
         self._begun = time.monotonic()
         self._live: Live | None = None
         self._labels: Sequence[str] = ()
-        self._under_way: dict[int, tuple[float, ProgressNote]] = {}  # since when, and how far
+        self._under_way: dict[int, tuple[float, ProgressNote]] = {}  # start time and progress
         self._failed: list[Outcome] = []
         self._last: deque[Outcome] = deque(maxlen=_LAST)
         self._ended = 0
@@ -93,31 +93,31 @@ class LiveTable:
                 self._live.console.show_cursor()
 
     def start(self, labels: Sequence[str]) -> None:
-        """Begin with the studies of these names."""
+        """Start with studies of these names."""
         self._labels = labels
 
     def advance(self, index: int, how: ProgressNote) -> None:
-        """A study's question is so far."""
+        """Record the progress of a study's question."""
         since, before = self._under_way.get(index, (0.0, None))
         if before is None or before.command != how.command:
             since = time.monotonic()
         self._under_way[index] = since, how
         self.show()
 
-    def done(self, index: int, given: Outcome) -> None:
-        """A study's question is answered."""
+    def done(self, index: int, outcome: Outcome) -> None:
+        """Record the outcome of a study's question."""
         self._under_way.pop(index, None)
-        (self._failed if given.exit_code else self._last).append(given)
+        (self._failed if outcome.exit_code else self._last).append(outcome)
         self.show()
 
     def end(self, index: int) -> None:
-        """A study is done with."""
+        """Record the end of a study."""
         self._under_way.pop(index, None)
         self._ended += 1
         self.show()
 
     def say(self, words: str) -> None:
-        """Messages, above the table."""
+        """Print messages above the table."""
         if self._live is None:
             print(words, end="", file=self._stream, flush=True)
         elif words:
@@ -126,7 +126,7 @@ class LiveTable:
             self._live.console.print(Text(words.rstrip("\n")), soft_wrap=True)
 
     def show(self) -> None:
-        """Show how things are."""
+        """Update the table on the terminal."""
         now = time.monotonic()
         if self._live is not None:
             if now - self._shown > _OFTEN:
@@ -148,23 +148,23 @@ class LiveTable:
 
         assert self._live is not None
         grid = Grid(box=None, pad_edge=False, header_style="bold")
-        # However long the names are, there is room for the rest.
+        # Long names leave room for the other columns.
         grid.add_column("study", no_wrap=True, max_width=self._live.console.width // 4)
         grid.add_column("question", no_wrap=True)
         grid.add_column("outcome", no_wrap=True)
         grid.add_column("seconds", justify="right", no_wrap=True)
-        # The head and two lines below; at least one of what is above.
+        # Lines for finished questions: without the head and the two lines below, but at least one.
         room = max(1, self._live.console.height - 3 - len(self._under_way))
         failed = self._failed[-room:]
         last = [*self._last][len(failed) - room :] if room > len(failed) else []
-        for given in (*failed, *last):
-            word = Text(given.word, style="red" if given.exit_code else "green")
-            grid.add_row(Text(given.study), given.command, word, f"{given.seconds:.1f}")
+        for outcome in (*failed, *last):
+            word = Text(outcome.word, style="red" if outcome.exit_code else "green")
+            grid.add_row(Text(outcome.study), outcome.command, word, f"{outcome.seconds:.1f}")
         for index, (since, how) in sorted(self._under_way.items()):
             bar = Grid.grid(padding=(0, 1))
             bar.add_row(how.stage, ProgressBar(how.total, min(how.done, how.total), width=_WIDTH))
-            outcome = bar if how.total else Text("under way", style="dim")
-            grid.add_row(Text(self._labels[index]), how.command, outcome, f"{time.monotonic() - since:.1f}")
+            state = bar if how.total else Text("under way", style="dim")
+            grid.add_row(Text(self._labels[index]), how.command, state, f"{time.monotonic() - since:.1f}")
         hidden = len(self._failed) - len(failed)
         told = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
         if self._failed:

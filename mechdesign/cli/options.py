@@ -17,15 +17,17 @@ from mechdesign.files import FORMATS, formats_of
 if TYPE_CHECKING:
     from mechdesign.work.shards import Shard
 
-# Widths of the pages of pictures and sizes of their type.
+# Styles of pictures: width of the page and size of the type.
 STYLES = ("screen", "paper")
-# Relative tolerance of `compare`: more than machines differ by, less than anything that matters.
+# Default relative tolerance of `compare`: above the rounding differences between machines, below any real change.
 RELATIVE = 1e-9
+# Options that fill fields of other names.
+_FIELDS = {"--set": "overrides", "--format": "formats"}
 _LEFT_OUT = "Left out: study.yaml here, or else the built-in two-link arm."
 
 
 def _studies(incomplete: str) -> list[str]:
-    """Files of studies that a word may become; a shell completes the names of folders where there are none."""
+    """Study files that complete a word; where there are none the shell completes names of folders."""
     folder, slash, start = incomplete.rpartition("/")
     try:
         found = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
@@ -40,7 +42,7 @@ def _templates(incomplete: str) -> list[str]:
 
 
 def _one_of(words: Iterable[str]) -> Callable[[str], list[str]]:
-    """Completes a word to those known."""
+    """A completion to one of these words."""
     return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
@@ -55,17 +57,22 @@ def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
     return _parameter("study", kind | None, None, argument)
 
 
-def _text(name: str, kind: Any, flag: str, metavar: str, meaning: str, **more: Any) -> Parameter:
+def _name(flag: str) -> str:
+    """The field of `Options` that an option fills."""
+    return _FIELDS.get(flag, flag.removeprefix("--").replace("-", "_"))
+
+
+def _text(kind: Any, flag: str, metavar: str, meaning: str, **more: Any) -> Parameter:
     option = typer.Option(flag, metavar=metavar, help=meaning, show_default=False, **more)
-    return _parameter(name, kind | None, None, option)
+    return _parameter(_name(flag), kind | None, None, option)
 
 
-def _flag(name: str, flag: str, meaning: str, *short: str) -> Parameter:
-    return _parameter(name, bool, False, typer.Option(flag, *short, help=meaning))
+def _flag(flag: str, meaning: str, *short: str) -> Parameter:
+    return _parameter(_name(flag), bool, False, typer.Option(flag, *short, help=meaning))
 
 
 def _out(meaning: str) -> Parameter:
-    return _text("out", Path, "--out", "DIR", meaning)
+    return _text(Path, "--out", "DIR", meaning)
 
 
 STUDY = _study(Path, "STUDY", "The study file; - is standard input.")
@@ -78,15 +85,13 @@ OUT_ALL = _out(
 )
 OUT_DRAWINGS = _out("Folder for the drawing (several studies: <study>/ in it). Default: results/<study>/check.")
 OVERRIDES = _text(
-    "overrides",
     list[str],
     "--set",
     "A.B.C=VALUE",
     "Change one entry of the study before it is checked, e.g. mechanism.parameters.r=42. Repeatable.",
 )
-SEED = _text("seed", int, "--seed", "N", "Seed of the random numbers. Default: the study's, else 0.", min=0)
+SEED = _text(int, "--seed", "N", "Seed of the random numbers. Default: the study's, else 0.", min=0)
 JOBS = _text(
-    "jobs",
     int,
     "--jobs",
     "N",
@@ -95,7 +100,6 @@ JOBS = _text(
     max=MAX_JOBS,
 )
 EXECUTOR = _text(
-    "executor",
     str,
     "--executor",
     "NAME",
@@ -103,85 +107,65 @@ EXECUTOR = _text(
     "concurrent.futures.Executor. The results do not depend on it. Default: here.",
 )
 SHARD = _text(
-    "shard",
     str,
     "--shard",
     "I/N",
     "Compute only the I-th of N parts of the long computations, I from 1 on, and keep it in the folder of the results; "
     "`mechdesign merge` puts the parts together.",
 )
-JSON = _flag("json", "--json", "Print the main table to stdout as JSON.")
-QUIET = _flag("quiet", "--quiet", "Say nothing but the results and what went wrong.", "-q")
+JSON = _flag("--json", "Print the main table to stdout as JSON.")
+QUIET = _flag("--quiet", "Say nothing but the results and what went wrong.", "-q")
 NO_PLOTS = _flag(
-    "no_plots",
-    "--no-plots",
-    "Draw no pictures; those of a run before are removed, as they would not fit the new tables.",
+    "--no-plots", "Draw no pictures; those of a run before are removed, as they would not fit the new tables."
 )
 FORMAT = _text(
-    "formats",
-    str,
-    "--format",
-    "LIST",
-    "Formats of the pictures, e.g. png,svg,pdf. Default: png.",
-    autocompletion=_one_of(FORMATS),
+    str, "--format", "LIST", "Formats of the pictures, e.g. png,svg,pdf. Default: png.", autocompletion=_one_of(FORMATS)
 )
 STYLE = _text(
-    "style",
     str,
     "--style",
     "NAME",
     "Of the pictures: screen, or paper for a journal's column, 88 mm wide with type of 8 pt. Default: screen.",
     autocompletion=_one_of(STYLES),
 )
-ANIMATE = _flag("animate", "--animate", "Also draw the motion of a sweep or path: motion.gif.")
-REPORT = _flag("report", "--report", "Also write report.html: one page with all of it, which moves.")
+ANIMATE = _flag("--animate", "Also draw the motion of a sweep or path: motion.gif.")
+REPORT = _flag("--report", "Also write report.html: one page with all of it, which moves.")
 REPORTS = _flag(
-    "report", "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+    "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
 )
-ALLOW_FILES = _flag(
-    "allow_files", "--allow-files", "Also read files that the study names and that lie outside its folder."
-)
-ALL_MODES = _flag("all_modes", "--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
+ALLOW_FILES = _flag("--allow-files", "Also read files that the study names and that lie outside its folder.")
+ALL_MODES = _flag("--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
 BEFORE = _text(
-    "before",
     Path,
     "--before",
     "STUDY",
     "Also draw this study, without the overrides of --set, in dashes under the other: before and after a change.",
     autocompletion=_studies,
 )
-JUNIT = _text("junit", Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
-FAIL_FAST = _flag("fail_fast", "--fail-fast", "Stop at the first question that fails.")
-STRICT = _flag("strict", "--strict", "Every warning fails, as with fail_on: all in the study: exit code 1.")
+JUNIT = _text(Path, "--junit", "FILE", "Also write the outcome as JUnit XML, for CI.")
+FAIL_FAST = _flag("--fail-fast", "Stop at the first question that fails.")
+STRICT = _flag("--strict", "Every warning fails, as with fail_on: all in the study: exit code 1.")
 RESUME = _flag(
-    "resume",
     "--resume",
     "Skip questions whose results are there, whole, from the same study and seed; go on with unfinished ones.",
 )
-RESUME_DESIGNS = _flag(
-    "resume", "--resume", "Go on with what an interrupted run of the same study and seed had finished."
-)
+RESUME_DESIGNS = _flag("--resume", "Go on with what an interrupted run of the same study and seed had finished.")
 VARY = _text(
-    "vary",
     list[str],
     "--vary",
     "A.B.C=VALUES",
     "An entry of the study that varies, and its values: START:STOP:STEP, VALUE,VALUE,... (also words), or LOW:HIGH of "
     "a random design, e.g. mechanism.parameters.r=30:50:5. Repeatable; in place of what the study's matrix varies.",
 )
-METHOD = _text(
-    "method", str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid."
-)
-SAMPLES = _text("samples", int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
+METHOD = _text(str, "--method", "NAME", "Which combinations are cases: grid, latin_hypercube or sobol. Default: grid.")
+SAMPLES = _text(int, "--samples", "N", "Number of cases of latin_hypercube and sobol.", min=1)
 CASES = _text(
-    "cases",
     Path,
     "--cases",
     "FILE",
     "CSV file of cases instead of --vary: its first line names entries of the study, each line below is a case.",
 )
 RESULTS = _text(
-    "results",
     list[str],
     "--results",
     "LIST",
@@ -189,23 +173,15 @@ RESULTS = _text(
     "place of those of the study's matrix.",
 )
 MAXIMIZE = _text(
-    "maximize",
     list[str],
     "--maximize",
     "LIST",
     "Results that are to be large: cases that meet every requirement get a rank, and the Pareto front is marked. Named "
     "as for --results. Repeatable; in place of what the study's matrix maximizes.",
 )
-MINIMIZE = _text(
-    "minimize",
-    list[str],
-    "--minimize",
-    "LIST",
-    "Results that are to be small, likewise.",
-)
-SORT = _flag("sort", "--sort", "The best case is the first row of the table.")
+MINIMIZE = _text(list[str], "--minimize", "LIST", "Results that are to be small, likewise.")
+SORT = _flag("--sort", "The best case is the first row of the table.")
 VERIFY = _text(
-    "verify",
     Path,
     "--verify",
     "PATH",
@@ -247,7 +223,6 @@ RTOL = _parameter(
     typer.Option("--rtol", metavar="R", min=0, help="Relative tolerance: a share of the old number."),
 )
 ATOL = _text(
-    "atol",
     float,
     "--atol",
     "A",
@@ -256,7 +231,6 @@ ATOL = _text(
     min=0,
 )
 TOLERANCES = _text(
-    "tolerances",
     Path,
     "--tolerances",
     "FILE",
@@ -264,9 +238,9 @@ TOLERANCES = _text(
     "that fits counts, --rtol and --atol where none does.",
 )
 OUT_DIFFERENCES = _out("Folder for differences.csv and differences.png. Default: they are not written.")
-# Of the cases of a sweep.
+# Options that make the cases of a sweep.
 MATRIX = (VARY, METHOD, SAMPLES, CASES, RESULTS, MAXIMIZE, MINIMIZE, SORT)
-# What every question takes, and what only some of them do.
+# Options of every question, and those of single questions.
 COMMON = (STUDY, OUT, OVERRIDES, SEED, JOBS, JSON, QUIET, STRICT, NO_PLOTS, FORMAT, STYLE, ALLOW_FILES)
 OWN = {
     "kinematics": (ANIMATE, ALL_MODES, BEFORE),
@@ -293,7 +267,7 @@ class Options:
     jobs: int | None = None
     executor: str | None = None
     shard: str | None = None
-    command: str = ""  # that was given
+    command: str = ""  # name of the command
     json: bool = False
     quiet: bool = False
     no_plots: bool = False
@@ -324,7 +298,7 @@ class Options:
 
     @property
     def part(self) -> Shard | None:
-        """The shard that is to be computed."""
+        """The shard to compute; None without --shard."""
         from mechdesign.work.shards import Shard
 
         return None if self.shard is None else Shard.of(self.shard)

@@ -1,4 +1,4 @@
-"""Where the results of a command go, and what stands there already."""
+"""Folders of results, and the check that no other files are replaced in them."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from mechdesign.study import Study
 from mechdesign.work import shards
 from mechdesign.work.journal import MARK, NAME
 
-PAGE = pages.GENERATOR.encode()  # by which a report is known
-RESULTS = Path("results")  # where no other folder is asked for
+PAGE = pages.GENERATOR.encode()  # mark of our reports
+RESULTS = Path("results")  # default folder
 # Names of files about several studies, beside their folders.
 SUMMARY = "summary.csv"
 _SHARED = (SUMMARY, pages.INDEX)
-# Commands that an interrupted run need not begin anew.
+# Commands that can resume after an interrupt.
 RESUMED = ("optimize", SWEEP.name)
 
 
 def folder(study: Study, name: str, options: Options, *, several: bool = False) -> Path:
-    """Where the results of a command go, given alone; of several studies each has a folder in that of the option."""
+    """Folder of a command's results; with several studies each has a folder inside that of `--out`."""
     if options.out is None:
         return RESULTS / study.label / name
     return options.out / study.label if several else options.out
 
 
 def place(directory: Path, options: Options) -> Path:
-    """The folder that a command writes in: of a shard its own, for others write at the same time."""
+    """Folder that a command writes in; each shard has its own, as several are written at the same time."""
     return directory if options.part is None else directory / options.part.folder
 
 
 def claim(owners: dict[str, Path | None], study: Study) -> None:
-    """Take the folder of a study's name; `owners` says which file each folder belongs to.
+    """Reserve the folder of a study's name; `owners` maps folders to study files.
 
     Raises
     ------
@@ -53,14 +53,14 @@ def claim(owners: dict[str, Path | None], study: Study) -> None:
 
 
 def extras(command: str, options: Options) -> Extras:
-    """What else than tables the options want of a command."""
+    """Pictures and reports that the options ask of a command."""
     animate = options.animate and command == "kinematics"
     look = options.style or STYLES[0]
     return Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report, look)
 
 
 def check(study: Study, command: str, directory: Path, options: Options) -> None:
-    """Find out before a command computes that its files would replace others than its own, or what the study reads.
+    """Check before a computation that its files replace no others, and none that the study reads.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The process of a command: its exit code, and streams that cannot fail it. Imports nothing heavy."""
+"""The process of a command: its exit code, and output streams whose errors do not end it. Imports nothing heavy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What became of many questions: a table, JUnit for CI, and a line for each that failed."""
+"""Summaries of many questions: a table, JUnit for CI, and a line for each failure."""
 
 from __future__ import annotations
 
@@ -17,62 +17,61 @@ if TYPE_CHECKING:
     from junitparser import JUnitXml
 
 _SKIPPED = re.compile(r'(?<=") skipped="\d+"')
-_MARK = b'<testsuites name="mechdesign"'  # of a JUnit file
+_MARK = b'<testsuites name="mechdesign"'  # beginning of our JUnit files
 
 
 def mark(path: Path) -> bytes:
-    """By what a file is known whose place a JUnit file may take: that of an older one, none where its name is XML's."""
+    """Mark of files that a JUnit file may replace: older JUnit files of ours; any file if it is named ``*.xml``."""
     return b"" if path.suffix == ".xml" else _MARK
 
 
-def in_brief(given: Outcome) -> str:
-    """What a question failed by, in a line of the list of failures."""
-    why = [given.failed.splitlines()[0]] if given.failed else []
-    why += [str(verdict) for verdict in given.verdicts if not verdict.met]
-    return f"  {given.study}: {given.command}: {given.word}: {'; '.join(why)}"
+def in_brief(outcome: Outcome) -> str:
+    """The reason of a failed question, in one line."""
+    why = [outcome.failed.splitlines()[0]] if outcome.failed else []
+    why += [str(verdict) for verdict in outcome.verdicts if not verdict.met]
+    return f"  {outcome.study}: {outcome.command}: {outcome.word}: {'; '.join(why)}"
 
 
-def summary(answers: Sequence[Outcome]) -> Table:
-    """What became of the questions, a row each."""
-    rows = [given for given in answers if given.command]
+def summary(outcomes: Sequence[Outcome]) -> Table:
+    """Table of the outcomes, one row for each question."""
+    rows = [outcome for outcome in outcomes if outcome.command]
     return SUMMARY.table(SUMMARY.columns(
-        {}, study=[given.study for given in rows], command=[given.command for given in rows],
-        outcome=[given.shard or given.word + " (kept)" * given.kept for given in rows],
-        exit_code=[given.exit_code for given in rows], requirements=[
-            f"{sum(verdict.met for verdict in given.verdicts)}/{len(given.verdicts)}" if given.verdicts else ""
-            for given in rows
+        {}, study=[outcome.study for outcome in rows], command=[outcome.command for outcome in rows],
+        outcome=[outcome.shard or outcome.word + " (kept)" * outcome.kept for outcome in rows],
+        exit_code=[outcome.exit_code for outcome in rows], requirements=[
+            f"{sum(verdict.met for verdict in outcome.verdicts)}/{len(outcome.verdicts)}" if outcome.verdicts else ""
+            for outcome in rows
         ],
-        rows=[given.rows for given in rows], warnings=[len(given.warnings) for given in rows],
-        directory=[str(given.directory) if given.rows else "" for given in rows],
+        rows=[outcome.rows for outcome in rows], warnings=[len(outcome.warnings) for outcome in rows],
+        directory=[str(outcome.directory) if outcome.rows else "" for outcome in rows],
     ))  # fmt: skip
 
 
-def junit(answers: Sequence[Outcome]) -> str:
-    """JUnit XML, which every CI server shows: a suite a study; a case a command, and a case a requirement.
+def junit(outcomes: Sequence[Outcome]) -> str:
+    """JUnit XML for CI servers: a suite for each study, with a case for each command and each requirement.
 
-    A requirement that is not met is a failure; whatever kept a command from its result is an error; what the run ended
-    before is skipped.
+    A requirement that is not met is a failure, a command without a result an error, a command not reached skipped.
     """
     from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    for study, group in groupby(answers, key=lambda given: given.study):
+    for study, group in groupby(outcomes, key=lambda outcome: outcome.study):
         study = printable(study)
         suite, name = TestSuite(study or "mechdesign"), f"mechdesign.{study}".rstrip(".")
-        for given in group:
-            case = TestCase(given.command or "run", classname=name, time=round(given.seconds, 3))
-            if given.exit_code > 1:
-                failed = printable_lines(given.failed)
-                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {given.exit_code}")
+        for outcome in group:
+            case = TestCase(outcome.command or "run", classname=name, time=round(outcome.seconds, 3))
+            if outcome.exit_code > 1:
+                failed = printable_lines(outcome.failed)
+                error = Error(failed.partition("\n")[0] or "failed", type_=f"exit code {outcome.exit_code}")
                 error.text = failed
                 case.result = [error]
-            if given.left:
+            if outcome.left:
                 case.result = [Skipped("the run ended before it")]
-            if given.warnings:
-                case.system_out = "\n".join(f"warning: {printable(str(warning))}" for warning in given.warnings)
+            if outcome.warnings:
+                case.system_out = "\n".join(f"warning: {printable(str(warning))}" for warning in outcome.warnings)
             suite.add_testcase(case)
-            for verdict in given.verdicts:
-                case = TestCase(f"{given.command}: {printable(verdict.requirement)}", classname=name, time=0)
+            for verdict in outcome.verdicts:
+                case = TestCase(f"{outcome.command}: {printable(verdict.requirement)}", classname=name, time=0)
                 if not verdict.met:
                     case.result = [Failure(printable(str(verdict)), type_="requirement")]
                 suite.add_testcase(case)
@@ -84,6 +83,6 @@ def junit_text(report: JUnitXml) -> str:
     """The text of a JUnit report, with its counts."""
     report.update_statistics()  # type: ignore[no-untyped-call]
     text = report.tostring()  # type: ignore[no-untyped-call]
-    # Jenkins' schema (junit-10.xsd of its xunit plugin) allows that count in suites alone.
+    # Jenkins' schema (junit-10.xsd of its xunit plugin) allows this attribute in suites only.
     body = _SKIPPED.sub("", text.decode(), count=1)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n'

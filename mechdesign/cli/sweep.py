@@ -22,7 +22,7 @@ from mechdesign.study.text.document import in_yaml, read
 
 @dataclass(frozen=True)
 class Matrix:
-    """What the options say of the cases; what is left out is the study's."""
+    """The options that make the cases; those left out are the study's."""
 
     vary: Sequence[str] | None = None
     method: str | None = None
@@ -34,7 +34,7 @@ class Matrix:
     sort: bool = False
 
     def overrides(self, study: Path | None) -> Iterator[str]:
-        """The same as changes of the section ``matrix``; of other cases nothing of the study's design stays.
+        """The options as overrides of the section ``matrix``; new cases replace the study's whole design of cases.
 
         Raises
         ------
@@ -55,29 +55,18 @@ class Matrix:
         if self.cases is not None:
             beside = study.parent if study is not None else Path()
             yield f"matrix.cases={in_yaml(os.path.relpath(self.cases, beside))}"
-        if self.method is not None:
-            yield f"matrix.method={in_yaml(self.method)}"
-        if self.samples is not None:
-            yield f"matrix.samples={self.samples}"
-        if self.results:
-            yield f"matrix.results={_listed(self.results)}"
         if self.maximize or self.minimize:
             yield from (f"matrix.best.{key}=" for key in ("maximize", "minimize"))
-        if self.maximize:
-            yield f"matrix.best.maximize={_listed(self.maximize)}"
-        if self.minimize:
-            yield f"matrix.best.minimize={_listed(self.minimize)}"
-        if self.sort:
-            yield "matrix.best.sort=true"
-
-
-def _listed(texts: Sequence[str]) -> str:
-    """Names with commas between them."""
-    return in_yaml([name.strip() for text in texts for name in text.split(",")])
+        lists = {"results": self.results, "best.maximize": self.maximize, "best.minimize": self.minimize}
+        values: dict[str, Any] = {"method": self.method, "samples": self.samples, "best.sort": self.sort or None}
+        values |= {
+            key: [name.strip() for text in texts for name in text.split(",")] for key, texts in lists.items() if texts
+        }
+        yield from (f"matrix.{key}={in_yaml(value)}" for key, value in values.items() if value is not None)
 
 
 def _varied(text: str) -> tuple[str, Any]:
-    """An entry and its values: a range, or a list of which commas stand between."""
+    """An entry and its values: a range, or a list separated by commas."""
     name, separator, values = text.partition("=")
     name, values = name.strip(), values.strip()
     label = f"--vary {text}"
@@ -92,28 +81,28 @@ def _varied(text: str) -> tuple[str, Any]:
 
 
 def _as_typed(error: StudyError) -> StudyError:
-    """The same mistakes under the options that say what `Matrix.overrides` made of them."""
+    """The mistakes of overrides from `Matrix.overrides`, with the options that gave them."""
     written = re.compile(r"--set matrix\.(?:best\.)?(\w+)=.*")
     return StudyError([replace(problem, file=written.sub(r"--\1", problem.file)) for problem in error.problems])
 
 
 def sweep(path: Path | None, options: Options, matrix: Matrix) -> int:
     """Answer the cases of a study; returns the exit code, the highest of them all."""
-    given, label = None, name_of(path)
+    outcome, label = None, name_of(path)
     if options.junit is not None:
         check_marked(options.junit, mark(options.junit))
     try:
         changes = (*(options.overrides or ()), *matrix.overrides(path))
-        given = ask("sweep", path, replace(options, overrides=changes))
-        return given.exit_code
+        outcome = ask("sweep", path, replace(options, overrides=changes))
+        return outcome.exit_code
     except KeyboardInterrupt as stop:
         words = str(stop) or "interrupted"
-        given = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
+        outcome = Outcome(label, "sweep", Path(), Interrupted.exit_code, 0, failed=words)
         raise
     except Exception as wrong:
         error = _as_typed(wrong) if isinstance(wrong, StudyError) else wrong
-        given = failure(label, "sweep", Path(), error)
-        return given.exit_code
+        outcome = failure(label, "sweep", Path(), error)
+        return outcome.exit_code
     finally:
-        if options.junit is not None and given is not None:
-            write_file(options.junit, junit([given]).encode(), mark(options.junit))
+        if options.junit is not None and outcome is not None:
+            write_file(options.junit, junit([outcome]).encode(), mark(options.junit))

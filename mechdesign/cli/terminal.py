@@ -1,4 +1,4 @@
-"""Talk on stderr, data on stdout: a table for people, CSV for pipes, a bar for what takes long."""
+"""Messages on stderr, data on stdout: a table on a terminal, CSV in a pipe, a progress bar."""
 
 from __future__ import annotations
 
@@ -24,32 +24,32 @@ if TYPE_CHECKING:
 
 _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
-_PIECE = 1 << 20  # characters of a file that are copied at once
-_NAMES = 6  # names of columns for which there was no room
-_GREAT = 1_000_000  # poses, designs or samples that nobody asks for without a reason
-DELAY = 1.0  # seconds before it is shown how far something is
+_PIECE = 1 << 20  # characters copied at a time from a file
+_NAMES = 6  # most names listed of columns that do not fit
+_GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
+DELAY = 1.0  # seconds before progress is shown
 
 
 def say(text: str, *, quiet: bool = False) -> None:
-    """A line to stderr, unless the user wants quiet."""
+    """Print a line to stderr, unless `quiet`."""
     if not quiet:
         print(printable_lines(text), file=sys.stderr, flush=True)
 
 
 def emit(text: str) -> None:
-    """Data to stdout."""
+    """Write data to stdout."""
     emit_all([text])
 
 
 def emit_all(texts: Iterable[str]) -> None:
-    """Data to stdout, piece by piece."""
+    """Write data to stdout, piece by piece."""
     for text in texts:
         sys.stdout.write(text)
     sys.stdout.flush()
 
 
 def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
-    """A table to stdout: JSON if asked, else CSV in a pipe; on a terminal what fits, and the file of the `rest`."""
+    """Write a table to stdout: as JSON, as CSV in a pipe, or on a terminal what fits and the file of the `rest`."""
     if as_json:
         emit_all(json_blocks(table))
     elif sys.stdout.isatty():
@@ -62,7 +62,7 @@ def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
 
 
 def show_lines(lines: Sequence[str]) -> None:
-    """The first of many lines to a terminal, and how many are left."""
+    """Write the first lines, and how many are left."""
     more = len(lines) - _ROWS
     emit("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
     if more > 0:
@@ -78,7 +78,7 @@ def _show_to_people(table: Table, rest: Path | None) -> None:
     columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
     heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
-    # A long word leaves room for what stands beside it.
+    # A long word leaves room for other columns.
     room, widest = console.width, console.width // 2
     shown = 0
     for head, column, texts in zip(heads, table.columns, columns, strict=True):
@@ -102,13 +102,13 @@ def _show_to_people(table: Table, rest: Path | None) -> None:
 
 
 def lively() -> bool:
-    """Whether a person looks at stderr on a terminal that can be drawn on, rather than a CI server keeps it."""
+    """Whether stderr is a terminal that can show a live display, and not the log of a CI server."""
     ci = os.environ.get("CI", "").lower() not in ("", "0", "false")
     return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
 
 
 def announced(total: int, what: str) -> str:
-    """What is said of a great stage when it begins; empty of others."""
+    """Announcement of a stage of `_GREAT` steps or more; empty for smaller ones."""
     return f"{total} {what} to compute; Ctrl-C ends it" if total >= _GREAT else ""
 
 
@@ -130,7 +130,7 @@ class Bar(Progress):
             self._bar = self._task = None
 
     def start(self, total: int, what: str) -> None:
-        """Begin a stage; a great one is said, also where nobody sees a bar. A place for an interrupt."""
+        """Begin a stage, and announce a great one even without a bar; an interrupt is raised here."""
         interrupts.check()
         if great := announced(total, what):
             say(great, quiet=self._quiet)
@@ -139,7 +139,7 @@ class Bar(Progress):
             self._bar.reset(self._task, total=total, description=what)
 
     def update(self, n: int) -> None:
-        """`n` more steps are done; a place for an interrupt."""
+        """Add `n` finished steps; an interrupt is raised here."""
         interrupts.check()
         self._done += n
         if self._bar is not None and self._task is not None:

@@ -16,7 +16,7 @@ from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggesti
 from mechdesign.study.text.inputs import FILES, MAX_FILE_BYTES
 from mechdesign.work import interrupts
 
-_LOOK = 0.2  # seconds between two looks at the files
+_LOOK = 0.2  # seconds between two checks of the files
 _NAMES = re.compile(rf"[^\s,:'\"\[\]{{}}]+(?:{'|'.join(map(re.escape, FILES))})\b")
 
 
@@ -54,7 +54,7 @@ def watch(path: Path, commands: Sequence[str], options: Options) -> int:
 
 
 def _await_change(seen: dict[Path, bytes | None]) -> None:
-    """Return when a file holds something else, and has done so for two looks: an editor may still be writing."""
+    """Return when a file has changed and then stays the same for two checks: an editor may still be writing."""
     stamps = _stamps(seen)
     changed = _contents(seen) != seen
     while True:
@@ -68,7 +68,7 @@ def _await_change(seen: dict[Path, bytes | None]) -> None:
 
 
 def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
-    """What tells that a file was written, without reading it."""
+    """Inode, size and time of each file, which show a change without reading it; None if it is missing."""
     stamps: list[tuple[int, int, int] | None] = []
     for file in files:
         try:
@@ -84,7 +84,7 @@ def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
     for file in files:
         contents[file] = None
         with suppress(OSError):
-            # A device might have no end, and a pipe no beginning.
+            # Reading a device or a pipe might never end.
             if file.is_file():
                 with file.open("rb") as stream:
                     contents[file] = stream.read(MAX_FILE_BYTES)
@@ -92,7 +92,7 @@ def _contents(files: Iterable[Path]) -> dict[Path, bytes | None]:
 
 
 def _named(path: Path, options: Options) -> set[Path]:
-    """Files that a study names; of one that is wrong, those that its text seems to name."""
+    """Files that a study names; if the study has mistakes, file names found in its text."""
     try:
         return {file for _, file, _ in load_study(path, options).inputs()}
     except MechdesignError:

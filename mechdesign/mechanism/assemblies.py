@@ -52,7 +52,8 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
     choosing = [index for index, mode in enumerate(plan.modes) if mode]
     if 2 ** len(choosing) > MAX_ASSEMBLIES:
         raise MechanismError(
-            f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes", "mechanism.sketch"
+            f"{len(choosing)} joints choose the assembly: more than {MAX_ASSEMBLIES} modes; leave --all-modes out",
+            "mechanism.sketch",
         )
     listed: list[Assembly] = []
     for signs in product((1, -1), repeat=len(choosing)):
@@ -71,7 +72,7 @@ def assemblies(mechanism: Mechanism, given: tuple[str, ...]) -> tuple[Assembly, 
             label = " ".join([*names, f"#{number}"])
             listed.append(Assembly(label, _variant(mechanism, plan, modes, configuration), drawn and number == 1))
             if len(listed) > MAX_ASSEMBLIES:
-                raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes", SKETCH)
+                raise MechanismError(f"more than {MAX_ASSEMBLIES} assembly modes; leave --all-modes out", SKETCH)
     return tuple(listed)
 
 

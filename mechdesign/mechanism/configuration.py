@@ -30,7 +30,16 @@ class Reason(IntEnum):
     @property
     def text(self) -> str:
         """Words for tables and messages."""
-        return ("", "cannot be assembled", "other assembly", "limit", "does not hold its load")[self]
+        return ("", *REASONS)[self]
+
+
+# Reasons in words, each with what it is and what helps.
+REASONS = {
+    "cannot be assembled": "the links do not reach; change a length or the pose",
+    "other assembly": "the pose is not reached from the sketch without a singularity; draw the assembly that is meant",
+    "limit": "a stated limit is passed; widen it, or leave the pose out",
+    "does not hold its load": "a motion is free under the load; add a drive or a link",
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -60,7 +60,7 @@ def near_singular(regularity: float) -> list[Caution]:
     return [Caution(
         "singular",
         f"the sketch is at a singular position (regularity {regularity:.1g} of 1): its drives hold the links "
-        "hardly or not at all there, and rates there mean nothing",
+        "hardly or not at all there, and rates there mean nothing; draw another pose",
     )]  # fmt: skip
 
 

@@ -198,7 +198,9 @@ class Mechanism(Core):
         for name, value in (places or {}).items():
             place = self.description.places.get(name)
             if place is None and name not in self.geometry.offsets:
-                raise MechanismError(f"'{name}' is not a dimension of this mechanism", name)
+                raise MechanismError(
+                    f"'{name}' is not a dimension of this mechanism: a parameter, or a place such as rod.length", name
+                )
             angle = place is not None and place.quantity == "angle"
             dims[name] = np.asarray(value, dtype=float) * (unit if angle else 1.0)
         configuration = plan.solve(given, dims, jobs=None)

@@ -1,4 +1,4 @@
-"""What the reference says of a word."""
+"""Entries of the reference."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Entry:
-    """A word and what is said of it; what is empty is not said.
+    """A word and its explanation; empty fields are not shown.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Entry:
 
     @property
     def plain(self) -> str:
-        """The word as one may type it, without the places of names."""
+        """The word as a user types it, without the ``*`` of names."""
         return self.word.replace(".*", "")
 
     @property

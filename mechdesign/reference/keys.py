@@ -54,7 +54,7 @@ def _models(annotation: Any) -> Iterator[tuple[type[Model], str]]:
 
 
 def entries() -> Iterator[Entry]:
-    """An entry for each key, and one for each word that a key chooses out of a list."""
+    """An entry for each key, and one for each word of a key's list of choices."""
     forms = schema()
     chosen: dict[tuple[str, str], Entry] = {}
     for key in keys():
@@ -64,7 +64,7 @@ def entries() -> Iterator[Entry]:
         reads = list(fields.reads(key.field.annotation, key.field.metadata))
         words = _words(reads)
         about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
-        # Of local indices there is more to say: `mechdesign.reference.sources.indices`.
+        # Local indices have entries of their own: `mechdesign.reference.sources.indices`.
         for what, word, text in _words(read for read in reads if read.words is not INDEX_NAMES):
             before = chosen[what, word].where if (what, word) in chosen else ()
             chosen[what, word] = Entry(word, what, text, where=(*before, key.path.replace(".*", "")))
@@ -83,12 +83,12 @@ def entries() -> Iterator[Entry]:
 
 
 def _words(reads: Iterable[Read]) -> list[tuple[str, str, str]]:
-    """What they are, words and meanings of what is chosen out of a list."""
+    """The choices of values: what they are, the word and its meaning."""
     return [(read.what, word, meaning(each)) for read in reads for word, each in (read.words or {}).items()]
 
 
 def _within(models: Iterable[tuple[type[Model], str]]) -> Iterator[tuple[str, str, str]]:
-    """Words that a section which stands alone may be written as, instead of a mapping."""
+    """Words that may stand in place of a section's mapping."""
     for model, stars in models:
         for field in model.model_fields.values() if model.short and not stars else ():
             yield from _words(fields.reads(field.annotation, field.metadata))
@@ -103,7 +103,7 @@ def _unit(reads: Sequence[Read]) -> str:
 
 
 def _default(field: FieldInfo) -> str:
-    """The value that is taken where a key is left out, as a study writes it."""
+    """The default of a key, as a study writes it."""
     value = field.get_default(call_default_factory=True, validated_data={})
     if value is PydanticUndefined:
         return "never; it is required"
@@ -115,7 +115,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def place(path: str) -> str:
-    """The key of the format at a path of a study, as one may type it; the nearest above it where there is none."""
+    """The key of the format at a path of a study, without ``*``; else the nearest key above it."""
     known = {key.path: key.path.replace(".*", "") for key in keys()}
     while path:
         for each, plain in known.items():

@@ -1,4 +1,4 @@
-"""Looking a word up: by its path, by its last part, by what it is, by a close spelling."""
+"""Look a word up by its path, its last part, its kind or a similar spelling."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mechdesign.reference.keys import KIND, place
 
 
 def find(entries: Sequence[Entry], word: str) -> list[Entry]:
-    """What a word may mean: entries of that path or name, else of that last part, else of that kind.
+    """Entries of a word: those of that path or name, else of that last part, else of that kind.
 
     A path may be that of a study, ``mechanism.joints.guide.angle``, or leave names out, ``mechanism.joints.angle``.
     """
@@ -34,20 +34,20 @@ def find(entries: Sequence[Entry], word: str) -> list[Entry]:
 
 
 def holding(entries: Sequence[Entry], words: str) -> list[Entry]:
-    """Entries in whose texts these words stand."""
+    """Entries whose texts contain these words."""
     asked = words.casefold()
     return [entry for entry in entries if any(asked in text.casefold() for text in (entry.text, entry.formula))]
 
 
 def below(entries: Sequence[Entry], entry: Entry) -> list[Entry]:
-    """Keys of a section, without those of sections in it."""
+    """Keys directly in a section, not those of sections inside it."""
     inside = (each for each in entries if entry.kind == each.kind == KIND and each.word.startswith(f"{entry.word}."))
     depth = entry.plain.count(".") + 1
     return [each for each in inside if each.plain.count(".") == depth]
 
 
 def near(entries: Sequence[Entry], word: str) -> str | None:
-    """The known word that is spelt most like this one; None where none is."""
+    """The word of the reference with the most similar spelling; None if none is similar."""
     known = [
         *(entry.last for entry in entries),
         *(entry.plain for entry in entries),

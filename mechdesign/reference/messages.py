@@ -1,49 +1,52 @@
-"""Errors and warnings that a user can meet: read from the calls that make them, where each is written once."""
+"""Errors and warnings that a user can meet, read from the source: each is written once, in the call that makes it.
+
+A module, or the package around it, names in `HELP_PAGE` the page of the documentation that tells more of its messages.
+"""
 
 from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import NamedTuple
 
-import yaml
-
+from mechdesign import errors
 from mechdesign.cautions import KINDS
 from mechdesign.errors import EXIT_CODES
+from mechdesign.mechanism.configuration import REASONS
 from mechdesign.reference.entries import Entry
-from mechdesign.reference.made import PLACE, Reader
 
 KIND = "message"
-PART = 0  # in place of an exit code: what may stand in a place of another message
-# Two words at least, outside of its places; and letters by which a text is known to be that message.
+PLACE = "\N{HORIZONTAL ELLIPSIS}"  # what differs from one message to the other
+PART = 0  # in place of an exit code: a text that a message is made of
+# What makes an error of a study, beside the classes of errors.
+MAKERS = ("Problem", "failure", "problem", "report", "Misfit", "note", "_note", "Undetermined")
+FOREIGN = ("KeyError", "TypeError", "AttributeError", "ImportError", "ValueError")
+# A message has two words or more outside of its places, a part more; letters by which a message is recognised.
 _SENTENCE = re.compile(r"[A-Za-z]{2,}[,;:')]* +['(]?[A-Za-z]")
+_WORDS_OF_PART = 4
 _LETTERS = 10
-_WORDS = 3  # of a part
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Messages about one subject: what is to be known of them, and what mends those that do not say it."""
-
-    group: str
-    about: str
-    files: tuple[str, ...]  # beginnings of the names of the files that they stand in; the longest that fits counts
-    mends: Mapping[str, str]  # by a part of the text
 
 
 class Message(NamedTuple):
-    """An error with its exit code, or a warning with its kind, what it is about, and what mends it."""
+    """An error with its exit code or a warning with its kind, and the page of the documentation that tells more."""
 
     text: str
-    group: Group
-    code: int | None
-    kind: str
-    mend: str
+    page: str
+    code: int | None  # None of a warning
+    kind: str = ""
+
+    @property
+    def meaning(self) -> str:
+        """What an error with its exit code means, or a warning of its kind."""
+        if self.code == PART:
+            return "an error or a warning, or a part of one"
+        if self.code is None:
+            return f"a warning of kind {self.kind}: {KINDS[self.kind].meaning}" if self.kind else "a warning"
+        return f"exit code {self.code}: {EXIT_CODES[self.code]}"
 
     def holds(self, words: str) -> bool:
         """Whether these words stand in it, or it in these words."""
@@ -58,74 +61,120 @@ class Message(NamedTuple):
 
 
 @cache
-def groups() -> tuple[Group, ...]:
-    """What ``messages.yaml`` says, in its order."""
-    said = yaml.safe_load((files("mechdesign.reference") / "messages.yaml").read_text(encoding="utf-8"))
-    return tuple(Group(**{"mends": {}, **each}) for each in said)
-
-
-@cache
 def messages() -> tuple[Message, ...]:
-    """Every message of the package, group by group, in the order of a group's files and of the source in them."""
-    found: dict[tuple[Group, str], tuple[int, Message]] = {}
-    for name, text, code, kind in _read():
-        if (owner := _owner(name)) is not None:
-            group, place = owner
-            mend = next((mend for part, mend in group.mends.items() if part in text), "")
-            known = found.get((group, text))
-            if known is None or known[1].code == PART:
-                found[group, text] = place, Message(text, group, code, kind, mend)
-    order = sorted(found.values(), key=lambda each: (groups().index(each[1].group), each[0]))
-    return tuple(message for _, message in order)
-
-
-def unread() -> set[str]:
-    """Files with messages that belong to no group."""
-    return {name for name, *_ in _read() if _owner(name) is None}
-
-
-def _owner(name: str) -> tuple[Group, int] | None:
-    """The group of a file, and the place of its name there."""
-    fits = [
-        (len(begin), group, k) for group in groups() for k, begin in enumerate(group.files) if name.startswith(begin)
-    ]
-    return max(fits, key=lambda each: each[0])[1:] if fits else None
+    """Every message of the package, page by page, in the order of the source."""
+    found: dict[tuple[str, str], Message] = {}
+    for page, tree in _modules(files("mechdesign")):
+        for message in _read(page, tree):
+            known = found.get((page, message.text))
+            if known is None or known.code == PART:
+                found[page, message.text] = message
+    return tuple(sorted(found.values(), key=lambda each: (not each.page.startswith("reference/"), each.page)))
 
 
 def find_messages(words: str) -> list[Entry]:
-    """Entries of the messages in which these words stand, or that these words are."""
+    """Entries of messages that contain these words or are these words, and of reasons why a pose fails."""
     found = [
-        Entry(message.text, KIND, ". ".join(filter(None, (f"{message.group.group}; {meaning(message)}", message.mend))))
+        Entry(message.text, KIND, f"{message.meaning}; see the page {message.page} of the documentation")
         for message in messages() if message.holds(words)
     ]  # fmt: skip
-    # What is between quotes in what is said of a group may be any part of a message.
-    said = [group for group in groups() if any(part in words for part in re.findall('"(.+?)"', group.about))]
-    return found or [Entry(f"{group.group}: ...", KIND, group.about) for group in said]
+    reasons = [
+        Entry(reason, KIND, f"why a pose fails: {cure}")
+        for reason, cure in REASONS.items() if words == reason or (reason in words and not found)
+    ]  # fmt: skip
+    return [*reasons, *found]
 
 
-def meaning(message: Message) -> str:
-    """What an error with its exit code means, or a warning of its kind."""
-    if message.code == PART:
-        return "a part of an error or a warning"
-    if message.code is None:
-        return f"a warning of kind {message.kind}: {KINDS[message.kind].meaning}" if message.kind else "a warning"
-    return f"exit code {message.code}: {EXIT_CODES[message.code]}"
-
-
-def _sources(folder: Traversable, prefix: str = "") -> Iterator[tuple[str, ast.Module]]:
-    for each in sorted(folder.iterdir(), key=lambda item: item.name):
+def _modules(folder: Traversable, page: str = "") -> Iterator[tuple[str, ast.Module]]:
+    """Every module below a folder, with its page."""
+    inside = sorted(folder.iterdir(), key=lambda item: item.name)
+    trees = {each.name: ast.parse(each.read_text(encoding="utf-8")) for each in inside if each.name.endswith(".py")}
+    if "__init__.py" in trees:
+        page = _help_page(trees["__init__.py"]) or page
+    for tree in trees.values():
+        yield _help_page(tree) or page, tree
+    for each in inside:
         if each.is_dir():
-            yield from _sources(each, f"{prefix}{each.name}/")
-        elif each.name.endswith(".py"):
-            yield f"{prefix}{each.name}", ast.parse(each.read_text(encoding="utf-8"))
+            yield from _modules(each, page)
 
 
-def _read() -> Iterator[tuple[str, str, int | None, str]]:
-    """File, text, exit code and kind of each message; what may stand in its places follows as `PART`."""
-    reader = Reader(dict(_sources(files("mechdesign"))))
-    for name in reader.trees:
-        for made in reader.made(name):
-            for text, part in reader.texts(made.argument, made.scope):
-                plain = text.replace(PLACE, "")
-                if _SENTENCE.search(plain) and (not part or len(re.findall(r"[A-Za-z']{2,}", plain)) >= _WORDS):
-                    yield name, " ".join(text.split()).strip(" ;,:"), PART if part else made.code, made.kind
+def _help_page(tree: ast.Module) -> str:
+    pages = _given(tree.body).get("HELP_PAGE")
+    return str(ast.literal_eval(pages[0])) if pages else ""
+
+
+def _read(page: str, tree: ast.Module) -> Iterator[Message]:
+    """Messages of a module; where it has a page also further texts in its functions, as parts."""
+    constants = _given(tree.body)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign) and _name(node.targets[0]) == "one_of":
+            yield from _sentences(node.value, page, 2)
+        elif isinstance(node, ast.FunctionDef):
+            names = {**constants, **_given(ast.walk(node))}
+            for call in ast.walk(node):
+                if isinstance(call, ast.Call):
+                    code, kind, arguments = _made(call)
+                    for argument in arguments:
+                        inside = {_name(each) for each in ast.walk(argument)}
+                        for value in (argument, *(value for name in inside for value in names.get(name, ()))):
+                            yield from _sentences(value, page, code, kind)
+            for statement in node.body if page else ():
+                for message in _sentences(statement, page, PART):
+                    if len(re.findall(r"[A-Za-z']{2,}", message.text)) >= _WORDS_OF_PART:
+                        yield message
+
+
+def _made(call: ast.Call) -> tuple[int | None, str, Sequence[ast.expr]]:
+    """Exit code, kind, and the arguments of a call that are messages."""
+    name = _name(call.func)
+    if name == "Caution" and call.args:
+        return None, str(getattr(call.args[0], "value", "")), call.args[1:2]
+    if name == "doubt":
+        return None, "suspect", call.args
+    if name in MAKERS:
+        return 2, "", call.args
+    if name.endswith("Error") and name not in FOREIGN:
+        return getattr(getattr(errors, name, None), "exit_code", 2), "", call.args[:1]
+    return 3, "", [keyword.value for keyword in call.keywords if keyword.arg == "failed"]
+
+
+def _name(node: ast.AST) -> str:
+    """The last name of ``a.b.c``."""
+    return str(getattr(node, "attr", getattr(node, "id", "")))
+
+
+def _given(nodes: Iterable[ast.AST]) -> Mapping[str, list[ast.expr]]:
+    """What names are given among some statements."""
+    found: dict[str, list[ast.expr]] = {}
+    for node in nodes:
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        if isinstance(node, ast.Assign):
+            pairs = [(target, node.value) for target in node.targets]
+        elif isinstance(node, ast.AugAssign | ast.NamedExpr):
+            pairs = [(node.target, node.value)]
+        elif isinstance(node, ast.For | ast.comprehension):
+            pairs = [(node.target, node.iter)]
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "append":
+            pairs = [(node.func.value, node.args[0])]
+        for target, value in pairs:
+            for each in target.elts if isinstance(target, ast.Tuple) else [target]:
+                found.setdefault(_name(each), []).append(value)
+    return found
+
+
+def _sentences(node: ast.AST, page: str, code: int | None, kind: str = "") -> Iterator[Message]:
+    """Sentences among the texts of an expression or a statement, `PLACE` for what differs; docstrings are none."""
+    inner: Iterable[ast.AST] = ast.iter_child_nodes(node)
+    text = ""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        text = node.value.replace("{}", PLACE)
+    elif isinstance(node, ast.JoinedStr):
+        words = (str(part.value) if isinstance(part, ast.Constant) else PLACE for part in node.values)
+        text = re.sub(f"{PLACE}+", PLACE, "".join(words))
+        inner = [part.value for part in node.values if isinstance(part, ast.FormattedValue)]
+    if _SENTENCE.search(text.replace(PLACE, "")):
+        yield Message(" ".join(text.split()).strip(" ;,:"), page, code, kind)
+    for each in inner:
+        yield from _sentences(each, page, code, kind)

@@ -1,4 +1,4 @@
-"""Where entries come from: one function for each kind of word, which reads what the code declares."""
+"""Sources of the entries: one function for each kind of word, which reads the declarations in the code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mechdesign.study.text.units import listed
 
 
 def terms() -> Iterator[Entry]:
-    """What may stand at a key."""
+    """Terms for the values of keys."""
     for word, meaning in TERMS.items():
         yield Entry(word, "what may stand", meaning)
 
@@ -76,7 +76,7 @@ def exit_codes() -> Iterator[Entry]:
         yield Entry(str(code), "exit code", meaning)
 
 
-# A further kind of word is one more function here.
+# One function for each kind of word.
 SOURCES: tuple[Callable[[], Iterable[Entry]], ...] = (
     keys.entries, terms, indices, results, tables.entries, expressions, units, exit_codes, synonyms.entries,
 )  # fmt: skip

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from mechdesign.reference.entries import Entry
 
-# What a word is here: the word of the reference, and how it is meant.
+# A word: the word of the reference in its place, and what it means.
 SYNONYMS: Mapping[str, tuple[str, str]] = {
     "torque": (
         "<drive>_effort",

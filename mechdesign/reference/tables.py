@@ -31,7 +31,7 @@ def entries() -> Iterator[Entry]:
                 where.setdefault((name, kind), []).append(f"{table.name}.csv")
     for (name, kind), files in where.items():
         word = PLACE.sub("*", name)
-        # Numbers of a workspace are results that have entries of their own.
+        # Results of a workspace have entries of their own.
         if word.strip("*") and word not in REGIONAL and word.removeprefix("*_") not in STATISTICS:
             takes = name if word != name else ""
             unit, formula = kind.unit.replace("_", " "), kind.formula

@@ -11,6 +11,8 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
+HELP_PAGE = "howto/report"
+
 # Commands whose pictures can show it.
 COMMANDS = ("kinematics", "workspace")
 KEY = "before"  # of what pictures show

@@ -24,6 +24,8 @@ from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result
 from mechdesign.study import Study
 
+HELP_PAGE = "howto/report"
+
 NAME = "manifest.json"
 _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"

@@ -19,6 +19,8 @@ from mechdesign.study.text.units import written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named
 
+HELP_PAGE = "reference/study/requirements"
+
 Bounds = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
 # Where a requirement is on a part of the motion, and none of it lies there.

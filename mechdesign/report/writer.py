@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
     from mechdesign.report.figures.rendering import Gallery
 
+HELP_PAGE = "howto/report"
+
 DIMENSIONS = "dimensions"  # of `check`
 CREATOR = "mechdesign"  # by which a drawing is known that no manifest lists
 FIGURES = "mechdesign.report.figures"

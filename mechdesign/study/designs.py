@@ -19,7 +19,7 @@ from mechdesign.study.expansion import Numbers
 from mechdesign.study.loading import Study, load_document
 from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.schema.targets import Target
-from mechdesign.study.text.document import Document, Mark
+from mechdesign.study.text.document import Document
 from mechdesign.study.text.fields import Model, own_numbers, parts_of, positive
 from mechdesign.study.text.units import Amount
 from mechdesign.study.variants import changed_data, remeasured
@@ -75,11 +75,8 @@ class Designs:
             raise StudyError([Problem(self.faults[k], "mechanism", str(study.path or ""))])
         resolved = changed_data(study, changed)
         if not self.alike:
-            file = str(study.path or "")
-            return load_document(
-                Document(file, resolved, values={(): Mark(file)}), study.path, study.folder, study.text,
-                study.text_sha256, study.overrides, study.seed, study.mechanism,
-            )  # fmt: skip
+            document = Document.of(resolved, str(study.path or ""))
+            return load_document(document, study.source, study.overrides, study.seed, study.mechanism)
         parameters = {name: float(value) for name, value in old.values(changed).items()}
         places = {name: float(values[k]) for name, values in self.places.items()}
         description = study.mechanism.description

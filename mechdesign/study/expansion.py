@@ -1,4 +1,4 @@
-"""Poses as arrays from what a study asks: lists, sweeps, grids and paths, of its own design or of many."""
+"""Poses as arrays, from lists, sweeps, grids and paths of a study, for its own design or many."""
 
 from __future__ import annotations
 
@@ -19,17 +19,19 @@ from mechdesign.study.schema.poses import PoseSection, Sweep
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
+HELP_PAGE = "reference/study/kinematics"
+
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
     """The numbers of a study for some designs."""
 
     count: int = 1
-    # What differs from the study's own design, shape (count,): parameters, and places in lengths and radians.
+    # Values that differ from the study's own design, shape (count,): parameters, and places (lengths, radians).
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     places: Mapping[str, Floats] = field(default_factory=dict)
     nominal: Mapping[str, float] = field(default_factory=dict)  # every parameter of the study's own design
-    changed: frozenset[str] = frozenset()  # names of what is changed itself, and so follows nothing
+    changed: frozenset[str] = frozenset()  # names with values of their own, which no longer follow parameters
 
     def of(self, number: float) -> Floats:
         """A number of each design, shape (count,)."""
@@ -64,7 +66,7 @@ def sweep_values(sweep: Sweep, numbers: Numbers = OWN) -> Floats:
     with np.errstate(all="ignore"):
         steps = (end - begin) / step + 1e-9
     if not (steps < MAX_POSES).all():
-        raise StudyError(f"a sweep of more than {MAX_POSES} poses")
+        raise StudyError(f"a sweep of more than {MAX_POSES} poses; take a larger step")
     if not (steps >= 0).all():
         raise StudyError(f"a step of {step[0]:g} never leads from {begin[0]:g} to {end[0]:g}")
     return begin[:, None] + step[:, None] * np.arange(math.floor(steps.min()) + 1, dtype=np.float64)

@@ -42,23 +42,33 @@ from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
 from mechdesign.study.schema.workspace import WorkspaceSection
-from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, Mark, in_yaml, plain, read
+from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files
 from mechdesign.study.text.reporter import Reporter, unknown_key
 from mechdesign.study.text.units import Units
 from mechdesign.work.threads import one_thread
 
-# Characters of a study's name that a folder's name does without, and the name of a study that has none.
+# Characters that are replaced in the folder's name, and the name of a study without one.
 _UNFIT = re.compile(r"[^\w.-]+")
 _UNNAMED = "study"
-# What messages call a text that is no file.
+# Name in messages of a study given as a text.
 _TEXT = "<study>"
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a study is read from: its file and text, empty of a mapping, and the folder of the files that it names."""
+
+    path: pathlib.Path | None
+    folder: Folder
+    text: bytes = b""
+    sha256: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study:
-    """A validated study; sections are None where it does not ask.
+    """A validated study; sections that its file does not have are None.
 
     >>> import mechdesign
     >>> study = mechdesign.load(text='''
@@ -89,12 +99,12 @@ class Study:
     requirements: tuple[Requirement, ...]  #: in the order of the file
     fail_on: tuple[str, ...]  #: kinds of warnings that no result, and no case of a sweep, may have
     targets: Mapping[str, Target]  # by the coordinate or point
-    kinds: Mapping[KeyPath, str]  # of quantities, of entries outside the geometry; also of what lies below them
-    fixed: frozenset[str]  # parameters in whole numbers, which are read once
-    folder: Folder  #: where the files lie that it names, and what they held when it was loaded
+    kinds: Mapping[KeyPath, str]  # kinds of quantities of entries outside the geometry, and of the entries below them
+    fixed: frozenset[str]  # parameters used in whole numbers, which are the same for every design
+    folder: Folder  #: folder of the files that it names, with their contents when it was loaded
     drawn: Mapping[str, Any] | None = None  #: units and mechanism before overrides, whose sketch shows the assembly
     strict: bool = False  #: whether every kind of warning fails, not only those of `fail_on`
-    warnings: tuple[Problem, ...] = ()  #: what is likely a mistake, such as a parameter that nothing uses
+    warnings: tuple[Problem, ...] = ()  #: likely mistakes, such as a parameter that nothing uses
 
     @cached_property
     def questions(self) -> tuple[str, ...]:
@@ -102,14 +112,19 @@ class Study:
         return tuple(command for command in COMMANDS if getattr(self, command) is not None)
 
     @property
+    def source(self) -> Source:
+        """What it was read from."""
+        return Source(self.path, self.folder, self.text, self.text_sha256)
+
+    @property
     def barred(self) -> tuple[str, ...]:
         """Kinds of warnings that fail a run."""
         return (ALL,) if self.strict else self.fail_on
 
     @property
-    def cautions(self) -> tuple[Caution, ...]:
-        """What is likely a mistake, as warnings of its results."""
-        return tuple(Caution("suspect", f"{problem.key}: {problem.message}") for problem in self.warnings)
+    def cautions(self) -> dict[Caution, Problem]:
+        """Likely mistakes as warnings of its results, each with its place in the study."""
+        return {Caution("suspect", f"{problem.key}: {problem.message}"): problem for problem in self.warnings}
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -128,12 +143,12 @@ class Study:
         return f"<Study {shown(self.name)}: mobility {self.mechanism.mobility}; {questions}>"
 
     def inputs(self) -> Iterator[tuple[KeyPath, pathlib.Path, str]]:
-        """Files that the study reads: the keys of their names, the file, and what it held when the study was loaded."""
+        """Files that the study reads: path of the key, file, and its text when the study was loaded."""
         for keys, name in files(self.resolved, self.questions):
             yield keys, self.folder.path / name, self.folder.text(name)
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a number of the geometry, a drive, or a parameter; None where it is not known.
+        """Unit of a number of the geometry, a drive, or a parameter; None if it is not known.
 
         See `Parameters.kind` for that of a parameter.
         """
@@ -155,7 +170,7 @@ class Study:
 
     @cached_property
     def _document(self) -> Document:
-        """The text once more, with the places of its entries."""
+        """The text read again, with the places of its entries."""
         document = read(self.text, str(self.path or _TEXT))
         override(document, self.overrides)
         return document
@@ -187,7 +202,7 @@ def load(
 
 
 def read_file(file: pathlib.Path) -> bytes:
-    """The text of a study, or as much of it as tells that it is too long.
+    """The text of a study file, at most one byte more than is allowed.
 
     Raises
     ------
@@ -203,18 +218,15 @@ def read_file(file: pathlib.Path) -> bytes:
 
 
 def load_data(
-    source: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
+    mapping: Mapping[str, Any], overrides: Sequence[str] | Mapping[str, Any], seed: int | None, folder: Folder,
     drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
     """Load a study from a mapping, perhaps with overrides in it (see `Study.drawn`); files that it names lie in a
     folder. See `load`.
     """
-    data = _plain_data(source, "the study")
-    document, changes = Document("", data, values={(): Mark("")}), _texts(overrides)
-    drawn = drawn or _drawing(document)
-    override(document, changes)
-    sha256 = hashlib.sha256(json.dumps(data).encode()).hexdigest()
-    return _load_changed(document, None, folder, b"", sha256, changes, seed, drawn)
+    data = _plain_data(mapping, "the study")
+    source = Source(None, folder, sha256=hashlib.sha256(json.dumps(data).encode()).hexdigest())
+    return _load_changed(Document.of(data), source, _texts(overrides), seed, drawn)
 
 
 @one_thread()
@@ -226,32 +238,30 @@ def load_bytes(
     folder: Folder | None = None,
 ) -> Study:
     """Load a study from the bytes of a file; see `load`. Without a `folder`, files that it names lie beside it."""
-    document, changes = read(content, str(path or _TEXT)), _texts(overrides)
-    drawn = _drawing(document)
-    override(document, changes)
-    sha256 = hashlib.sha256(content).hexdigest()
     folder = folder or Folder(path.parent if path is not None else pathlib.Path())
-    return _load_changed(document, path, folder, content, sha256, changes, seed, drawn)
+    source = Source(path, folder, content, hashlib.sha256(content).hexdigest())
+    return _load_changed(read(content, str(path or _TEXT)), source, _texts(overrides), seed)
 
 
 def _drawing(document: Document) -> dict[str, Any]:
-    """What a sketch is assembled from: a study's units and mechanism."""
+    """The units and the mechanism of a study, which determine how its sketch is assembled."""
     data = document.data if isinstance(document.data, dict) else {}
     return {key: plain(data[key]) for key in ("units", "mechanism") if data.get(key) is not None}
 
 
 def _load_changed(
-    document: Document, path: pathlib.Path | None, folder: Folder, text: bytes, sha256: str, changes: tuple[str, ...],
-    seed: int | None, drawn: Mapping[str, Any],
+    document: Document, source: Source, changes: tuple[str, ...], seed: int | None,
+    drawn: Mapping[str, Any] | None = None,
 ) -> Study:  # fmt: skip
-    """Load a study whose overrides are applied; its assembly is that of the study before, `drawn`, if that has one."""
+    """Load a study with overrides; the assembly is that of the mechanism before them, `drawn`, if it has one."""
+    drawn = drawn or _drawing(document)
+    override(document, changes)
     if drawn == _drawing(document) or not same_sketch(drawn, document.data):
-        return load_document(document, path, folder, text, sha256, changes, seed)
+        return load_document(document, source, changes, seed)
     original = None
     with contextlib.suppress(StudyError):
-        own = Document("", plain(drawn), values={(): Mark("")})
-        original = load_document(own, path, folder, b"", "").mechanism
-    study = load_document(document, path, folder, text, sha256, changes, seed, original)
+        original = load_document(Document.of(plain(drawn)), Source(source.path, source.folder)).mechanism
+    study = load_document(document, source, changes, seed, original)
     if not isinstance(study.mechanism, Variant):
         return study
     warnings = [*study.warnings]
@@ -260,7 +270,7 @@ def _load_changed(
             "with the changed numbers it cannot be assembled at its own drive values; poses are in the assembly that "
             "it shows without the change", "mechanism", "sketch",
         ))  # fmt: skip
-    # The units in full, as the data of the study has them.
+    # With all units, as in the data of the study.
     drawn = {**drawn, "units": study.resolved["units"]}
     return dataclasses.replace(study, drawn=drawn, warnings=tuple(warnings))
 
@@ -281,7 +291,7 @@ def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _plain_data(value: Any, what: str) -> Any:
-    """Data of mappings, lists, texts and numbers alone."""
+    """Data of mappings, lists, texts and numbers only."""
 
     def plainly(each: Any) -> Any:
         if isinstance(each, Mapping):
@@ -295,17 +305,15 @@ def _plain_data(value: Any, what: str) -> Any:
     try:
         return json.loads(json.dumps(value, default=plainly))
     except (TypeError, ValueError, RecursionError) as error:
-        message = f"{what} is not plain data (mappings, lists, texts, numbers): {error}"
-        raise StudyError([Problem(message)]) from None
+        raise StudyError(
+            f"{what} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
+        ) from None
 
 
 @few_comparisons()
 def load_document(
     document: Document,
-    path: pathlib.Path | None,
-    folder: Folder,
-    text: bytes,
-    text_sha256: str,
+    source: Source,
     changes: tuple[str, ...] = (),
     seed: int | None = None,
     original: Mechanism | None = None,
@@ -326,26 +334,26 @@ def load_document(
     assert section is not None
     builder = Builder(section, context, reporter)
     description = build(builder)
-    # Mobility and sketch are judged where the mechanism's own words are right, whatever else is wrong.
+    # Mobility and sketch are checked if the mechanism itself has no mistakes, even if other sections have.
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    checker = Checker(builder, parameters, parts, folder)
+    checker = Checker(builder, parameters, parts, source.folder)
     parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()
     doubts.note(checker, parts, description)
     assert mechanism is not None
-    _check_poses(parts, mechanism, reporter, folder)
+    _check_poses(parts, mechanism, reporter, source.folder)
     reporter.done()
-    name = parts.get("name") or (path.stem if path is not None else _UNNAMED)
+    name = parts.get("name") or (source.path.stem if source.path is not None else _UNNAMED)
     seed = parts["seed"] if seed is None else seed
     named = {"name": name, "seed": seed, "units": dataclasses.asdict(context.units)}
     return Study(
         name=name,
-        path=path,
-        text=text,
-        text_sha256=text_sha256,
+        path=source.path,
+        text=source.text,
+        text_sha256=source.sha256,
         seed=seed,
         overrides=changes,
         units=context.units,
@@ -361,24 +369,24 @@ def load_document(
         targets=parts["targets"],
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
-        folder=folder,
+        folder=source.folder,
         warnings=tuple(reporter.warnings),
     )
 
 
 def _sections(document: Document, reporter: Reporter) -> dict[str, Any]:
-    """The study's top level with sections that are named but empty as empty mappings."""
+    """The top level of the study; an empty section becomes an empty mapping."""
     data = document.data
     if not isinstance(data, dict):
         message = "is not a study: a mapping with 'mechanism' is expected, not " + shown(data)
-        raise StudyError([document.values[()].problem(message)])
+        raise document.values[()].failure(message)
     return {key: {} if value is None and key in COMMANDS else value for key, value in data.items()}
 
 
 def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict[str, Expression]]:
-    """Units and parameters, which all other numbers are read with."""
+    """Units and parameters, which are needed to read all other numbers."""
     units = Units()
-    # A wrong unit is reported with the mistakes of the other sections.
+    # A wrong unit is reported later, with the mistakes of other sections.
     with contextlib.suppress(ValidationError):
         units = Units(**UnitsSection.model_validate(data.get("units") or {}).model_dump())
     mechanism = data.get("mechanism")
@@ -411,7 +419,7 @@ def _context(data: Mapping[str, Any], reporter: Reporter) -> tuple[Context, dict
 
 
 def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) -> dict[str, Any]:
-    """Validate part by part, so that a mistake in one does not hide those in another; wrong parts are left out."""
+    """Validate each top-level key by itself, so that all mistakes are found; wrong parts are left out."""
     parts: dict[str, Any] = {"seed": 0, "requirements": (), "fail_on": ()}
     fields = StudyFile.model_fields
     for key in data:
@@ -421,23 +429,25 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
         raw = data.get(key)
         if raw is None:
             if field.is_required():
-                reporter.report((key,), "is missing: a study describes a mechanism")
+                reporter.report(
+                    (key,), "is missing: a study describes a mechanism; 'mechdesign new' prints one to begin with"
+                )
             continue
         if key == "mechanism" and isinstance(raw, dict):
-            # The parameters have been read already, in their order.
+            # The parameters have been read by `_context`.
             raw = {name: value for name, value in raw.items() if name != "parameters" or not isinstance(value, dict)}
         try:
             parts[key] = _adapter(key).validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
-            # Names are checked all the same where the mistakes so far are in numbers and keys alone.
+            # If only numbers and keys are wrong, the names in this part can still be checked.
             with contextlib.suppress(ValidationError):
                 parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
 
 
 def _checked(checker: Checker) -> dict[str, Any]:
-    """Check all questions that validated, and the targets; returns them with wildcards and defaults filled in."""
+    """Check the validated sections and the targets; returns them with wildcards and defaults filled in."""
     if "optimize" in checker.parts:
         checker.parts["optimize"] = check_variables(checker.parts["optimize"], checker)
     found = dict(checker.parts)
@@ -457,8 +467,8 @@ def _checked(checker: Checker) -> dict[str, Any]:
 
 
 def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
-    """Check that the coordinates that poses give determine the mechanism, that they are not too many, and that the
-    targets fit those of kinematics.
+    """Check that poses determine the mechanism and are not too many, and that the targets fit the poses of
+    kinematics.
     """
     for command in COMMANDS:
         section = parts.get(command)
@@ -476,7 +486,11 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                     place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
                     reporter.report(place, str(error))
             if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
-                reporter.report((command, "speed"), "the path's point does not move: it has no direction", at_key=True)
+                reporter.report(
+                    (command, "speed"),
+                    "the path's point does not move: it has no direction; give two different places",
+                    at_key=True,
+                )
         if command == "kinematics" and parts["targets"]:
             try:
                 assumed = found or expansion.default(mechanism.description)
@@ -486,9 +500,9 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
 
 
 def _check_use(parts: Mapping[str, Any], parameters: Parameters, context: Context, reporter: Reporter) -> None:
-    """Note parameters that no number, design variable or varying dimension of the study uses."""
+    """Report parameters that no number, design variable or varying dimension uses."""
     if reporter.problems:
-        # What was wrong may have been what uses them.
+        # A part with a mistake may use them.
         return
     optimize, reliability = parts.get("optimize"), parts.get("reliability")
     used = context.used.union(
@@ -522,5 +536,5 @@ def _compiled(description: Description, reporter: Reporter, original: Mechanism 
 
 
 def _alike(one: Description, other: Description) -> bool:
-    """Whether two mechanisms differ in numbers alone."""
+    """Whether two mechanisms differ only in numbers."""
     return dataclasses.replace(one, places=other.places, sketch=other.sketch) == other

@@ -1,4 +1,4 @@
-"""A study with other numbers: as if its file had been changed, and the text of that file.
+"""A study with other numbers, as if its file had been changed, and the text of that file.
 
 It is not read again: numbers that follow parameters are evaluated anew. Only dimensions measured from the sketch, and
 tolerances that go by the size of a dimension, are found anew from the data.
@@ -20,13 +20,13 @@ from mechdesign.study.building.section import LINK_KEYS
 from mechdesign.study.loading import Study, load_document, same_sketch
 from mechdesign.study.schema.entries import number_at
 from mechdesign.study.schema.study_file import entry, kinds_of, override
-from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, in_yaml, leaves, plain, read
+from mechdesign.study.text.document import Document, KeyPath, dotted, in_yaml, leaves, plain, read
 
 Changes = Sequence[tuple[str, Any]]
 """Entries of a study, by the names that ``--set`` takes, and their values."""
-# Sections that say which studies are made of this one.
+# Sections that ask for variants of the study.
 _OF_OTHERS = ("matrix", "sensitivities")
-# Bytes of a text beyond which it is written anew, without its comments.
+# Largest text that is edited, in bytes; a longer one is written anew, without comments.
 _MOST_BYTES = 1_000_000
 _INPUT = "input_"
 
@@ -48,20 +48,20 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
-    document = Document("", data, values={(): Mark("")})
+    document = Document.of(data)
     override(document, overrides(changes))
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
     return load_document(
-        document, study.path, study.folder, study.text, study.text_sha256, (*study.overrides, *overrides(changes)),
+        document, study.source, (*study.overrides, *overrides(changes)),
         original=study.mechanism if same_sketch(data, study.resolved) else None,
     )  # fmt: skip
 
 
 def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:
-    """What is wrong with values of an entry, each alone in the study: the number of the value, and why.
+    """Mistakes of values of an entry, each tried alone: the index of the value, and the message.
 
-    What is wrong elsewhere then may be right together with other changes.
+    Mistakes elsewhere in the study are left out: other changes may correct them.
     """
     place = dotted(entry(study.resolved, name))
     for k, value in enumerate(values):
@@ -72,12 +72,12 @@ def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int
 
 
 def entry_unit(study: Study, name: str) -> str:
-    """Unit of an entry, as far as the study or its format tell it."""
+    """Unit of an entry; empty if neither the study nor its format determines it."""
     keys = entry(study.resolved, name)
     for k in range(len(keys), 0, -1):
         if keys[:k] in study.kinds:
             return study.units.label(study.kinds[keys[:k]])
-    # What a short form stands for lies below it.
+    # The keys of a short form lie below it.
     kinds = kinds_of(keys) | {kind for path, kind in study.kinds.items() if path[:-1] == keys}
     if len(kinds) == 1:
         return study.units.label(*kinds)
@@ -87,7 +87,7 @@ def entry_unit(study: Study, name: str) -> str:
 
 
 def remeasured(study: Study, names: Collection[str]) -> bool:
-    """Whether dimensions that are measured from the sketch depend on parameters or places."""
+    """Whether dimensions measured in the sketch depend on these parameters or places."""
     if not study.parameters.measured:
         return False
     sketch = study.resolved["mechanism"].get("sketch")
@@ -97,7 +97,7 @@ def remeasured(study: Study, names: Collection[str]) -> bool:
 
 
 def _drawing(study: Study) -> set[str]:
-    """Places that have a part in how links lie on the sketch, of links of which something is measured there."""
+    """Places on which the measured dimensions depend: of links that are measured in the sketch."""
     links, joints = study.mechanism.description.links, study.mechanism.description.joints
     owners: set[str] = set()
     for place in study.parameters.measured:
@@ -105,14 +105,14 @@ def _drawing(study: Study) -> set[str]:
         owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
     points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
     found = {f"{name}.length" for name in owners if len(links[name].points) > 2}
-    # The ground's points lie on the sketch where its numbers say.
+    # The numbers of the ground place its points in the sketch.
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
     return found | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def _mentions(data: Any, names: Collection[str]) -> bool:
-    """Whether a text of the data is an expression in which one of the names stands."""
+    """Whether a text in the data is an expression with one of the names."""
     for _, text in leaves(data) if names else ():
         with contextlib.suppress(ExpressionError):
             if isinstance(text, str) and not Expression.parse(text).names.isdisjoint(names):
@@ -121,7 +121,7 @@ def _mentions(data: Any, names: Collection[str]) -> bool:
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
-    """The study as plain data with other values: what its file would be."""
+    """The study as plain data with other values."""
     data: dict[str, Any] = plain(study.resolved)
     mechanism = data["mechanism"]
     for name, value in changed.items():
@@ -163,7 +163,7 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
 
 
 def rewritten(study: Study, data: dict[str, Any], heading: str) -> tuple[str, dict[str, str]]:
-    """The text of a study with other values, headed by a comment, and the files that it reads, by their names.
+    """The text of a study with other values under a heading comment, and the texts of the files that it reads.
 
     Overrides are part of the new text, as is the seed. Comments are kept where no more than single values change. The
     names of files in `data`, which is `Study.resolved` with other values, are brought up to date.
@@ -193,7 +193,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
     text, document = study.text.decode("utf-8-sig"), read(study.text, "")
     written = document.data
     wanted = {key: value for key, value in data.items() if key in written}
-    # Names of units in full are what the loader makes of the text.
+    # The loader fills in all units; the text may name only some.
     if "units" in written:
         wanted["units"] = written["units"]
     edits = []
@@ -223,7 +223,7 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
 
 
 def _replaced(old: Any, new: Any, keys: KeyPath) -> Iterator[tuple[KeyPath, dict[str, Any]]]:
-    """Keys in whose place several others stand, and those with their values, where mappings differ in just that."""
+    """Keys that are missing in the new data, each with the entries that replace it."""
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
         return
     gone = [key for key in old if key not in new]
@@ -235,7 +235,7 @@ def _replaced(old: Any, new: Any, keys: KeyPath) -> Iterator[tuple[KeyPath, dict
 
 
 def _removal(text: str, document: Document, keys: KeyPath) -> tuple[int, int, str]:
-    """The edit that takes a key away: with its lines, or with the comma beside it."""
+    """The edit that removes a key, with its lines or with the comma beside it."""
     start, inside = (
         document.keys[keys].start,
         (mark for path, mark in document.values.items() if path[: len(keys)] == keys),

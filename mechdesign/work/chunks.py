@@ -20,6 +20,8 @@ from mechdesign.work import interrupts
 from mechdesign.work.pool import ChunkMap, Pool
 from mechdesign.work.processes import forked
 
+HELP_PAGE = "reference/commands"
+
 Item = TypeVar("Item")
 Value = TypeVar("Value")
 # From the name of a computation, its map and the items, to the values.

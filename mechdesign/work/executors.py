@@ -120,7 +120,9 @@ class _Dask(Pool):
             self._end()
             if address == LOCAL:
                 raise StudyError(f"--executor {name}: no cluster starts: {error}") from None
-            raise StudyError(f"--executor {name}: no scheduler answers there: {error}") from None
+            raise StudyError(
+                f"--executor {name}: no scheduler answers there: {error}; start 'dask scheduler'"
+            ) from None
         try:
             self._client.wait_for_workers(1, timeout=_NO_WORKERS)
         except TimeoutError:
@@ -147,7 +149,9 @@ class _Dask(Pool):
         return self._threads
 
     def _gone(self) -> LostWorkerError:
-        return LostWorkerError(f"--executor {self._name}: the scheduler does not answer any more")
+        return LostWorkerError(
+            f"--executor {self._name}: the scheduler does not answer any more; start it again, and run with --resume"
+        )
 
     def outcome(self, future: Future[Any]) -> Any:
         """Wait for the value of a task, but not for ever on a scheduler without workers."""

@@ -21,8 +21,7 @@ import mechdesign
 from mechdesign.cautions import KINDS
 from mechdesign.errors import AssemblyError, MechdesignError
 from mechdesign.reference import entries, tables
-from mechdesign.reference.made import PLACE
-from mechdesign.reference.messages import find_messages, groups, messages, unread
+from mechdesign.reference.messages import PLACE, find_messages, messages
 from mechdesign.results import Result
 
 ROOT = Path(__file__).parents[2]
@@ -206,14 +205,11 @@ def test_messages_are_texts():
     assert all(told.kind in KINDS for told in messages() if told.code is None and told.kind)
 
 
-def test_every_message_is_in_a_group_whose_cures_are_of_its_messages():
-    """A file without a group has texts of pictures only."""
-    apart = ("report/figures/", "report/page/", "mechanism/describe.py", "mechanism/margins.py")
-    assert [name for name in unread() if not name.startswith(apart)] == [], "name them in reference/messages.yaml"
-    for group in groups():
-        texts = [told.text for told in messages() if told.group is group]
-        assert texts
-        assert [part for part in group.mends if not any(part in text for text in texts)] == []
+def test_every_message_names_a_page_of_the_documentation():
+    assert [told.text for told in messages() if not told.page] == [], "give the module a HELP_PAGE"
+    pages = {told.page for told in messages()} | {kind.page for kind in KINDS.values()}
+    made = lists.pages()
+    assert [page for page in pages if f"{page}.md" not in made and not (ROOT / "docs" / f"{page}.md").exists()] == []
 
 
 def test_a_message_is_found_with_what_mends_it():
@@ -221,8 +217,8 @@ def test_a_message_is_found_with_what_mends_it():
     assert "det_J is 0" in dead.word
     assert "kind singular" in dead.text
     assert "shall turn back" in dead.text
-    (many,) = find_messages("a sweep of more than 10,000,000 poses")
-    assert "larger step" in many.text
+    (many,) = find_messages("a sweep of more than 10,000,000 poses; take a larger step")
+    assert "larger step" in many.word
     (pose,) = find_messages("pose crank = 30 deg: cannot be assembled")
     assert "change a length" in pose.text
 

@@ -1,1 +1,3 @@
 """How does it move? Positions, rates, limits of motion and loops."""
+
+HELP_PAGE = "theory/kinematics"

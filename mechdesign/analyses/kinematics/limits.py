@@ -129,7 +129,8 @@ def change_points(changes: Sequence[Change], along: Along) -> list[Caution]:
         Caution(
             "singular",
             f"change point at {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' keeps "
-            "each joint on its side of the line, where a made mechanism may cross it",
+            "each joint on its side of the line, where a made mechanism may cross it; "
+            "'branch: follow' goes through smoothly",
             pose=place,
         )
         for place, joints in places.items()

@@ -183,7 +183,7 @@ def _corners(question: MotionQuestion) -> list[Caution]:
         "incomplete",
         f"the path has corners at {counted(len(rows), 'pose')}, the first: "
         f"{first}; velocities there are those of the segment that begins, "
-        "and the acceleration that a corner takes is in no row; a spline has no corners",
+        "and the acceleration that a corner takes is in no row; 'spline: true' has no corners",
         _TABLE, row, first,
     )]  # fmt: skip
 

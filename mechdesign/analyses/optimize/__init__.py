@@ -1,1 +1,3 @@
 """Which dimensions are best? Designs, their goals and the ways to look for the best one."""
+
+HELP_PAGE = "theory/optimize"

@@ -240,7 +240,9 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
     for goal in filter(lambda goal: goal.unassembled, designs.goals):
         optimum = ask(study_of(evaluator.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
-            words = f"{goal.name} of the optimum is that of a part of the motion: {part}"
+            words = (
+                f"{goal.name} of the optimum is that of a part of the motion, as 'unassembled: allowed' lets it: {part}"
+            )
             yield Caution("unassembled", words, "optimum")
     if not evaluator.questions or evaluator.questions[0].rule != "gauss":
         return
@@ -250,7 +252,7 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
             yield Caution(
                 "unconverged",
                 f"{goal.name} of {int(loose.sum())} designs is not known to the tolerance asked for; see "
-                f"{goal.name}_error",
+                f"{goal.name}_error, or allow a larger workspace.integrate.tolerance",
                 "designs", int(loose.argmax()),
             )  # fmt: skip
 

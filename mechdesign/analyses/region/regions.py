@@ -91,7 +91,9 @@ def regions(study: Study) -> list[Region]:
         )  # fmt: skip
     held = [values for values in section.at.values() if not isinstance(values, Over)]
     if len(held) < len(section.at):
-        raise problem(study, "at", "over a range of a coordinate only the command 'workspace' is answered")
+        raise problem(
+            study, "at", "over a range of a coordinate only the command 'workspace' is answered; give single values"
+        )
     try:
         plan = mechanism.plan((*outputs, *section.at))
     except MechanismError as error:

@@ -131,7 +131,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if not confirmed:
         failed = (
             f"allocate: the {aim.noun} asked, {asked.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
-            f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}"
+            f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}; ask for a little less"
         )
     before = sum(given[k].price(given[k].given) for k in free.tolist())
     notes = [Caution(

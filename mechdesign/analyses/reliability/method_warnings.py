@@ -141,7 +141,7 @@ def _pointless(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     return [Caution(
         "unconverged",
         f"form: samples break a limit at {task.where(unknown[0])}{others}, but no design point was found: it has no "
-        "probability there",
+        "probability there; trust the samples",
         "reliability", pose=task.where(unknown[0]),
     )]  # fmt: skip
 

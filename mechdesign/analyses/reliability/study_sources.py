@@ -112,11 +112,11 @@ def _check_sizes(sources: Sources) -> None:
         for slope, quantity in scalar.moves.values():
             allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
             if not max(np.max(np.abs(slope * end)) for end in scalar.ends) <= allowed:
-                message = f"varies by more than {words}"
+                message = f"varies by more than {words}; look at its unit"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
     for pin in sources.pins:
         if not np.max(pin.ends[1]) <= MAX_DEVIATION * size:
-            message = "is more than a million times the size of the mechanism"
+            message = "is more than a million times the size of the mechanism; look at its unit"
             raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
 
 

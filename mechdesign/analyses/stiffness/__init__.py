@@ -1,1 +1,3 @@
 """How stiff is it? Legs, screws and compliance."""
+
+HELP_PAGE = "theory/stiffness"

@@ -77,7 +77,7 @@ def unreachable(study: Study, questions: Sequence[Question]) -> AssemblyError:
     assembly = " in the sketch's assembly" if field.same_assembly else ""
     return AssemblyError(
         f"point {section.point} reaches nothing{there} on the scan about ({about.real:g}, {about.imag:g}): "
-        f"its links cannot close there{assembly}, or a limit forbids it"
+        f"its links cannot close there{assembly}, or a limit forbids it; move scan.about, or widen the limits"
     )
 
 
@@ -95,7 +95,7 @@ def _doubts(region: Reached) -> Iterator[Caution]:
         yield Caution(
             "unconverged",
             f"the area{there} is only known to {error:.2g}: a raster of places that are reached shows more than the "
-            "integral has found",
+            "integral has found; put scan.about into the region, or take more rays",
             "indices",
         )
     for name in ("GII", "GRI"):

@@ -21,6 +21,8 @@ from mechdesign.rows import UnknownColumnError, in_unit
 from mechdesign.study.text.document import leaves, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
+HELP_PAGE = "howto/batch"
+
 _POSE_KEYS = ("poses", "sweep", "path")
 _MOST_ENTRIES = 4  # of the study, that a note names
 
@@ -94,7 +96,7 @@ def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
     except OSError as error:
         raise StudyError(f"{path}: cannot be read: {error.strerror or error}") from None
     if not isinstance(document.data, dict):
-        raise StudyError([document.values[()].problem("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")])
+        raise document.values[()].failure("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")
     patterns, problems = {}, list(document.problems)
     for pattern, given in document.data.items():
         try:

@@ -8,6 +8,8 @@ from typing import Any
 from mechdesign.errors import OutputError, printable_lines
 from mechdesign.files import marked
 
+HELP_PAGE = "howto/report"
+
 REPORT = "report.html"
 INDEX = "index.html"
 SECTION = "report.json"  # what a page says of a result

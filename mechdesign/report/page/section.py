@@ -16,6 +16,8 @@ from mechdesign.report.tables import cells, json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
+HELP_PAGE = "howto/report"
+
 # Of a mechanism that moves: the picture of the same curves is left out.
 CURVES = "motion"
 # Tables of more rows than this are shown by their first ones.

@@ -1,1 +1,3 @@
 """From the sections of a study to the mechanism that they describe."""
+
+HELP_PAGE = "reference/study/mechanism"

@@ -21,7 +21,7 @@ ROOT: KeyPath = ("mechanism",)
 
 
 class Builder:
-    """What a description is built from; mistakes go to the reporter, and what they spoil is left out."""
+    """Builds the parts of a description; mistakes go to the reporter, and wrong parts are left out."""
 
     def __init__(
         self, section: models.MechanismSection, context: Context, reporter: Reporter
@@ -76,7 +76,7 @@ class Builder:
         what = {"angle": "link", "distance": "point"}.get(what, what)
         points = [*self.section.owners, *self.section.ends]
         known: Iterable[str] = points if what == "point" else getattr(self.section, f"{what}s")
-        # All of them are looked up, so that every mistake is reported.
+        # No short circuit: every mistake is reported.
         found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
         return all(found)
 
@@ -131,7 +131,7 @@ class Builder:
         for name in order:
             self.links[name] = self._link(name, self.section.links[name])
             if name == GROUND:
-                # What is fixed need not be drawn, and where it is drawn the ground's own numbers count.
+                # Points of the ground need not be in the sketch; if they are, the ground's own numbers count.
                 for point, (x, y) in self.links[name].points.items():
                     self.sketch[point] = complex(self.nominal(x), self.nominal(y))
 
@@ -164,14 +164,15 @@ class Builder:
         points: dict[str, tuple[Term, Term]] = {start: (0.0, 0.0)}
         if section.telescopic:
             if name == GROUND:
-                self.report(("links", name), "the ground cannot be telescopic")
+                self.report(("links", name), "the ground cannot be telescopic; a leg is a link of its own")
             return points
         length: float = section.length or 1.0
         if section.length is None and (drawn := self._drawn([start, end], ("links", name), "its length")):
             length = abs(drawn[1] - drawn[0])
             if length == 0.0:
                 self.report(
-                    ("links", name), f"{start!r} and {end!r} are at one place in the sketch: no length to measure"
+                    ("links", name),
+                    f"{start!r} and {end!r} are at one place in the sketch: no length to measure; give the length",
                 )
                 length = 1.0
         points[end] = (self.place(f"{name}.length", length, measured=section.length is None), 0.0)
@@ -180,7 +181,7 @@ class Builder:
     def _measured(
         self, name: str, measured: list[str], given: Mapping[str, models.PointValues], ends: tuple[str, str] | None
     ) -> dict[str, complex]:
-        """Local coordinates of the points left out, from the sketch.
+        """Local coordinates of points without numbers, measured in the sketch.
 
         The ground's frame is the world; that of a binary link has its origin at the first end and its x axis towards
         the second, and one without given points so by its first two; one with given points is laid on the drawing by
@@ -205,12 +206,14 @@ class Builder:
         elif free or ends:
             if drawn[0] == drawn[1]:
                 first, second = [*known, *measured][:2]
-                self.report(path, f"{first!r} and {second!r} are at one place in the sketch: no x axis")
+                self.report(
+                    path, f"{first!r} and {second!r} are at one place in the sketch: no x axis; draw them apart"
+                )
                 return {}
             start, turn = drawn[0], (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
         found = {point: (at - start) / turn + centre for point, at in zip(measured, places, strict=True)}
         if free and not given:
-            # Rounding leaves the second point off its own axis.
+            # Without this, rounding would leave the second point off its axis.
             found[measured[1]] = complex(found[measured[1]].real, 0.0)
         return found
 
@@ -223,7 +226,7 @@ class Builder:
         return [self.sketch[point] for point in points]
 
     def link_direction(self, name: str) -> float | None:
-        """Angle of a link's x axis in the sketch (radians), None where the sketch does not tell."""
+        """Angle of a link's x axis in the sketch (radians), None if too few of its points are drawn."""
         if name == GROUND:
             return 0.0
         link = self.links[name]

@@ -49,7 +49,7 @@ def build(builder: Builder) -> Description:
 
 
 class _WrongJoint(Exception):
-    """What is wrong with a joint has been noted."""
+    """A mistake of a joint, already reported."""
 
 
 def _joints(builder: Builder) -> dict[str, Joint]:
@@ -149,7 +149,7 @@ def _fixed(builder: Builder, name: str, section: models.Joint, pair: tuple[str, 
 
 
 def _check_pins(builder: Builder) -> None:
-    """Note links that share two points, and slides between links that a shared point pins together."""
+    """Report links that share two points, and slides between links that a shared point pins together."""
     section = builder.section
     for index, (name, link) in enumerate(builder.links.items()):
         for other in list(builder.links.values())[:index]:
@@ -183,7 +183,7 @@ def _shared_twice(builder: Builder, link: Link, other: Link, shared: list[str]) 
 
 
 def _check_connected(builder: Builder) -> None:
-    """Note links that neither shared points nor joints lead to from the ground."""
+    """Report links that are not connected to the ground by shared points or joints."""
     section, owners = builder.section, builder.section.owners
     ties = [set(links) for links in owners.values()]
     for joint in section.joints.values():
@@ -209,7 +209,7 @@ def _check_connected(builder: Builder) -> None:
 
 
 def _drives(builder: Builder) -> dict[str, Drive]:
-    """Every drive whose names are right."""
+    """Drives without mistakes in their names."""
     mechanism = builder.section
     known: Mapping[str, tuple[str, Iterable[str]]] = {
         "angle": ("moving link", mechanism.moving),
@@ -227,7 +227,9 @@ def _drives(builder: Builder) -> dict[str, Drive]:
         elif section is None:
             right = builder.check_name(name, [*mechanism.moving, *mechanism.slides], "link, leg or slide", path)
         elif kind == "length" and item in mechanism.moving and item not in mechanism.legs:
-            builder.report(path, f"link {item!r} is not telescopic: its length is fixed")
+            builder.report(
+                path, f"link {item!r} is not telescopic: its length is fixed; write 'telescopic: true' in its place"
+            )
             right = False
         else:
             right = builder.check_name(item, known[kind][1], known[kind][0], path)
@@ -242,7 +244,7 @@ def _drives(builder: Builder) -> dict[str, Drive]:
 
 
 def _measures(builder: Builder) -> dict[str, Measure]:
-    """Every measure whose names are right."""
+    """Measures without mistakes in their names."""
     # A measure may use those above it.
     known = [name for name in builder.section.coordinates if name not in builder.section.measures]
     found: dict[str, Measure] = {}
@@ -252,7 +254,7 @@ def _measures(builder: Builder) -> dict[str, Measure]:
         if section.expression is not None:
             try:
                 expression = Expression.parse(section.expression, builder.units.angle_factor)
-                # Constants alone fail here (1/0), whatever the coordinates come to.
+                # A failure here comes from constants alone (1/0), not from coordinates.
                 expression.evaluate(dict.fromkeys(expression.names, np.full(1, np.nan)))
             except ExpressionError as error:
                 builder.report(path, str(error))
@@ -274,7 +276,7 @@ def _measures(builder: Builder) -> dict[str, Measure]:
 
 
 def _limits(builder: Builder) -> tuple[Limit, ...]:
-    """Every limit whose names are right; its bounds become places."""
+    """Limits without mistakes in their names; their bounds become places."""
     found = []
     for index, section in enumerate(builder.section.limits):
         path: KeyPath = ("limits", index)

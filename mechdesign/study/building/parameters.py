@@ -25,7 +25,7 @@ class Parameters:
     dependent: Mapping[str, Expression] = field(default_factory=dict)
     # Every place; radians per study unit for an angle, 1 for a length.
     factors: Mapping[str, float] = field(default_factory=dict)
-    # Places that the study leaves out and that are so measured from its sketch.
+    # Places without numbers in the study, which are measured in its sketch.
     measured: frozenset[str] = frozenset()
     # Parameters that are written with a unit, and the kinds of their quantities.
     kinds: Mapping[str, str] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class Parameters:
             if name not in self.nominal and name not in self.factors:
                 raise KeyError(name)
         env, moved = self.values(changed), self.moved_places(changed)
-        # A place that is set by itself varies alone, whatever gives its nominal value.
+        # A place with a value of its own no longer follows parameters.
         return {
             place: (_number(changed[place]) if place in changed else self.dependent[place].evaluate(env)) * factor
             for place, factor in self.factors.items()

@@ -331,7 +331,7 @@ class MechanismSection(fields.Model):
     0.6*(crank - 40)} Example: {C: {file: path.csv}}
     """
 
-    # What the names mean, whether or not the rest of the section is right.
+    # The properties below hold even if other parts of the section are wrong.
 
     def points_of(self, link: str) -> list[str]:
         """Names of a link's points, its ends first."""
@@ -394,7 +394,7 @@ class MechanismSection(fields.Model):
             found[name] = "angle" if measure.kind == "angle" else "length"
             if measure.expression is not None:
                 found[name] = "none"
-                # What is no expression is reported where it is built.
+                # A text that is no expression is reported by `description`.
                 with suppress(ExpressionError):
                     found[name] = "angle" if Expression.parse(measure.expression).is_angle(known) else "none"
             known[name] = found[name]

@@ -1,4 +1,4 @@
-"""What is allocated among tolerances: a reliability or a Cpk, at least cost, in any numbers or in standard grades."""
+"""Allocation of tolerances: the cheapest for a reliability or a Cpk, in any numbers or in standard grades."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 from mechdesign.study.text.units import QuantityError
 
-# Grades where a study does not name them, and all that there are.
+HELP_PAGE = "theory/reliability"
+
+# Grades used by default, and the largest grade.
 USUAL = tuple(f"IT{number}" for number in range(5, 13))
 _MOST_GRADE = 18
 _GRADE = re.compile(r"IT([1-9]\d?)")
@@ -47,7 +49,7 @@ def _grades(raw: Any, context: Context) -> tuple[str, ...]:
                 f"expected true, or grades from IT1 to IT{_MOST_GRADE} such as [IT6, IT7, IT8], not {shown(name)}"
             )
     if names and context.units.length == "dimensionless":
-        raise failure("grades are of sizes in mm, and this study's lengths are dimensionless")
+        raise failure("grades are of sizes in mm, and this study's lengths are dimensionless; give 'units'")
     return tuple(sorted(dict.fromkeys(names), key=_number))
 
 

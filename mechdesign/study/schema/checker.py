@@ -1,4 +1,4 @@
-"""Names, kinds of quantities and units that the checks of the questions look up."""
+"""Checks of names, kinds of quantities and units that the questions share."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_MOMENT = "a pin carries no moment; name the 'link' of the stiffness section t
 
 
 class Checker:
-    """Looks names and units up, and notes what is wrong with them."""
+    """Checks names and units, and reports mistakes in them."""
 
     def __init__(
         self, builder: Builder, parameters: Parameters, parts: dict[str, Any], folder: Folder
@@ -34,7 +34,7 @@ class Checker:
     def coordinate(
         self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), order: int | None = None
     ) -> Quantity | None:
-        """Kind of a coordinate; None, and noted, where there is none of that name.
+        """Kind of a coordinate; an unknown name is reported, and None returned.
 
         `others` are names that might have stood there as well. With an `order` the unit of its value (0), rate (1) or
         acceleration (2) is checked.
@@ -55,13 +55,13 @@ class Checker:
         return quantity
 
     def quantity(self, name: str) -> str | None:
-        """Kind of a parameter, a dimension or a drive; None where it is not known."""
+        """Kind of a parameter, a dimension or a drive; None if it is not known."""
         if name in self.parameters.nominal:
             return self.parameters.kind(name, self.places)
         return self.places[name].quantity if name in self.places else self.mechanism.driven_kinds.get(name)
 
     def size(self, name: str) -> float:
-        """Nominal value of a parameter or a place of the geometry; 0 of what deviates from nothing: drives, loads."""
+        """Nominal value of a parameter or a place of the geometry; 0 of drives and loads, whose errors are about 0."""
         return self.parameters.nominal.get(name, self.places[name].nominal if name in self.places else 0.0)
 
     def coordinates(self, names: Iterable[str], path: KeyPath, order: int = 0) -> None:
@@ -70,7 +70,7 @@ class Checker:
             self.coordinate(name, (*path, name), at_key=True, order=order)
 
     def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
-        """Check a list of coordinates and points that are asked for."""
+        """Check the names in a list of outputs."""
         seen: set[str] = set()
         for index, name in enumerate(outputs or ()):
             parts = self.mechanism.coordinates_of(name)
@@ -104,6 +104,6 @@ class Checker:
         return [value for values in varied for value in values or ()]
 
     def needs(self, section: str | None, what: str, path: KeyPath) -> None:
-        """Check that the study has a section that something cannot do without."""
+        """Check that the study has a section that `what` needs."""
         if section is not None and self.reporter.raw((section,)) is None:
             self.report(path, f"{what} needs the {section} section, and the study has none")

@@ -14,6 +14,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, shown
 
+HELP_PAGE = "theory/reliability"
+
 PIN_MODELS = {
     "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
     "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",
@@ -24,7 +26,7 @@ _EFFECTS = {
     "offset": "moves the joint's point in the link's frame, by x and y",
     "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
 }
-# A lowest clearance so little below zero counts as zero.
+# Clearances down to minus this count as zero.
 CLEARANCE_ROUNDING = 1e-9
 
 
@@ -122,7 +124,7 @@ class Clearance(fields.Model):
         return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
 
     def flaw(self) -> str:
-        """What is wrong with its numbers, perhaps of several designs; empty where nothing is."""
+        """The mistake in its numbers, of one design or several; empty if there is none."""
         spread = self.radius_spread
         if spread is None:
             return ""
@@ -149,7 +151,7 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: s
     held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
-    # Where the study does not say, the pin moves in the last link that no output or limit means.
+    # By default the pin moves in the last link that no output or limit names.
     link = clearance.link or ([link for link in links if link != meant] or links)[-1]
     if link not in links:
         checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
@@ -173,7 +175,7 @@ def _check_slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath
 
 
 def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
-    """Check how the clearance's size varies."""
+    """Check the variation of the clearance."""
     report = checker.report
     checker.kind((*path, "tolerance"), "length")
     if clearance.fit is not None:

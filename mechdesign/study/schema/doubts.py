@@ -1,4 +1,4 @@
-"""What can be computed and is likely a mistake all the same: slips of units, of places, of sizes."""
+"""Likely mistakes in a study that can be computed: slips of units, places and sizes."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 
-# Parts of a turn that a sweep or a pose likely means, and how well written radians agree with them, as 6.28 does.
+# Likely angles in turns, and the relative accuracy of radians written with few digits, such as 6.28.
 TURNS = (0.25, 0.5, 1.0, 2.0)
 DIGITS = 6e-4
-# Bare angles in radians beyond so many turns are degrees where they are multiples of so much.
+# An angle above so many turns, in radians, is likely meant in degrees if it is a multiple of the step.
 MOST_TURNS = 4
 STEP = 5
-# Lengths of links that are so many times apart are hardly in one unit.
+# Ratio of the largest link to the smallest from which their units likely differ.
 APART = 1000
 
 
 def note(checker: Checker, parts: Mapping[str, Any], description: Description) -> None:
-    """Note as warnings what is likely a mistake in the parts of a study that has none."""
+    """Warn of likely mistakes in the parts of a valid study."""
     for part in parts.values():
         if isinstance(part, PoseSection):
             _angles(checker, part)
@@ -37,11 +37,14 @@ def note(checker: Checker, parts: Mapping[str, Any], description: Description) -
         _tolerances(checker, reliability)
     for name in checker.mechanism.drives:
         if name.casefold() == GROUND:
-            checker.doubt(("mechanism", "drives", name), f"{name!r} is the name of a drive, and the ground never moves")
+            checker.doubt(
+                ("mechanism", "drives", name),
+                f"{name!r} is the name of a drive, and the ground never moves; name what it moves",
+            )
 
 
 def _angles(checker: Checker, section: PoseSection) -> None:
-    """Angles of sweeps and poses without a unit that are whole parts of a turn in the unit that is not the study's."""
+    """Warn of angles without a unit that are round in the other unit, degrees or radians."""
     factor = checker.units.angle_factor
     for path, sizes in _given(section):
         if checker.mechanism.coordinates.get(str(path[-1])) != "angle":
@@ -58,7 +61,7 @@ def _angles(checker: Checker, section: PoseSection) -> None:
 
 
 def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
-    """Sizes of what each coordinate is given without a unit, and of the range that it passes."""
+    """Sizes of the values without a unit of each coordinate, and of the ranges of sweeps."""
     for name, sweep in (section.sweep or {}).items():
         if not text_of(sweep.from_) and not text_of(sweep.to):
             sizes = [abs(sweep.to - sweep.from_), abs(sweep.from_), abs(sweep.to)]
@@ -70,7 +73,7 @@ def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
 
 
 def _lengths(checker: Checker, description: Description) -> None:
-    """Links whose sizes, from one point to another, are so far apart that their units likely are."""
+    """Warn of links whose sizes are so different that their units likely differ."""
     sizes = {
         name: max((abs(a - b) for a, b in combinations(_points(link, description).values(), 2)), default=0.0)
         for name, link in description.links.items() if not link.telescopic
@@ -86,12 +89,13 @@ def _lengths(checker: Checker, description: Description) -> None:
 
 
 def _pivots(checker: Checker, ground: Link, description: Description) -> None:
-    """Pins of the ground that lie at one place."""
+    """Warn of two pins of the ground at the same place."""
     pins = {name: at for name, at in _points(ground, description).items() if len(checker.mechanism.owners[name]) > 1}
     for one, other in combinations(pins, 2):
         if abs(pins[one] - pins[other]) <= 1e-9 * max(map(abs, pins.values())):
             checker.doubt(
-                ("mechanism", "links", GROUND), f"{one!r} and {other!r} are at one place; is it one pivot, or two?"
+                ("mechanism", "links", GROUND),
+                f"{one!r} and {other!r} are at one place; is it one pivot, or two? Of one, use one name",
             )
 
 
@@ -105,7 +109,7 @@ def _points(link: Link, description: Description) -> dict[str, complex]:
 
 
 def _tolerances(checker: Checker, section: ReliabilitySection) -> None:
-    """Lengths of links that are less than their tolerance or standard deviation."""
+    """Warn of lengths of links that are smaller than their tolerance or standard deviation."""
     parameters, links = checker.parameters, checker.mechanism.links
     lengths = {f"{name}.length" for name in links} & checker.places.keys()
     for name, dimension in section.dimensions.items():

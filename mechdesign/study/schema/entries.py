@@ -1,4 +1,4 @@
-"""Entries of a study that cases and designs change: that the study has them, and that none is named twice."""
+"""Checks that the entries changed by cases and designs exist, and that none is named twice."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import shown
 
-# Sections of which designs may differ in an entry.
+HELP_PAGE = "theory/optimize"
+
+# Sections whose entries may be design variables.
 _DESIGNED = ("mechanism", *(command for command in COMMANDS if command != "optimize"))
 
 
 def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str]) -> str:
-    """Name of the parameter, or of the place of the geometry, at a path of a study; empty where there is none."""
+    """Name of the parameter or the place of the geometry at a path of a study; empty if there is none."""
     section, *path = keys
     if section != "mechanism" or len(path) < 2:
         return ""
@@ -34,14 +36,14 @@ def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str
 
 
 class _Varied:
-    """Entries that were named so far."""
+    """Entries named so far."""
 
     def __init__(self, checker: Checker) -> None:
         self._checker = checker
         self._names: dict[KeyPath, str] = {}
 
     def add(self, path: KeyPath, name: str, place: KeyPath) -> None:
-        """Note an entry, and report it at a place where it is, holds or lies in one that was named before."""
+        """Add an entry; report it at `place` if it equals, contains or lies inside an earlier one."""
         for keys, other in self._names.items():
             if path[: len(keys)] == keys[: len(path)]:
                 message = f"{name} and {other} are, or hold, the same entry; vary one of them"
@@ -50,7 +52,7 @@ class _Varied:
 
 
 def check_varied(matrix: MatrixSection, checker: Checker) -> None:
-    """Check that the study has the entries that a matrix varies, each named once, and none inside another."""
+    """Check that the entries that a matrix varies exist, and that none equals or contains another."""
     at: KeyPath = ("matrix", "vary") if matrix.vary is not None else ("matrix", "cases")
     try:
         names = tuple(matrix.vary) if matrix.vary is not None else matrix.table(checker.folder)[0]
@@ -86,7 +88,7 @@ def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSecti
                 message = f"there is no parameter or variable {unknown!r}{below}{suggestion(unknown, above)}"
                 checker.report((*path, key), message)
         if section.method == "grid" and not variable.stepped and variable.step is None and variable.number is None:
-            checker.report(path, "a variable of a grid needs either 'step' or 'number'")
+            checker.report(path, "a variable of a grid needs either 'step' or 'number'; 'method: search' needs neither")
         own, keys = _named(name, variable, checker)
         varied.add(keys, name, path)
         variables[own] = variable
@@ -99,7 +101,7 @@ def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSecti
 
 
 def _named(name: str, variable: Variable, checker: Checker) -> tuple[str, KeyPath]:
-    """The name of a design variable, of a parameter or dimension its own, and a path that no other variable has."""
+    """The name of a design variable, that of its parameter or dimension if it is one, and a path that identifies it."""
     known, path = checker.parameters.known(), ("optimize", "variables", name)
     if name in known:
         return name, ("", name)

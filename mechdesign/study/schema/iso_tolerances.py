@@ -17,9 +17,11 @@ from numpy.typing import ArrayLike
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats
 
+HELP_PAGE = "theory/reliability"
+
 
 class ToleranceClassError(ValueError):
-    """A tolerance class that is not given for a size, or none at all; the message says what there is."""
+    """No such tolerance class, or not for this size; the message names those there are."""
 
 
 def _numbers(text: str) -> Floats:
@@ -157,7 +159,9 @@ def deviations(text: str, size: ArrayLike) -> tuple[Number, Number]:
     wrong = (size < _SMALLEST_LENGTH) | (size > _LENGTH_ENDS[-1]) | np.isnan(half)
     if wrong.any():
         given = size[wrong][0]
-        raise ToleranceClassError(f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {given:g} mm")
+        raise ToleranceClassError(
+            f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {given:g} mm; give it in numbers"
+        )
     return -half, half
 
 
@@ -186,7 +190,9 @@ def _width(grade: int, size: Floats) -> Floats:
     wrong = ~((size > 0) & (size <= _ENDS[-1]))
     if wrong.any():
         given, most = size[wrong][0], _ENDS[-1]
-        raise ToleranceClassError(f"ISO 286 gives classes of sizes above 0 up to {most:g} mm, not of {given:g} mm")
+        raise ToleranceClassError(
+            f"ISO 286 gives classes of sizes above 0 up to {most:g} mm, not of {given:g} mm; give it in numbers"
+        )
     if grade >= _COARSE and (size <= 1).any():
         given = size[size <= 1][0]
         raise ToleranceClassError(f"ISO 286 gives grades from {_COARSE} on of sizes above 1 mm, not of {given:g} mm")

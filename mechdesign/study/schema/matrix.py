@@ -22,7 +22,9 @@ from mechdesign.study.text.document import KeyPath, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 
-# Cases of one study.
+HELP_PAGE = "howto/sweep"
+
+# Most cases of one study.
 MAX_CASES = 10_000_000
 GRID = "grid"
 METHODS = {
@@ -30,10 +32,10 @@ METHODS = {
     "latin_hypercube": "random; of as many equal parts of each range as there are samples, one sample lies in each",
     "sobol": "a scrambled Sobol' sequence, random and evenly spread; a power of two is most even",
 }
-# A range as the command line has it, and the keys of its parts.
+# A range as written on the command line, and the keys of its parts.
 RANGE = re.compile(r"[^:,\[\]{}]+(?::[^:,\[\]{}]+){1,2}")
 _PARTS = ("from", "to", "step")
-# A plain number, which most cells of a file of cases are: a million of them are not read as YAML one by one.
+# A plain number. Most cells of a file of cases are such numbers, and reading each as YAML would be slow.
 _DECIMAL = re.compile(r"-?(?:0|[1-9][0-9]{0,14})(\.[0-9]+)?")
 
 
@@ -82,7 +84,7 @@ class Values(fields.Model):
 
     @property
     def spaced(self) -> bool:
-        """Whether a grid knows which values these are."""
+        """Whether the values on a grid are determined."""
         return self.values is not None or self.step is not None or self.number is not None
 
     @property
@@ -92,27 +94,31 @@ class Values(fields.Model):
             return len(self.values)
         if self.number is not None:
             return self.number
+        assert self.step is not None
+        low, high = self._ends
+        return int(min((high - low) / self.step + 1e-9, 1e15)) + 1
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        """Ends of the range."""
         assert self.from_ is not None
         assert self.to is not None
-        assert self.step is not None
-        return int(min((self.to - self.from_) / self.step + 1e-9, 1e15)) + 1
+        return self.from_, self.to
 
     def on_grid(self) -> tuple[Any, ...]:
         """The values on a grid, both ends of a range included: ``from + k step <= to + 1e-9 step``."""
         if self.values is not None:
             return self.values
-        assert self.from_ is not None
-        assert self.to is not None
-        step = self.step if self.step is not None else (self.to - self.from_) / max(self.count - 1, 1)
-        return tuple(plainly(self.from_ + k * step) for k in range(self.count))
+        low, high = self._ends
+        step = self.step if self.step is not None else (high - low) / max(self.count - 1, 1)
+        return tuple(plainly(low + k * step) for k in range(self.count))
 
     def at(self, share: float) -> Any:
         """The value at a share of the range, from 0 to 1, or the entry of the list there."""
         if self.values is not None:
             return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
-        assert self.from_ is not None
-        assert self.to is not None
-        return plainly(self.from_ + share * (self.to - self.from_))
+        low, high = self._ends
+        return plainly(low + share * (high - low))
 
 
 def _named(raw: Any, context: Context) -> str:
@@ -209,7 +215,7 @@ class MatrixSection(fields.Model):
         return self
 
     def checked(self, checker: Checker) -> Self:
-        """Check the commands that results name; whether they have such a result is found at a look."""
+        """Check the commands that results name; `experiments` checks that they have such a result."""
         named: dict[KeyPath, Results] = {("matrix", "results"): self.results}
         if self.best is not None:
             named |= {("matrix", "best", key): getattr(self.best, key) for key in ("maximize", "minimize")}
@@ -233,7 +239,9 @@ class MatrixSection(fields.Model):
         if not lines:
             raise StudyError(f"{self.cases} has no cases below its first line")
         if len(lines) > MAX_CASES:
-            raise StudyError(f"{self.cases} has {len(lines):,} cases, and at most {MAX_CASES:,} are answered")
+            raise StudyError(
+                f"{self.cases} has {len(lines):,} cases, and at most {MAX_CASES:,} are answered; divide the file"
+            )
         return tuple(names), tuple(self._row(number, names, row) for number, row in lines)
 
     def _row(self, number: int, names: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ class Method:
     name: str  # in studies and tables
     words: str  # in pictures
     meaning: str  # what it computes, in a line
-    accuracy: int = 0  # where there is room for one method only, it is that of the highest
+    accuracy: int = 0  # rank; where one method only is shown, it is that of the highest rank
     color: str = "YELLOW"  # of `mechdesign.report.figures.style`; vermilion is left to limits
     marker: str = "h"  # Matplotlib's, of values
     dashes: Literal["-", "--", ":", "-."] = "-."  # of computed values; those of made mechanisms have whiskers instead

@@ -24,7 +24,9 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY, Amount, QuantityError, text_of, turn_in, written
 from mechdesign.terms import command_of, sum_of
 
-# Commands whose section no default can replace.
+HELP_PAGE = "theory/optimize"
+
+# Commands that need their section in the study.
 _UNASSUMED = ("reliability", "stiffness")
 
 
@@ -33,18 +35,18 @@ _METHODS = {
     "search": "global search over ranges and choices, for each row of weights",
     "pareto": "the front between two goals or more, spread evenly",
 }
-# Words behind the name of a column.
+# Statistics that may follow the name of a column.
 WORDS = ", ".join(f"``{word}``" for word in STATISTICS_OF_ROWS)
 _UNASSEMBLED = {"allowed": "only the part of the motion that is valid counts; how much is missing is said"}
 
 
 def _known() -> tuple[str, ...]:
-    """Results of a workspace that need no command's name."""
+    """Results of a workspace that may be named without the command."""
     return (*REGIONAL, *(f"{index}_{kind}" for index in INDEX_NAMES for kind in STATISTICS))
 
 
 def read_result(raw: Any, context: Context) -> str | Expression:
-    """The name of a result, a sum of results, or an expression over parameters; what is both is the result's."""
+    """The name of a result, a sum of results, or an expression over parameters; a result comes first."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         raise failure(f"expected a result, such as GII or kinematics.mu, or an expression, not {shown(raw)}")
     if fields.COORDINATE.fullmatch(raw) and (raw not in context.parameters or raw in _known()):
@@ -76,7 +78,7 @@ def _is_sum(raw: str) -> bool:
 
 def _required(raw: Any, context: Context) -> str:
     if isinstance(raw, str) and raw.startswith("optimize."):
-        # A column of its tables may be an expression.
+        # Columns of its tables may be named by expressions.
         return raw
     if isinstance(found := read_result(raw, context), str):
         return found
@@ -85,7 +87,7 @@ def _required(raw: Any, context: Context) -> str:
 
 
 def _amount(value: str | float, info: ValidationInfo) -> str | float:
-    """A quantity as an `Amount`; what only looks like one is a word."""
+    """A quantity as an `Amount`; a text that only looks like one stays a word."""
     with suppress(PydanticCustomError):
         if text_of(value):
             return read_number(value, info.context or Context())
@@ -293,7 +295,7 @@ AnyCondition = Annotated[
 def _weight_row(raw: Any, info: ValidationInfo) -> Any:
     """Bring ``{GII: 1, SUI: 1}`` to a list in the order maximize then minimize; say what is wrong with a row."""
     if "maximize" not in info.data or "minimize" not in info.data:
-        # What is wrong with the goals is reported; their weights cannot be judged.
+        # The goals have mistakes, which are reported; the weights cannot be checked.
         return ()
     goals = [goal.name for goal in info.data["maximize"] + info.data["minimize"]]
     if isinstance(raw, Mapping):
@@ -376,7 +378,11 @@ class OptimizeSection(fields.Model):
         if self.method == "pareto" and len(self.maximize + self.minimize) == 1:
             report((*root, "method"), "a Pareto front is between two goals or more; for one use search")
         if self.method == "grid" and self.evaluations is not None:
-            report((*root, "evaluations"), "the designs of a grid follow from its steps", at_key=True)
+            report(
+                (*root, "evaluations"),
+                "the designs of a grid follow from its steps; 'evaluations' is of 'method: search'",
+                at_key=True,
+            )
         moved = checker.parameters.moved(self.variables)
         goals = [
             (goal, (*root, key, k)) for key in ("maximize", "minimize") for k, goal in enumerate(getattr(self, key))
@@ -395,7 +401,7 @@ class OptimizeSection(fields.Model):
 
 
 def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collection[str]) -> None:
-    """Note a result that does not exist, or an expression that none of the parameters in `moved` changes."""
+    """Report a result that does not exist, or an expression that no parameter in `moved` changes."""
     if isinstance(judged.result, str):
         check_result(checker, judged.result, path)
     elif judged.result.names.isdisjoint(moved):
@@ -403,9 +409,9 @@ def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collec
 
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
-    """Note a bound that the parameters in `moved` change."""
+    """Report a bound that a parameter in `moved` changes."""
     raw, names = checker.reporter.raw(path), frozenset[str]()
-    # What is no expression has been reported.
+    # A text that is no expression has been reported.
     with suppress(ExpressionError):
         names = Expression.parse(str(raw)).names
     if names.isdisjoint(moved):

@@ -20,7 +20,9 @@ from mechdesign.study.text.fields import Context, failure, read_number, read_row
 from mechdesign.study.text.inputs import Folder, file_of
 from mechdesign.study.text.units import Amount
 
-# Numbers of poses where a study does not say them: of a circle (in steps of 5 deg); of a line or an arc, both ends too.
+HELP_PAGE = "reference/study/kinematics"
+
+# Default numbers of poses: of a circle (steps of 5 deg); of a line or an arc, both ends included.
 CIRCLE_POSES = 72
 LINE_POSES = 51
 _ROWS = {"type": ["array", "string", "number"], "title": "[[x, y], ...] or [number, ...] or file or number"}
@@ -67,7 +69,9 @@ class Arc(fields.Model):
     """Angle of the last place; less than ``from``: clockwise. Example: 180"""
 
     def misfits(self) -> Iterator[fields.Misfit]:
-        yield fields.Misfit(self.from_ == self.to, "an arc needs two different angles 'from' and 'to'")
+        yield fields.Misfit(
+            self.from_ == self.to, "an arc needs two different angles 'from' and 'to'; a whole turn is a 'circle'"
+        )
 
 
 def _through(raw: Any, context: Context) -> tuple[tuple[float, ...], ...]:
@@ -106,7 +110,7 @@ class PathSection(fields.Model):
 
     @property
     def shape(self) -> str | None:
-        """Which figure of the plane it is; None for what is listed."""
+        """The key of its figure (circle, arc, line); None for a list of points."""
         return next(iter(self.given("circle", "arc", "line")), None)
 
     @model_validator(mode="before")
@@ -208,6 +212,6 @@ def _number(text: str) -> float | None:
 
 
 def _lines(folder: Folder, file: str) -> list[tuple[int, str]]:
-    """Lines of a text with their numbers, without empty ones and comments; a StudyError where it cannot be read."""
+    """Lines of a file with their numbers, without empty ones and comments; raises as `Folder.text`."""
     lines = [line.strip() for line in folder.text(file).splitlines()]
     return [(number, line) for number, line in enumerate(lines, start=1) if line and not line.startswith("#")]

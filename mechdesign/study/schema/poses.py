@@ -17,9 +17,11 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 
+HELP_PAGE = "reference/study/kinematics"
+
 
 def _range(raw: list[Any] | str) -> str:
-    """The keys of a range that is written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; nothing of what is none."""
+    """The keys of a range written as ``[0, 360, 5]``, ``0..360`` or ``0:5:360``; empty for anything else."""
     parts = raw if isinstance(raw, list) else re.split(r"\s*(?:\.\.+|:|\s+to\s+)\s*", raw)
     if isinstance(raw, str) and len(parts) == 3:
         parts = [parts[0], parts[2], parts[1]]
@@ -102,7 +104,7 @@ class PoseSection(fields.Model):
 
     @property
     def source(self) -> str | None:
-        """The key that gives the poses; None where none does."""
+        """The key that gives the poses; None if there is none."""
         return next(iter(self.given("poses", "sweep", "path")), None)
 
     @model_validator(mode="after")

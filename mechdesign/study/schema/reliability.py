@@ -29,6 +29,8 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
+HELP_PAGE = "theory/reliability"
+
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 
 
@@ -144,7 +146,7 @@ class ReliabilitySection(MotionSection):
             if pair in pairs[:index]:
                 checker.report(("reliability", "correlation", index), "this pair is given twice; leave one out")
         if not self.methods:
-            checker.report(("reliability", "methods"), "name at least one method")
+            checker.report(("reliability", "methods"), "name at least one method, as in [analytic, monte_carlo]")
         for index, method in enumerate(self.methods):
             if method in self.methods[:index]:
                 checker.report(("reliability", "methods", index), f"{method!r} is given twice")
@@ -167,7 +169,7 @@ class ReliabilitySection(MotionSection):
         springs = set(stiffness.bearings if stiffness is not None else ()) - self.clearances.keys()
         if len({name if parts[name][2] in springs else parts[name][1] for name in self.limits}) < len(self.limits):
             checker.report(("reliability", "limits"), "the same error is limited twice; leave one out")
-        # Of a pin with a clearance all names mean the one link of which it is asked.
+        # All names of a pin with a clearance mean the same link.
         names = {name: plain if point in self.clearances else name for name, (_, plain, point) in parts.items()}
         limits = {names[name]: limit for name, limit in self.limits.items()}
         outputs = None if self.outputs is None else tuple(names[name] for name in self.outputs)
@@ -177,7 +179,7 @@ class ReliabilitySection(MotionSection):
 
 
 def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
-    """The link that a coordinate or point is said to be of, or nothing, the name without it, and the point."""
+    """The link named before a coordinate or point (empty if none), the name without it, and the point."""
     link, _, rest = name.partition(".")
     points = {part: point for point in mechanism.owners for part in (point, *mechanism.coordinates_of(point))}
     base, _ = split_order(rest, points.__contains__)
@@ -187,7 +189,7 @@ def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
 
 
 def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
-    """The link of which each point with a clearance is asked, where that is said; what contradicts itself is noted."""
+    """The link named for each point with a clearance; contradictions are reported."""
     found: dict[str, str] = {}
     given: list[tuple[KeyPath, str, bool]] = [
         *((("reliability", "outputs", k), name, False) for k, name in enumerate(section.outputs or ())),
@@ -216,7 +218,7 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
 
 
 def _parts(checker: Checker, name: str) -> list[str]:
-    """A coordinate, and the names in it where it is a measure, its velocity or its acceleration."""
+    """A coordinate, and the names in it if it is a measure or the velocity or acceleration of one."""
     measures, names = checker.mechanism.measures, [name]
     for part in names:
         measure = measures.get(split_order(part, measures.__contains__)[0])

@@ -11,6 +11,8 @@ from mechdesign.study.schema.matrix import Results
 from mechdesign.study.schema.optimize import check_result
 from mechdesign.study.text import fields
 
+HELP_PAGE = "howto/sensitivities"
+
 
 def _name(raw: Any, _context: fields.Context) -> str:
     if not isinstance(raw, str):
@@ -47,7 +49,7 @@ class SensitivitiesSection(fields.Model):
         return self
 
     def checked(self, checker: Checker) -> Self:
-        """Check the commands that results name; whether they have such a result is found at a look."""
+        """Check the commands that results name; `experiments` checks that they have such a result."""
         for k, named in enumerate(self.results):
             check_result(checker, named.result, ("sensitivities", "results", k))
         return self

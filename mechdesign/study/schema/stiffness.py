@@ -18,7 +18,9 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number
 from mechdesign.study.text.units import Amount
 
-# Keys of each kind of section.
+HELP_PAGE = "theory/stiffness"
+
+# Keys of each form of cross-section.
 _FORMS = (("width", "height"), ("diameter",), ("diameter", "inner_diameter"), ("area", "inertia"))
 _STIFFNESS_KINDS: dict[Quantity, str] = {"length": "stiffness", "angle": "rotational_stiffness"}
 
@@ -107,7 +109,7 @@ def _series(raw: Any, context: Context) -> float:
     """A stiffness, or of a list the stiffness of its parts in series, such as motor, gear and belt."""
     parts = {f"k{number}": read_number(each, context) for number, each in enumerate(fields.as_list(raw))}
     if not parts:
-        raise failure("expected a stiffness, or a list of those in series")
+        raise failure("expected a stiffness, or a list of those in series, [1e6, 2e6]")
     for part in parts.values():
         if part <= 0:
             raise failure(f"must be positive, not {part:g}")
@@ -157,16 +159,16 @@ class StiffnessSection(PoseSection):
 
     @property
     def point(self) -> str:
-        """The asked point without its link."""
+        """The point without its link."""
         return self.at.rpartition(".")[2]
 
     @property
     def bearer(self) -> str | None:
-        """The link whose point is asked; None of a pin."""
+        """The link of the point; None for a pin."""
         return self.link or self.at.rpartition(".")[0] or None
 
     def checked(self, checker: Checker) -> Self:
-        """Check what is named as well, and the units of stiffnesses; loads get three numbers."""
+        """Also check names and the units of stiffnesses; loads get three numbers."""
         root: KeyPath = ("stiffness",)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.known(self.at, [*owners, *ends], "point", (*root, "at"))

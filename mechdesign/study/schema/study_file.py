@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator
 
 from mechdesign.cautions import ALL, KINDS
-from mechdesign.errors import Problem, StudyError, cut, suggestion
+from mechdesign.errors import StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
@@ -75,17 +76,20 @@ def override(document: Document, overrides: Sequence[str]) -> None:
         Where one cannot be read or has no place to go.
     """
     for text in overrides:
-        _apply(document, text)
+        label = f"--set {cut(text)}"
+        try:
+            _apply(document, text, label)
+        except StudyError as error:
+            raise StudyError([replace(problem, file=label) for problem in error.problems]) from None
 
 
-def _apply(document: Document, text: str) -> None:
-    label = f"--set {cut(text)}"
+def _apply(document: Document, text: str, label: str) -> None:
     name, separator, value = text.partition("=")
     segments = name.strip().split(".")
     if not separator or not all(segments):
-        raise StudyError([Problem("an override is <dotted name>=<value>", file=label)])
+        raise StudyError("an override is <dotted name>=<value>, in quotes where it has spaces or brackets")
     if len(name) > MAX_NAME:
-        raise StudyError([Problem(f"a name longer than {MAX_NAME} characters", file=label)])
+        raise StudyError(f"a name longer than {MAX_NAME} characters; a whole section can be one value")
     # Bytes that the terminal could not decode are reported as not UTF-8, as they would be in a file.
     parsed = read(value.encode(errors="surrogateescape"), label) if value.strip() else Document(label, None)
     if parsed.problems:
@@ -96,9 +100,9 @@ def _apply(document: Document, text: str) -> None:
     key: Any = path[-1]
     there = has(holder, key)
     if isinstance(holder, dict) and parsed.data is None:
-        # Nothing takes the entry away: `--set kinematics.sweep=` makes room for other poses.
+        # An empty value removes the entry: `--set kinematics.sweep=` makes room for other poses.
         if not there and key not in schema_fields(StudyFile, path[:-1]):
-            raise StudyError([Problem(f"there is no {dotted(path)} to take away{suggestion(key, holder)}", file=label)])
+            raise StudyError(f"there is no {dotted(path)} to take away{suggestion(key, holder)}")
         holder.pop(key, None)
     elif isinstance(holder, list) and not there:
         holder.append(parsed.data)
@@ -115,12 +119,12 @@ def _apply(document: Document, text: str) -> None:
 
 
 def _descend(document: Document, segments: list[str], label: str, *, making: bool) -> tuple[Any, KeyPath]:
-    """Find the mapping or list to change and the path of the entry; mappings on the way are made where wanted."""
+    """The mapping or list that holds an entry, and the entry's path; `making` adds missing mappings on the way."""
     data: Any = document.data
     path: list[str | int] = []
     rest = list(segments)
     while True:
-        segment, rest = _next_key(data, path, rest, label)
+        segment, rest = _next_key(data, path, rest)
         path.append(segment)
         key: Any = segment
         if not rest:
@@ -134,15 +138,15 @@ def _descend(document: Document, segments: list[str], label: str, *, making: boo
                 document.values[tuple(path)] = Mark(label)
                 document.added.add(tuple(path))
         if not isinstance(inner, dict | list):
-            raise StudyError([Problem(f"{dotted(path)} is neither a mapping nor a list", file=label)])
+            raise StudyError(f"{dotted(path)} is neither a mapping nor a list")
         data = inner
 
 
-def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> tuple[str | int, list[str]]:
+def _next_key(data: Any, path: list[str | int], rest: list[str]) -> tuple[str | int, list[str]]:
     if isinstance(data, list):
         index = LIST_FORM.get(rest[0], int(rest[0]) if _INDEX.fullmatch(rest[0]) else -1)
         if not 0 <= index <= len(data) or (index == len(data) and len(rest) > 1):
-            raise StudyError([Problem(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}", file=label)])
+            raise StudyError(f"{dotted(path)} is a list of {len(data)}; it has no {rest[0]!r}, and the first is 0")
         return index, rest[1:]
     # The longest existing key wins.
     for length in range(len(rest), 0, -1):
@@ -158,7 +162,7 @@ def _next_key(data: Any, path: list[str | int], rest: list[str], label: str) -> 
         return rest[0], rest[1:]
     if len(rest) > 1 and _INDEX.fullmatch(rest[-1]):
         place, hint = dotted([*path, *rest[:-1]]), suggestion(rest[0], data)
-        raise StudyError([Problem(f"there is no {place} to have a {rest[-1]!r}{hint}", file=label)])
+        raise StudyError(f"there is no {place} to have a {rest[-1]!r}{hint}")
     return ".".join(rest), []
 
 
@@ -173,10 +177,7 @@ def entry(data: Any, name: str) -> KeyPath:
     segments = name.split(".")
     if not all(segments) or len(name) > MAX_NAME:
         raise StudyError("is no dotted name of an entry, such as mechanism.parameters.r")
-    try:
-        _, path = _descend(Document("", data), segments, "", making=False)
-    except StudyError as error:
-        raise StudyError(error.problems[0].message) from None
+    _, path = _descend(Document("", data), segments, "", making=False)
     here = data
     for k, key in enumerate(path):
         known = schema_fields(StudyFile, path[:k])
@@ -189,6 +190,6 @@ def entry(data: Any, name: str) -> KeyPath:
 
 
 def kinds_of(keys: KeyPath) -> set[str]:
-    """Kinds (of `units.KINDS`) of the number at a path, as far as the format itself tells them."""
+    """Kinds (of `units.KINDS`) of the number at a path, if the format determines them."""
     field = schema_fields(StudyFile, keys[:-1]).get(str(keys[-1]))
     return {read.kind for read in fields.reads(field.annotation, field.metadata) if read.kind} if field else set()

@@ -20,6 +20,8 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.reporter import Reporter
 
+HELP_PAGE = "theory/kinematics"
+
 ROOT: KeyPath = ("mechanism", "targets")
 
 
@@ -34,8 +36,8 @@ class Target:
     owner: str  # a coordinate or a measure, or a point whose path it is
     coordinates: tuple[str, ...]  # what has an error: the owner, or the point's x and y
     expression: Expression | None = None  # over coordinates and parameters, in the study's units
-    table: Floats | None = None  # in the study's units, shape (rows, columns),
-    rows: Sequence[Sequence[float]] = ()  # and its numbers where some follow parameters
+    table: Floats | None = None  # in the study's units, shape (rows, columns)
+    rows: Sequence[Sequence[float]] = ()  # the numbers of the table, if some follow parameters
 
     @property
     def timed(self) -> bool:
@@ -49,7 +51,7 @@ class Target:
 
 
 def check(checker: Checker, wanted: Mapping[str, Wanted]) -> dict[str, Target]:
-    """Targets whose names and tables are right; the mistakes of the others are noted."""
+    """Targets without mistakes; the mistakes of the others are reported."""
     found: dict[str, Target] = {}
     seen: dict[str, str] = {}
     for owner, value in wanted.items():
@@ -75,7 +77,7 @@ def check(checker: Checker, wanted: Mapping[str, Wanted]) -> dict[str, Target]:
 
 
 def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, point: bool) -> bool:
-    """Whether the target of a coordinate is an expression over others."""
+    """Whether the target of a coordinate is an expression over other coordinates and parameters."""
     if point:
         message = f"the target of a point is a path; give {owner}.x and {owner}.y their expressions"
         checker.report(path, message)
@@ -91,7 +93,7 @@ def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, 
 
 
 def _table(checker: Checker, owner: str, value: Any, path: KeyPath, count: int, quantity: str) -> Floats | None:
-    """The target's table, where its rows have `count` numbers or one more."""
+    """The table of a target; None, and a report, unless its rows have `count` numbers or one more."""
     try:
         table = read_table(checker.folder, value, most=3) if isinstance(value, str) else np.array(value)
     except StudyError as error:

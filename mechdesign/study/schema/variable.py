@@ -11,17 +11,19 @@ from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.units import QUANTITY
 
+HELP_PAGE = "theory/optimize"
+
 LIST_FORM: fields.Form = {"type": "array", "items": {"title": "value"}}
 
 
 def plainly(value: float) -> float | int:
-    """A number of 12 digits, as it is written: whole ones without a point."""
+    """A number rounded to 12 digits; a whole one is an int."""
     value = float(f"{value:.12g}")
     return int(value) if value.is_integer() and abs(value) < 1e15 else value
 
 
 def read_values(raw: Any, context: Context) -> tuple[Any, ...]:
-    """A list of values; quantities become numbers in the study's units, and no value stands there twice."""
+    """A list of different values; quantities become numbers in the study's units."""
     if not isinstance(raw, list) or not raw:
         raise failure(f"expected a list of values, not {shown(raw)}")
     values: list[Any] = []
@@ -79,7 +81,7 @@ class Variable(fields.Model):
 
     @property
     def stepped(self) -> bool:
-        """Whether there is nothing between its values, whatever the method."""
+        """Whether only separate values are possible, with every method."""
         return self.integer or self.choices is not None
 
     @property
@@ -89,7 +91,7 @@ class Variable(fields.Model):
 
     @property
     def words(self) -> tuple[str, ...]:
-        """Choices that are no numbers as tables name them; empty of numbers."""
+        """Choices as tables name them; empty if they are numbers."""
         if self.numeric:
             return ()
         return tuple(choice if isinstance(choice, str) else in_yaml(choice) for choice in self.choices or ())

@@ -29,6 +29,8 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount, QuantityError
 
+HELP_PAGE = "theory/reliability"
+
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
 DISTRIBUTIONS = {
@@ -49,12 +51,12 @@ def millimetre(context: Context, text: str) -> float:
     try:
         return context.units.convert("1 mm")
     except QuantityError:
-        raise failure(f"{text!r} is of sizes in mm, and this study's lengths are dimensionless") from None
+        raise failure(f"{text!r} is of sizes in mm, and this study's lengths are dimensionless; give 'units'") from None
 
 
 @dataclass(frozen=True)
 class ToleranceClass:
-    """A tolerance class as it is written, a millimetre and a degree as the study counts them."""
+    """A tolerance class as written, with a millimetre and a degree in the study's units."""
 
     text: str
     millimetre: float
@@ -72,7 +74,7 @@ class ToleranceClass:
 
 
 def _tolerance_or_class(raw: Any, context: Context) -> tuple[float, float] | ToleranceClass:
-    """As `_tolerance`, or a tolerance class; a parameter of its name counts first."""
+    """As `_tolerance`, or a tolerance class unless a parameter has that name."""
     if isinstance(raw, str) and is_class(raw) and raw not in context.parameters:
         degree = math.pi / 180.0 / context.units.angle_factor
         return ToleranceClass(raw, millimetre(context, raw), degree)
@@ -158,12 +160,12 @@ class Dimension(fields.Model):
         return self.tolerance.of_length(nominal) if self.leg is None else self.tolerance.of_angle(self.leg)
 
     def varies(self, nominal: Number) -> bool:
-        """Whether it has a tolerance that is wider than nothing; see `ends`."""
+        """Whether it has a tolerance above 0; see `ends`."""
         low, high = self.ends(nominal)
         return bool(np.any(low < high))
 
     def flaw(self, nominal: Number) -> str:
-        """What is wrong with its numbers at a nominal value, or at any of several; empty where nothing is."""
+        """The mistake in its numbers at a nominal value, or at any of several; empty if there is none."""
         if self.distribution == "lognormal" and np.any(nominal <= 0):
             return "what is lognormal is positive, and so is its nominal value"
         low, high = self.ends(nominal)
@@ -204,7 +206,9 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
         if "*" in name or "?" in name:
             matching = parameters.match(name)
             if not matching:
-                report(path, f"no dimension matches {name!r}", at_key=True)
+                report(
+                    path, f"no dimension matches {name!r}; name a parameter, or a place such as rod.length", at_key=True
+                )
             for place in matching:
                 if place not in dimensions:
                     found[place] = _check_dimension(checker, place, dimension, path)
@@ -219,7 +223,7 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
 
 
 def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
-    """Check a dimension, as the section gives it or a wildcard in it."""
+    """Check a dimension that the section names itself or by a wildcard."""
     if (quantity := LOADS.get(name) or checker.quantity(name)) is not None:
         for key in (dimension.kind, "nominal"):
             checker.kind((*path, key), quantity)
@@ -238,7 +242,7 @@ def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: Ke
 
 
 def _check_class(checker: Checker, name: str, given: object, leg: float | None) -> None:
-    """Check that a tolerance is no class, or that of a parameter or place that has one."""
+    """Check that a tolerance class stands for a length or an angle."""
     if not isinstance(given, ToleranceClass):
         return
     kinds = quantities(name, checker.parameters, checker.places)
@@ -257,7 +261,7 @@ def _check_class(checker: Checker, name: str, given: object, leg: float | None) 
 def quantities(name: str, parameters: Parameters, places: Mapping[str, Place]) -> set[str]:
     """Quantities of the dimensions of parts that a parameter moves, or of the place of this name."""
     slopes = parameters.derivatives(name) if name in parameters.nominal or name in places else {}
-    # Bounds of the motion and numbers in measures are no dimensions of a part.
+    # Limits of motion and numbers in measures are not dimensions of a part.
     return {places[place].quantity for place, slope in slopes.items()
             if slope and not place.startswith(("limits.", MEASURED))}  # fmt: skip
 

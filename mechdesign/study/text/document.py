@@ -32,7 +32,7 @@ _WORDS = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-# What mends a mistake, by the words that YAML has for it.
+# Cures by the messages of the YAML parser.
 _HINTS = {
     "cannot start any token": " (indent with spaces, not tabs; put special characters in quotes)",
     "alias": " (put a word that begins with '*' in quotes, as in \"*.length\")",
@@ -56,6 +56,10 @@ class Mark(NamedTuple):
         """Build a problem that stands here."""
         return Problem(message, key, self.file, self.line, self.column)
 
+    def failure(self, message: str) -> StudyError:
+        """Build the error of a single problem that stands here."""
+        return StudyError([self.problem(message)])
+
 
 @dataclass
 class Document:
@@ -68,13 +72,18 @@ class Document:
     data: Any
     keys: dict[KeyPath, Mark] = field(default_factory=dict)
     values: dict[KeyPath, Mark] = field(default_factory=dict)
-    # Mistakes of writing that leave the rest readable, and the parts where complaints would only repeat them.
+    # Mistakes after which the rest can be read, and the parts in which further mistakes only follow from them.
     problems: list[Problem] = field(default_factory=list)
     spoiled: set[KeyPath] = field(default_factory=set)
     # Lists in which two numbers may be one with a decimal comma, and that number.
     commas: dict[KeyPath, str] = field(default_factory=dict)
-    # Entries that the text does not have: an override made them.
+    # Entries that an override has added.
     added: set[KeyPath] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, data: Any, name: str = "") -> Document:
+        """A document of data without a text."""
+        return cls(name, data, values={(): Mark(name)})
 
 
 def dotted(path: Sequence[str | int]) -> str:
@@ -91,21 +100,21 @@ def read(content: bytes, name: str) -> Document:
         Where the bytes are not one YAML document of plain data and reasonable size.
     """
     if len(content) > MAX_BYTES:
-        raise StudyError([Mark(name).problem(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")])
+        raise Mark(name).failure(f"is larger than {MAX_BYTES // 1_000_000} MB: not a study file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise StudyError([Mark(name).problem("is not a text file in UTF-8: not a study file")]) from None
+        raise Mark(name).failure("is not a text file in UTF-8: not a study file") from None
     try:
         _check_events(text, name)
         builder = _Builder(name)
         builder.document.data = builder.value(yaml.compose(text, Loader=_Loader), ())
         return builder.document
     except yaml.MarkedYAMLError as error:
-        raise StudyError([_misread(error, name)]) from None
+        raise _misread(error, name) from None
     except yaml.YAMLError as error:
         first = str(getattr(error, "reason", error)).splitlines()[0]
-        raise StudyError([Mark(name).problem(f"is not a text in YAML: {first}")]) from None
+        raise Mark(name).failure(f"is not a text in YAML: {first}") from None
 
 
 def in_yaml(value: Any) -> str:
@@ -117,7 +126,7 @@ def in_yaml(value: Any) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in text)
 
 
-def _misread(error: yaml.MarkedYAMLError, name: str) -> Problem:
+def _misread(error: yaml.MarkedYAMLError, name: str) -> StudyError:
     """What is wrong where a text is not YAML; a brace that is not closed is reported where it opens."""
 
     def at(mark: Any) -> Mark:
@@ -130,16 +139,16 @@ def _misread(error: yaml.MarkedYAMLError, name: str) -> Problem:
         message = (
             f"this {opening!r} is not closed where line {noticed.line + 1} goes on; {closing!r} or a comma is missing"
         )
-        return at(begin).problem(f"is not YAML: {message}")
+        return at(begin).failure(f"is not YAML: {message}")
     if "':'" in problem and "scanning" in context:
-        return at(begin).problem("is not YAML: a ':' needs a space after it, as in 'length: 90'")
+        return at(begin).failure("is not YAML: a ':' needs a space after it, as in 'length: 90'")
     parts = [part for part in (context, problem) if part]
     hint = next((hint for words, hint in _HINTS.items() if any(words in part for part in parts)), "")
-    return at(noticed).problem(f"is not YAML: {', '.join(parts)}{hint}")
+    return at(noticed).failure(f"is not YAML: {', '.join(parts)}{hint}")
 
 
 def _check_events(text: str, name: str) -> None:
-    """Check what can be judged of a text before anything is built of it."""
+    """Check the events of the YAML parser before any data are built."""
     depth = documents = 0
     event: Any
     for event in yaml.parse(text, Loader=_Loader):
@@ -147,14 +156,14 @@ def _check_events(text: str, name: str) -> None:
         if isinstance(event, yaml.DocumentStartEvent):
             documents += 1
             if documents > 1:
-                raise StudyError([here.problem("a second YAML document; a study file holds one")])
+                raise here.failure("a second YAML document; a study file holds one")
         elif isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag not in (None, "!"):
             message = f"the YAML tag {event.tag!r} has no place in a study; write plain values"
-            raise StudyError([here.problem(message)])
+            raise here.failure(message)
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         _check_depth(depth, here)
     if not documents:
-        raise StudyError([Mark(name).problem("is empty: nothing to study (`mechdesign new` prints a start)")])
+        raise Mark(name).failure("is empty: nothing to study (`mechdesign new` prints a start)")
 
 
 def _mark(part: Any, name: str) -> Mark:
@@ -164,7 +173,7 @@ def _mark(part: Any, name: str) -> Mark:
 
 def _check_depth(depth: int, here: Mark) -> None:
     if depth > MAX_DEPTH:
-        raise StudyError([here.problem(f"nested deeper than {MAX_DEPTH} levels")])
+        raise here.failure(f"nested deeper than {MAX_DEPTH} levels; write the section flatter")
 
 
 class _Builder:
@@ -179,7 +188,9 @@ class _Builder:
         _check_depth(len(path), here)
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise StudyError([here.problem(f"more than {MAX_NODES} values once its aliases are expanded")])
+            raise here.failure(
+                f"more than {MAX_NODES} values once its aliases are expanded; put the numbers into a file"
+            )
         self.document.values[path] = here
         if isinstance(node, yaml.ScalarNode):
             return _scalar(node)

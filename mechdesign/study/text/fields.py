@@ -39,13 +39,13 @@ NAME = re.compile(r"[^\W\d]\w*")
 COORDINATE = re.compile(r"[^\W\d]\w*(?:\.\w+)*")
 _END = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*)?")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:\s*[^\W\d].*)?")
-# Magnitudes beyond which a number is a slip of writing, as its square or reciprocal would soon overflow: of numbers,
-# and of lengths, which are multiplied with one another more often.
+# Magnitudes beyond which a number is likely a slip, as its powers would overflow: of numbers, and of lengths, which
+# are multiplied with one another more often.
 MAX_NUMBER = 1e60
 MIN_NUMBER = 1e-60
 MAX_LENGTH = 1e15
 MIN_LENGTH = 1e-15
-# Names that a message lists of those that might have stood in place of a wrong one.
+# Most names that a message lists in place of a wrong one.
 MAX_NAMED = 12
 
 
@@ -110,7 +110,7 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Amoun
     except (QuantityError, ExpressionError) as error:
         raise failure(str(error)) from None
     except OverflowError:
-        raise failure("too large a number") from None
+        raise failure("too large a number; choose a larger unit") from None
     if not isinstance(raw, str) and not math.isfinite(value):
         raise failure(f"expected a finite number, not {value:g}")
     largest, what = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")
@@ -141,7 +141,7 @@ def read_expression(raw: object, context: Context) -> Expression:
     """Read an expression whose names are looked up later; a number is one without names."""
     if not isinstance(raw, str) or QUANTITY.fullmatch(raw):
         number = float(read_number(raw, context))
-        # A number that is lost has been reported already.
+        # The mistake of a lost number has been reported.
         return Expression.parse(repr(0.0 if math.isnan(number) else number))
     try:
         expression = context.expression(raw)
@@ -176,7 +176,7 @@ def _known_names(name: str, context: Context) -> str:
 
 
 def as_list(raw: Any) -> list[Any]:
-    """One thing instead of a list of one; nothing is an empty list."""
+    """A list as it is, a single entry as a list of one, None as an empty list."""
     return raw if isinstance(raw, list) else [] if raw is None else [raw]
 
 
@@ -215,7 +215,7 @@ class Read:
 
 
 def reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
-    """What reads the values in an annotation, outside of other models."""
+    """The `Read` annotations in an annotation, except those inside models."""
     for each in (*metadata, *get_args(annotation)):
         if isinstance(each, Read):
             yield each
@@ -235,7 +235,7 @@ def number(
     def read(raw: Any, context: Context) -> Amount:
         size = read_number(raw, context, kind)
         if kind and not place and size.expression and size.text:
-            # Parameters are judged by the geometry that they change.
+            # Parameters in a place are checked by the geometry.
             _check_kind(size.text, kind)
         if minimum is not None and 0 < size < smallest:
             raise failure(f"{size:g} is too small a number: none but 0 is below {smallest:g}; choose a smaller unit")
@@ -249,7 +249,7 @@ def number(
 
 
 def positive(minimum: float, *, exclusive: bool) -> str:
-    """What a number must be that is not below a minimum, or above it."""
+    """Words for a minimum: ``positive`` or ``at least 2``."""
     return "positive" if minimum == 0 and exclusive else f"at least {minimum:g}"
 
 
@@ -331,7 +331,7 @@ class OrShort:
 
 
 class Misfit(NamedTuple):
-    """Numbers of a section that do not fit each other.
+    """Numbers of a section that contradict each other.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ class Misfit(NamedTuple):
 
 
 class KeyText(NamedTuple):
-    """What the docstring under an attribute of a model says: text in one line, and examples as a study writes them."""
+    """The docstring of a key: text in one line, and examples as a study writes them."""
 
     text: str
     examples: tuple[str, ...] = ()
@@ -428,7 +428,7 @@ def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
 
 
 def quoted(text: str) -> str:
-    """A text of a docstring as messages have it: ``from`` is 'from'."""
+    """A docstring with quotation marks in place of double backticks."""
     return text.replace("``", "'")
 
 
@@ -439,7 +439,7 @@ class Model(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-    bare: ClassVar[str] = ""  # key of a value that is written alone, instead of a mapping
+    bare: ClassVar[str] = ""  # key of a value that may stand alone, in place of the mapping
     short: ClassVar[tuple[Form, ...]] = ()  # JSON Schema of the short forms
     one_of: ClassVar[tuple[str, ...]] = ()  # a message, and keys of which exactly one is given
 
@@ -472,7 +472,7 @@ class Model(BaseModel):
         return self.given(*self.one_of[1:])[0]
 
     def misfits(self) -> Iterator[Misfit]:
-        """What the section does not allow of its numbers together; of designs the numbers are arrays."""
+        """Contradictions between the section's numbers, which are arrays for many designs."""
         return iter(())
 
     def with_numbers(self, value: Callable[[Amount], Any]) -> Self:
@@ -483,7 +483,7 @@ class Model(BaseModel):
 
     @classmethod
     def said_of_all(cls) -> str:
-        """What the section is, in one line."""
+        """The docstring of the section in one line."""
         return quoted(" ".join((cls.__doc__ or "").split()))
 
     @classmethod
@@ -493,7 +493,7 @@ class Model(BaseModel):
 
     @classmethod
     def said(cls, key: str) -> KeyText:
-        """What is said of a key; nothing where there is nothing."""
+        """The docstring of a key; empty if it has none."""
         name = next((name for name, field in cls.model_fields.items() if (field.alias or name) == key), key)
         texts = (_texts(holder.__module__).get((holder.__name__, name)) for holder in cls.__mro__[:-1])
         return next(filter(None, texts), KeyText(""))

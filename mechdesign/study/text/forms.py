@@ -1,4 +1,4 @@
-"""JSON Schema in words: what may stand at a key, for editors and the reference."""
+"""JSON Schema in words: the values of a key, for editors and the reference."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic_core import core_schema
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Form
 
-# Words of the titles that need a meaning; what they name is otherwise the study's own.
+# Meanings of the words in titles that are not names of the study.
 TERMS = {
     "number": "a number in the study's units, one with a unit of its own (40 mm, 600 rpm, 1e5 N*m/rad), or an "
     "expression over parameters",
@@ -25,20 +25,20 @@ _TYPES = {"string": "text", "number": "number", "integer": "whole number", "bool
 
 
 class Generator(GenerateJsonSchema):
-    """Of pydantic, without the titles that it makes of names."""
+    """pydantic's generator without the titles that it makes of names."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
-        """None is wanted: `name_forms` gives titles that say something."""
+        """Never: `name_forms` adds the titles."""
         return False
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Form:
-        """The same of a model."""
+        """The schema of a model, without its title."""
         found = super().model_schema(schema)
         found.pop("title", None)
         return found
 
     def dict_schema(self, schema: core_schema.DictSchema) -> Form:
-        """That of a mapping, whose keys and values keep their titles."""
+        """The schema of a mapping, whose keys and values keep their titles."""
         found = super().dict_schema(schema)
         if "keys_schema" in schema and schema["keys_schema"]["type"] != "str":
             found["propertyNames"] = self.generate_inner(schema["keys_schema"])
@@ -48,20 +48,20 @@ class Generator(GenerateJsonSchema):
 
 
 def name_forms(schema: Form) -> None:
-    """Give every property of a schema and of the models it refers to a title: what it takes, in words."""
+    """Give every property of a schema and its models a title: the values that it takes, in words."""
     for model in (schema, *schema["$defs"].values()):
         for form in properties(model).values():
             form["title"] = in_words(form, schema["$defs"])
 
 
 def properties(model: Form) -> dict[str, Form]:
-    """Of a model's schema the part that each key has; a model with short forms is the first of several."""
+    """The schema of each key of a model; with short forms, the model is the first alternative."""
     found: dict[str, Form] = model.get("anyOf", [model])[0]["properties"]
     return found
 
 
 def in_words(form: Form, known: Mapping[str, Form]) -> str:
-    """What a form accepts, written as it stands in a study; `known` are the models that it refers to."""
+    """The values that a form accepts, as written in a study; `known` are the models that it refers to."""
     if "title" in form:
         return str(form["title"])
     if "$ref" in form:

@@ -1,4 +1,4 @@
-"""Files that a study names: where they may lie, and what is read of them."""
+"""Files that a study names: where they may lie, and their texts."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MAX_FILE_BYTES = 50_000_000
 
 @dataclass(frozen=True)
 class Folder:
-    """The folder of a study, in which the files lie that it names; `anywhere`, those may lie elsewhere as well.
+    """The folder that must contain the files that a study names, unless they may lie `anywhere`.
 
-    A file is read once: what becomes of it while the study is computed changes nothing.
+    A file is read once: changes of it during the computation have no effect.
     """
 
     path: Path = Path()
@@ -30,7 +30,7 @@ class Folder:
     _read: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def text(self, name: str) -> str:
-        """What a file holds.
+        """The text of a file.
 
         Raises
         ------
@@ -45,7 +45,7 @@ class Folder:
         try:
             if not self.anywhere and not file.resolve().is_relative_to(self.path.resolve()):
                 raise StudyError(f"{file} is not in the folder of the study; --allow-files reads it all the same")
-            # Opened without waiting: a pipe might never be written to.
+            # Opened without waiting, as a pipe may never be written to.
             with open(file, "rb", opener=_without_waiting) as stream:
                 if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
                     raise StudyError(f"{file} cannot be read: not a file")
@@ -54,9 +54,9 @@ class Folder:
                 raise StudyError(f"{file} cannot be read: larger than {MAX_FILE_BYTES // 1_000_000} MB")
             return content.decode("utf-8-sig")
         except UnicodeDecodeError:
-            raise StudyError(f"{file} cannot be read: not a text file") from None
+            raise StudyError(f"{file} cannot be read: not a text file; save the table as CSV in UTF-8") from None
         except (OSError, ValueError, RuntimeError) as error:
-            # A name may hold what no file system knows, and links may go round in a circle.
+            # The name may be impossible, or links may form a circle.
             raise StudyError(f"{file} cannot be read: {getattr(error, 'strerror', None) or 'no such name'}") from None
 
 
@@ -65,7 +65,7 @@ def _without_waiting(path: str, flags: int) -> int:
 
 
 def file_of(raw: Any) -> str | None:
-    """The file that a path or a target is: ``{file: NAME}``, or a name with the ending of a table; else None."""
+    """The file that a path or a target names: ``{file: NAME}``, or a name with the ending of a table; else None."""
     name = raw.get("file") if isinstance(raw, Mapping) else raw
     return name if isinstance(name, str) and (name is not raw or name.lower().endswith(FILES)) else None
 

@@ -17,7 +17,7 @@ from mechdesign.study.text.units import QuantityError, measure, text_of
 
 # A link written as a list has its keys at these places.
 LIST_FORM = {"from": 0, "to": 1, "length": 2}
-# What is expected where pydantic says of which type an error is.
+# Expected values by the types of pydantic's errors.
 _EXPECTED = defaultdict(
     lambda: "something else",
     string_type="a text",
@@ -31,12 +31,12 @@ _EXPECTED = defaultdict(
     too_long="a shorter list",
     none_required="nothing",
 )
-# Those that want a mapping.
+# Types of errors where a mapping is expected.
 _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 
 def unknown_key(name: str, known: Iterable[str]) -> str:
-    """Say that a key is not known, and which one may be meant."""
+    """Message of an unknown key, with the most similar key."""
     return f"unknown key{suggestion(name, known)}"
 
 
@@ -52,13 +52,13 @@ class Reporter:
 
     @property
     def problems(self) -> list[Problem]:
-        """Those found so far, each once."""
+        """Mistakes found so far, each once."""
         return list(self._problems)
 
     def known(
         self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
     ) -> bool:
-        """Whether a name is one of those known; if not, note it with the nearest one."""
+        """Whether a name is known; if not, report it with the most similar name."""
         candidates = list(known)
         if name in candidates:
             return True
@@ -69,7 +69,7 @@ class Reporter:
         return False
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
-        """Note a problem at a path of the data; paths through the long form of a short form are understood."""
+        """Report a mistake at a path of the data, which may go through the long form of a short one."""
         found = self.written(path)
         above = [found[:length] for length in range(len(found) + 1)]
         if not self.document.spoiled.isdisjoint(above):
@@ -79,10 +79,10 @@ class Reporter:
         self._problems[self._placed(found, message + hint, at_key)] = None
 
     def kind(self, path: KeyPath, kind: str) -> None:
-        """Note quantities at a path of the data, or below it, whose unit does not fit what is needed there."""
+        """Report quantities at or below a path of the data whose unit is of another kind."""
         self.kinds[path] = kind
         for keys, raw in leaves(self.raw(path)):
-            # A parameter alone has its own unit.
+            # The unit of a parameter is checked with the parameter.
             parameter = self.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
             if text := text_of(raw) or text_of(parameter):
                 try:
@@ -91,7 +91,7 @@ class Reporter:
                     self.report((*path, *keys), str(error))
 
     def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
-        """Note a named thing that nothing uses: one that an override brought in is a name misspelt."""
+        """Warn of a name that nothing uses; if an override added it, report it as misspelt."""
         name = path[-1]
         if path in self.document.added:
             hint = suggestion(str(name), others)
@@ -129,7 +129,7 @@ class Reporter:
         return any(problem.key.partition(".")[0] in ("", *sections) for problem in self.problems)
 
     def raw(self, path: Sequence[str | int]) -> Any:
-        """The data as written at a path, None where there is none."""
+        """The data as written at a path, None if there are none."""
         data = self.document.data
         for segment in self.written(path):
             if not has(data, segment):
@@ -180,12 +180,12 @@ class Reporter:
                 if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
                     message += "; a ':' needs a space after it"
                 *holder, last = self.written(location)
-                # Of a whole mapping pydantic names the form last.
+                # For a whole mapping pydantic's path ends with the name of the form.
                 location = location if has(self.raw(holder), last) else tuple(holder)
                 self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[Model], key: str, raw: Any) -> Any:
-        """The data of a top-level part with the mistakes of a validation taken out, as far as that is possible.
+        """The data of a top-level part with the mistakes of a validation corrected or removed, where possible.
 
         Wrong numbers are lost, unknown keys take the name that they resemble or are left out.
         """
@@ -207,7 +207,7 @@ class Reporter:
 
 
 def _meaning(root: type[Model], location: Sequence[str | int]) -> str:
-    """The first sentence about the key at a location of the schema, to stand in a message."""
+    """The first sentence of a key's description, for a message."""
     model = _model(root, location[:-1])
     text = "" if model is None else model.said(str(location[-1])).text
     sentence = text.partition(". ")[0].removesuffix(".")
@@ -221,13 +221,13 @@ def schema_fields(root: type[Model], location: Sequence[str | int]) -> dict[str,
 
 
 def _model(root: type[Model], location: Sequence[str | int]) -> type[Model] | None:
-    """The model at a location of the schema, None where there is none."""
+    """The model at a location of the schema, None if there is none."""
     current: Any = root
     for segment in (*location, None):
         tagged = False
         while get_origin(current) in (Annotated, Union, UnionType) and not tagged:
             arms = [arm for arm in get_args(current) if arm is not NoneType]
-            # pydantic names the form that was meant among the keys.
+            # pydantic's path contains the tag of the form.
             named = [arm for arm in arms if any(isinstance(tag, Tag) and tag.tag == segment for tag in get_args(arm))]
             current, tagged = (named or arms)[0], bool(named)
         if tagged:

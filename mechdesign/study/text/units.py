@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike
 from mechdesign.errors import nearest
 from mechdesign.expressions import Expression, Number
 
+HELP_PAGE = "reference/expressions"
+
 Powers = tuple[int, ...]
 """Exponents of length, angle, time and force."""
 
@@ -122,23 +124,23 @@ class Amount(float):
 
     text: str
     expression: Expression | None  # over parameters, in the study's units
-    least: float | None = None  # which it may not fall below, or with `exclusive` not reach
+    least: float | None = None  # least allowed value, which is excluded with `exclusive`
     exclusive: bool = False
 
     def __new__(cls, value: float, text: str = "", expression: Expression | None = None) -> Self:
-        """Make it of a number, the quantity's text, and the expression."""
+        """Create it from a number, the quantity's text, and the expression."""
         amount = super().__new__(cls, value)
         amount.text, amount.expression = text, expression
         return amount
 
     @classmethod
     def of(cls, value: float) -> Self:
-        """The number itself if it is one, else a bare one."""
+        """The number itself if it is an `Amount`, else as a bare one."""
         return value if isinstance(value, cls) else cls(value)
 
     @classmethod
     def by(cls, formula: str, **given: float) -> Self:
-        """What a formula makes of numbers, which are its variables; it follows the parameters that they follow."""
+        """The value of a formula whose variables are `given`; it follows the parameters that they follow."""
         amounts = {name: cls.of(value) for name, value in given.items()}
         rule = Expression.parse(formula)
         value = float(rule.evaluate({name: float(amount) for name, amount in amounts.items()}))
@@ -169,7 +171,7 @@ class Amount(float):
 
 
 def turn_in(unit: str) -> float:
-    """A whole turn in a unit of angle; 0 in another."""
+    """A whole turn in a unit of angle; 0 for another unit."""
     with contextlib.suppress(QuantityError):
         _, powers, factor = measure(f"1 {unit}")
         return 2 * math.pi / factor if powers == KINDS["angle"] else 0.0
@@ -235,20 +237,20 @@ class Units:
 
 
 def text_of(value: object) -> str:
-    """The quantity as which a number was written; empty for a bare one."""
+    """The text of a quantity; empty for a bare number."""
     if isinstance(value, Amount):
         return value.text
     return value if isinstance(value, str) and QUANTITY.fullmatch(value) else ""
 
 
 def at(value: float, parameters: Mapping[str, ArrayLike]) -> Number:
-    """A number of the study where parameters have these values; it is its own where it follows none of them."""
+    """A number of the study at these values of the parameters."""
     expression = value.expression if isinstance(value, Amount) else None
     return float(value) if expression is None else expression.evaluate(parameters)
 
 
 def written(value: float) -> str:
-    """A number as a message has it: the quantity as it was written, or 12 digits."""
+    """A number for a message: the quantity as written, or 12 digits."""
     return text_of(value) or f"{value:.12g}"
 
 
@@ -259,7 +261,7 @@ def kind_of(value: object) -> str | None:
     return next((name for name, known in KINDS.items() if known == powers), None)
 
 
-# Units that are read without the registry, which takes a while to build: their kind and SI value.
+# Common units with their kind and SI value, read without pint's registry, which takes long to build.
 _COMMON = {
     "mm": ("length", 1e-3),
     "cm": ("length", 1e-2),
@@ -307,7 +309,7 @@ def measure(text: str, kind: str | None = None) -> tuple[float, Powers, float]:
     """
     match = QUANTITY.fullmatch(text)
     if match is None:
-        raise QuantityError(f"{text!r} is not a number with a unit")
+        raise QuantityError(f"{text!r} is not a number with a unit, such as '40 mm'")
     unit = match["unit"]
     if len(unit) > MAX_UNIT:
         raise QuantityError(f"{unit[:MAX_UNIT]!r}... is no unit: none is longer than {MAX_UNIT} characters")
@@ -344,7 +346,7 @@ def _unit(unit: str) -> tuple[Powers, float]:
     try:
         parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
         base = registry.Quantity(1.0, parsed).to_base_units()
-    except Exception:  # pint lets through whatever its tokenizer and its own classes raise
+    except Exception:  # pint raises errors of many classes
         known = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
         near = _MEANT.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *known))
         raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None)) from None
