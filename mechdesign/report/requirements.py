@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
-from mechdesign.results import POSES_ONLY, Result, Table
+from mechdesign.results import POSES_ONLY, Drawn, Result, Table
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
@@ -40,6 +40,28 @@ class Verdict:
     def __str__(self) -> str:
         place, note = f" at {self.place}" if self.place else "", f" ({self.note})" if self.note else ""
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}{note}"
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnCases(Drawn):
+    """Columns of the table of a sweep by what they are, and what became of the requirements over its cases.
+
+    Parameters
+    ----------
+    entries : sequence of str
+        Columns of the entries that vary.
+    results : mapping of str to Bounds
+        Columns of results, with the limits that a requirement sets, in the unit of the column.
+    goals : mapping of str to int
+        Columns of goals: 1 where one is to be small, -1 where it is to be large.
+    verdicts : tuple of Verdict
+        The worst over the cases, a requirement each.
+    """
+
+    entries: Sequence[str]
+    results: Mapping[str, Bounds]
+    goals: Mapping[str, int]
+    verdicts: tuple[Verdict, ...]
 
 
 def named(kind: str) -> str:
@@ -158,8 +180,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ...     print(verdict)
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30 (of the asked poses only)
     """
-    if "cases" in result.drawn:
-        return (*result.drawn["cases"].verdicts, *on_warnings(study, result.warnings))
+    if isinstance(result.drawn, DrawnCases):
+        return (*result.drawn.verdicts, *on_warnings(study, result.warnings))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):

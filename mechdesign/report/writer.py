@@ -26,6 +26,7 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechdesign.report.before import Before
     from mechdesign.report.figures.rendering import Gallery
 
 DIMENSIONS = "dimensions"  # of `check`
@@ -45,12 +46,14 @@ def write(
     asked: Extras,
     jobs: int | None = None,
     progress: Progress = NULL,
+    before: Before | None = None,
 ) -> tuple[Caution, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
-    pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
-    result that the new one does not have are removed, so that the directory never shows two results at once.
+    pictures, they are there. Of an interrupted computation no pictures are drawn. Pictures show a study `before` under
+    this one. Files of an older result that the new one does not have are removed, so that the directory never shows two
+    results at once.
 
     Raises
     ------
@@ -76,13 +79,13 @@ def write(
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, asked, jobs)
+            drawn, warnings = pictures(study, result, asked, jobs, before)
         if asked.report:
             from mechdesign.report.page import section
 
             inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
             mechanism = inline.pop(MECHANISM, "")
-            part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
+            part, warnings = section.section(study, result, inline, mechanism, warnings, before, plots=asked.plots)
             drawn[pages.SECTION] = section.encoded(part)
         if drawn or more:
             told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
@@ -110,9 +113,9 @@ def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
 def _check_room(directory: Path, result: Result) -> None:
     """Find out before long tables are written that the disk would not hold them."""
     need = 0.0
-    for name, table in result.tables.items():
-        if isinstance(table, LongTable) and len(some := result.seen.tables[name]):
-            need += sum(map(len, csv_blocks(some))) / len(some) * len(table)
+    for table in result.tables.values():
+        if isinstance(table, LongTable) and len(table.seen):
+            need += sum(map(len, csv_blocks(table.seen))) / len(table.seen) * len(table)
     free = shutil.disk_usage(directory).free if need else 0
     if need > free:
         raise OutputError(
@@ -185,18 +188,19 @@ def sketch(study: Study) -> bytes:
         return style.encoded(sketch_figure(study), "png")
 
 
-def figures(study: Study, result: Result) -> Gallery:
+def figures(study: Study, result: Result, before: Before | None = None) -> Gallery:
     """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
     from mechdesign.report.figures.rendering import Gallery
 
-    found, result = Gallery(), result.seen
+    gallery = Gallery()
+    shown = (study, result.seen) if before is None else (study, result.seen, before)
     # What all pictures of a command share may fail too.
-    found.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
-    return found
+    gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, *shown)
+    return gallery
 
 
 def pictures(
-    study: Study, result: Result, asked: Extras, jobs: int | None = None
+    study: Study, result: Result, asked: Extras, jobs: int | None = None, before: Before | None = None
 ) -> tuple[dict[str, bytes], tuple[Caution, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
@@ -210,7 +214,7 @@ def pictures(
     formats = asked.formats.split(",")
     result = result.seen
     with style.context(asked.style):
-        gallery = figures(study, result)
+        gallery = figures(study, result, before)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
@@ -226,9 +230,10 @@ def pictures(
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if asked.animate:
+            from mechdesign.analyses.kinematics.drawn import DrawnMotion
             from mechdesign.report.figures.kinematics.animation import animation
 
-            drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
+            drawings[ANIMATION] = lambda: {ANIMATION: animation(DrawnMotion.of(result).shown)}
         drawn, failed = render(drawings, jobs)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":

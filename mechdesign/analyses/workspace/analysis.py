@@ -13,6 +13,7 @@ from mechdesign.analyses.region.curves import Patch, patches_of_pieces
 from mechdesign.analyses.region.rays import SINGLE, Effort
 from mechdesign.analyses.region.regions import RAYS
 from mechdesign.analyses.workspace.columns import BOUNDARY, INDICES, LOCAL, PIECES, RANGE_INDICES
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.analyses.workspace.ellipses import ellipses
 from mechdesign.analyses.workspace.index import Local, determinant_power, prepare
 from mechdesign.analyses.workspace.inscribed import INSCRIBED, inscribed
@@ -119,7 +120,7 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     empty = sum(not given.panels.closes[0] for given in answers)
     named = {table.name: table for table in tables}
     along = poses_along(study, regions[0][1].held, named["boundary"])
-    drawn = {"along": along, "ellipses": ellipses(regions[0][1], regions[0][2])}
+    drawn = DrawnRegion(along, ellipses(regions[0][1], regions[0][2]))
     return Result("workspace", named, tuple(warnings), {"regions": len(asked), "empty": empty}, drawn=drawn)
 
 

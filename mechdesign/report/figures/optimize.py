@@ -13,19 +13,21 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
+from mechdesign.analyses.optimize.analysis import DrawnDesign, DrawnDesigns, drawn_design
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import variables_of
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.designs import folded, head, label, listed, tick, value_text
 from mechdesign.report.figures.front import chosen, described, front_figure, growth_figure, marked
-from mechdesign.report.figures.mechanism import mechanism_figure
+from mechdesign.report.figures.mechanism import sketch_and_first_pose
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.boundary import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
-from mechdesign.results import Result
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 MIN_MAP_DESIGNS = 9
@@ -48,63 +50,65 @@ def figures(study: Study, result: Result) -> Gallery:
     """``CPI`` (``objective`` of one goal), ``indices``, ``designs``, ``pareto``, ``hypervolume``,
     ``convergence``, ``optimum``."""
     assert study.optimize is not None
-    designs: Designs = result.drawn["designs"]
-    found = Gallery()
+    drawn, gallery = DrawnDesigns.of(result), Gallery()
+    designs = drawn.designs
     score = "CPI" if len(designs.goals) > 1 else "objective"
     if len(designs.variables) == 2 and len(designs) >= MIN_MAP_DESIGNS:
-        found.add(score, score_surface, designs)
+        gallery.add(score, score_surface, designs)
         if len(designs.goals) > 1:
-            found.add("indices", goal_maps, designs)
+            gallery.add("indices", goal_maps, designs)
     else:
-        found.add(score, score_curves, designs)
+        gallery.add(score, score_curves, designs)
     if len(designs.variables) > 2:
-        found.add("designs", parallel_axes, designs)
+        gallery.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
-        found.add("pareto", front_figure, designs, result.tables["pareto"])
-        found.add("hypervolume", growth_figure, result.tables["hypervolume"])
+        gallery.add("pareto", front_figure, designs, result.tables["pareto"])
+        gallery.add("hypervolume", growth_figure, result.tables["hypervolume"])
     if study.optimize.method == "search":
-        found.add("convergence", convergence, designs)
-    found.add("optimum", _optimum, result, designs)
-    return found
+        gallery.add("convergence", convergence, designs)
+    gallery.add("optimum", _optimum, drawn, result.tables.get("pareto"))
+    return gallery
 
 
-def _optimum(result: Result, designs: Designs) -> Figure:
+def _optimum(drawn: DrawnDesigns, front: Table | None) -> Figure:
     """The best design itself: in its workspace where that was judged, in its motion where that was.
 
     Of a front those that are marked in it, side by side.
     """
-    if "pareto" in result.tables:
-        front = result.tables["pareto"]
-        parts = [(described(designs, front, name, row), *result.drawn["design"](chosen(designs, front, row)))
+    designs = drawn.designs
+    if front is not None:
+        parts = [(described(designs, front, name, row), drawn_design(designs, chosen(designs, front, row)))
                  for name, row in marked(designs, front)]  # fmt: skip
-        moving = ("motion" in own.drawn and own.drawn["motion"].configuration.valid.any() for _, _, own in parts)
-        if len(parts) > 1 and all(moving):
-            return designs_figure(parts)
-        if len(parts) > 1 and all(own.command == "workspace" for _, _, own in parts):
-            found = [(words, design, regions(design, own)[0]) for words, design, own in parts]
+        moving = [(words, own.shown, own.motion) for words, own in parts
+                  if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
+        if len(parts) > 1 and len(moving) == len(parts):
+            return designs_figure(moving)
+        found = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
+                 if own.region is not None]  # fmt: skip
+        if len(parts) > 1 and len(found) == len(parts):
             figure = regions_figure(found, "some designs of the front where they are best conditioned")
-            for axes, (_, _, own) in zip(figure.axes, parts, strict=True):
+            for axes, (_, own) in zip(figure.axes, parts, strict=True):
                 _draw_contained(axes, own)
             return figure
-    best, own = result.drawn["design"](designs.design(designs.best))
-    words = listed(designs.design(designs.best))
-    if own.command == "workspace":
-        region = regions(best, own)[0]
+    best, words = drawn.best, listed(designs.design(designs.best))
+    if best.region is not None:
+        region = regions(best.study, best.region)[0]
         there = f", at {region.title}" if region.title else ""
-        dotted = "; dotted: what it contains" if own.drawn["contained"] else ""
-        figure = workspace_figure(best, own, region, f"the best design, {words}{there}{dotted}")
-        _draw_contained(figure.axes[0], own)
+        dotted = "; dotted: what it contains" if best.contained else ""
+        title = f"the best design, {words}{there}{dotted}"
+        figure = workspace_figure(best.study, DrawnRegion.of(best.region), region, title)
+        _draw_contained(figure.axes[0], best)
         return figure
     # A title may be broken between variables only.
     words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
-    if "motion" in own.tables:
-        return design_figure(best, own, words)
-    return mechanism_figure(best, own, words)
+    if best.motion is not None:
+        return design_figure(best.study, best.motion, words)
+    return sketch_and_first_pose(best.study, best.shown, words)
 
 
-def _draw_contained(axes: Axes, own: Result) -> None:
+def _draw_contained(axes: Axes, own: DrawnDesign) -> None:
     """Outline of what a workspace is to contain."""
-    for shape, centre in own.drawn["contained"]:
+    for shape, centre in own.contained:
         z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
         axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
 

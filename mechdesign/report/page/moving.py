@@ -10,12 +10,15 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.optimize.analysis import DrawnDesigns
 from mechdesign.analyses.poses import Shown, SolvedPoses, expand_outputs
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.kinematics.paths import path_looks
@@ -47,24 +50,27 @@ _WHY = {
 _RATES = ("velocity", "acceleration")
 
 
-def moving(study: Study, result: Result) -> Moving | None:
+def moving(study: Study, result: Result, before: Before | None = None) -> Moving | None:
     """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace.
 
-    Of an optimisation it is that of the best design.
+    Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
     """
     name = f"{result.command}-curves"
-    if result.command == "optimize":
-        designs = result.drawn["designs"]
-        study, result = result.drawn["design"](designs.design(designs.best))
+    if isinstance(result.drawn, DrawnDesigns):
+        best = result.drawn.best
+        judged = best.region or best.motion
+        if judged is None:
+            return None
+        study, result = best.study, judged
     with style.context():
-        if "motion" in result.drawn and result.drawn["poses"].motion:
-            return _motion(study, result, name)
+        if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
+            return _motion(study, result, result.drawn.shown, name, before)
         return roaming(study, result) if "local" in result.tables else None
 
 
-def _motion(study: Study, result: Result, name: str) -> Moving | None:
+def _motion(study: Study, result: Result, motion: Shown, name: str, before: Before | None) -> Moving | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
-    whole = Sweep.of(result.drawn["motion"])
+    whole = Sweep.of(motion)
     some = evenly(len(whole.rows), MAX_POSES)
     shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
     sweep = Sweep.of(shown)
@@ -85,7 +91,7 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
         [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
         for given in sweep.poses.values if given in table
     ]  # fmt: skip
-    figure, beside = curves_figure(study, result), ""
+    figure, beside = curves_figure(study, result.tables, motion.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
         data["curves"] = _curves(study, sweep, figure, table, numbers)

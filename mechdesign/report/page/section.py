@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import explain
+from mechdesign.report.before import Before
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
 from mechdesign.report.tables import cells, json_text, plain
@@ -29,8 +30,8 @@ _NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIG
 
 
 def section(
-    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[Caution], *,
-    plots: bool,
+    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[Caution],
+    before: Before | None = None, *, plots: bool,
 ) -> tuple[dict[str, Any], tuple[Caution, ...]]:  # fmt: skip
     """The part of a report that a result fills, and a warning if the mechanism cannot be shown moving.
 
@@ -40,13 +41,15 @@ def section(
         HTML of the pictures of the question by their names.
     mechanism : str
         HTML of the drawing of the mechanism; empty where there is none.
+    before : Before, optional
+        The study before, whose curves stand beside the mechanism that moves, too.
     plots : bool
         Whether pictures are wanted; without them nothing moves.
     """
     part, warnings = None, tuple(undrawn)
     if plots and not result.interrupted:
         try:
-            part = moving(study, result.seen)
+            part = moving(study, result.seen, before)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))

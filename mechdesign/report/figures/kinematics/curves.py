@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.overlay import DASHES, name_both
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.scene import ranks
-from mechdesign.results import Column, Result, Table
-from mechdesign.study import Study, Units
+from mechdesign.results import Column, Table
+from mechdesign.study import Poses, Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12
@@ -78,18 +79,19 @@ class _Panel(NamedTuple):
         return -(-len(self.curves) // self.columns) + bool(self.left_out)
 
 
-def curves_figure(study: Study, result: Result) -> Figure | None:
+def curves_figure(
+    study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None
+) -> Figure | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
-    table = result.tables["motion"]
-    if not moving_names(result.drawn["poses"]):
+    table = tables["motion"]
+    if not moving_names(poses):
         return None
-    over = abscissa(study, result.drawn["poses"])
+    over = abscissa(study, poses)
     swept, x = over.name, over.values
     panels = _panels(study, table, swept, x)
     if not panels:
         return None
-    before = known(result.drawn)
-    limits, marks = result.tables.get("limits"), []
+    limits, marks = tables.get("limits"), []
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
@@ -220,7 +222,7 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
 
 def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
     """The curves of the study before, dashed, each in the colour of its name."""
-    table, x = before.result.tables["motion"], abscissa(before.study, before.result.drawn["poses"]).values
+    table, x = before.result.tables["motion"], abscissa(before.study, DrawnMotion.of(before.result).shown.poses).values
     low, high = axis.get_ylim()
     for curve in panel.curves:
         if curve.column.name in table:

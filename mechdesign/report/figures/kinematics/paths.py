@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
+from mechdesign.analyses.poses import Shown
 from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
@@ -21,7 +24,7 @@ from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.report.figures.shapes import link_colors
-from mechdesign.results import Result, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
@@ -65,7 +68,7 @@ def paths_figure(
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    earlier = Sweep.of(before.result.drawn["motion"]) if before is not None else None
+    earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
     centrodes = _centrodes(sweep, centres)
     middle, *sides = extent(sweep.extent)
     near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
@@ -201,16 +204,15 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     return sorted(found, key=lambda look: look.rank)
 
 
-def modes_figure(study: Study, result: Result) -> Figure:
-    """A panel an assembly that has a valid pose, as many as the result carries, on one scale."""
-    shown = [(title, Sweep.of(each)) for title, each in result.drawn["modes"].items()]
-    found = result.counts["modes"]
-    moving = int((result.tables["modes"]["valid"].reshape(found, -1) > 0).any(axis=1).sum())
+def modes_figure(study: Study, table: Table, modes: Mapping[str, Shown], count: int) -> Figure:
+    """A panel an assembly that has a valid pose, as many of all as there are `modes`, on one scale."""
+    shown = [(title, Sweep.of(each)) for title, each in modes.items()]
+    moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
     notes = []
     if moving > len(shown):
         notes.append(f"{len(shown)} of {moving} assemblies")
-    if found > moving:
-        notes.append(f"{found - moving} of {found} assemblies have no valid pose")
+    if count > moving:
+        notes.append(f"{count - moving} of {count} assemblies have no valid pose")
     places = np.concatenate([sweep.extent for _, sweep in shown])
     columns, window = tiled(places, len(shown), _MAX_COLUMNS, gap=_GAP, pads=_PADS, page=_PAGE, least=_MIN_HEIGHT)
     unit, top = study.units.label("length"), _NOTE if notes else 0.0

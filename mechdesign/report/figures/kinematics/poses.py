@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
@@ -21,7 +22,6 @@ from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, window
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.scene import Sweep, pose, ranks
-from mechdesign.results import Result
 from mechdesign.study import Study
 
 _MAX_COLUMNS = 3
@@ -73,13 +73,12 @@ _KINDS = (
 )
 
 
-def poses_figure(study: Study, result: Result) -> Figure | None:
+def poses_figure(study: Study, sweep: Sweep, drawn: DrawnMotion) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
-    found: SpecialPoses = result.drawn["special"]()
+    found = drawn.special
     centres = list(found.shown[0].centres) if found.shown else []
-    if not found.shown or not (found.special or found.rates or centres or result.drawn["poses"].listed):
+    if not found.shown or not (found.special or found.rates or centres or sweep.poses.listed):
         return None
-    sweep = Sweep.of(result.drawn["motion"])
     mechanism, points = study.mechanism, _pointing(study)
     places = [mechanism_places(sweep, each) for each in found.shown]
     middle, wide, tall = extent(np.concatenate(places))
@@ -97,7 +96,7 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
     above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
-    heading = style.folded(_heading(found, result), 11, style.width() - LEFT - RIGHT)
+    heading = style.folded(_heading(found, listed=sweep.poses.listed), 11, style.width() - LEFT - RIGHT)
     top = _HEADING + _HEADING_LINE * heading.count("\n") + _KEY * (arrows + len(rows))
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
     for axes, title, each in zip(grid, titles, found.shown, strict=True):
@@ -162,8 +161,8 @@ def _title(each: SpecialPose, rates: bool, letters: int) -> str:
     return "\n".join(textwrap.fill(line, letters) for line in (each.where, what) if line)
 
 
-def _heading(found: SpecialPoses, result: Result) -> str:
-    heading = "poses asked for" if result.drawn["poses"].listed else "poses spread evenly over the motion"
+def _heading(found: SpecialPoses, *, listed: bool) -> str:
+    heading = "poses asked for" if listed else "poses spread evenly over the motion"
     if found.special:
         ends = [each.what.startswith(LIMIT) for each in found.shown if each.what]
         singular = [each.what.startswith(SINGULAR) for each in found.shown if each.what]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
 )
 from mechdesign.report.figures.scene import Sweep
-from mechdesign.results import Result
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Transmission angles that textbooks call good, degrees.
@@ -55,16 +56,14 @@ class Transmission(NamedTuple):
     at: float
 
 
-def transmission_figure(study: Study, result: Result) -> Figure | None:
+def transmission_figure(study: Study, tables: Mapping[str, Table], sweep: Sweep) -> Figure | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
-    poses = result.drawn["poses"]
     section = study.kinematics
-    if not moving_names(poses):
+    if not moving_names(sweep.poses):
         return None
-    over = abscissa(study, poses)
-    sweep = Sweep.of(result.drawn["motion"])
+    over = abscissa(study, sweep.poses)
     x = over.values[sweep.rows]
-    loops = transmissions(study, result, sweep, over)
+    loops = transmissions(study, tables.get("loops"), sweep, over)
     asked = list((section.mechanical_advantage if section is not None else {}).items())
     names = asked[:MOST_ADVANTAGES]
     if not loops and not names:
@@ -84,9 +83,9 @@ def transmission_figure(study: Study, result: Result) -> Figure | None:
     if loops:
         _draw_angles(axes[0], x, loops, over)
         legend_below(figure, *axes[0].get_legend_handles_labels())
-    toggles = result.tables.get("toggles")
+    toggles = tables.get("toggles")
     known = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
-    motion = result.tables["motion"]
+    motion = tables["motion"]
     for axis, (output, given) in zip(axes[bool(loops) :], names, strict=True):
         column = motion.column(f"{output}_advantage")
         large = _draw_advantage(axis, over, column.values, known)
@@ -99,10 +98,9 @@ def transmission_figure(study: Study, result: Result) -> Figure | None:
     return figure
 
 
-def transmissions(study: Study, result: Result, sweep: Sweep, over: Along) -> list[Transmission]:
+def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) -> list[Transmission]:
     """Every loop that has a transmission angle along the motion; the worst is that of the table of loops."""
     found: list[Transmission] = []
-    table = result.tables.get("loops")
     if table is None:
         return found
     for k, loop in enumerate(four_bars(study.mechanism)):

@@ -18,7 +18,6 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import (
     Along,
-    along,
     clear_of_ticks,
     fitting,
     legend_below,
@@ -26,7 +25,7 @@ from mechdesign.report.figures.panels import (
     stack,
     tick_abscissa,
 )
-from mechdesign.results import Result, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 MAX_JOINTS = 6  # curves with a look of their own
@@ -109,13 +108,11 @@ def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
     return sorted(loaded, key=lambda joint: -joint.peak)
 
 
-def joint_force_figures(study: Study, result: Result) -> dict[str, Figure]:
-    """``joint_forces`` over the sweep or path, and ``force_hodographs``; none where no joint bears anything."""
-    poses, section = result.drawn["poses"], study.stiffness
-    over = along(study, poses)
-    if over is None or section is None:
-        return {}
-    forces, moments = borne(result.tables["forces"], poses.count, study.mechanism.size)
+def joint_force_figures(study: Study, table: Table, count: int, over: Along) -> dict[str, Figure]:
+    """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
+    section = study.stiffness
+    assert section is not None
+    forces, moments = borne(table, count, study.mechanism.size)
     if not forces:
         return {}
     loads = [f"{load_in_words(study, load)} at {section.at}" for load in section.loads[:MAX_LOADS]]

@@ -12,11 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO
@@ -36,12 +37,13 @@ _DRIVES_HEIGHT = 1.9  # inches, of a panel
 _SMALL_SYMBOLS = 0.7
 
 
-def workspace_figure(study: Study, result: Result, region: Region, title: str = "") -> Figure:
+def workspace_figure(
+    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
+) -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
     section, mechanism = study.workspace, study.mechanism
     assert section is not None
-    configuration: Configuration = result.drawn["along"]
-    reached, before = np.concatenate([configuration.point(point) for point in mechanism.points]), known(result.drawn)
+    reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
     extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
                              places_before(before)])  # fmt: skip
     where = f" at {region.title}" if region.title else ""
@@ -51,8 +53,8 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     fill(axes, region.local)
     page.ends([region])
     draw_before(axes, before)
-    for index in range(len(configuration.reason)):
-        draw_mechanism(axes, mechanism, configuration, index, faint=True)
+    for index in range(len(drawn.along.reason)):
+        draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
     name_both(page.figure, before)
     return page.figure

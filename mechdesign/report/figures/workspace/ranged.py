@@ -13,7 +13,7 @@ from matplotlib.path import Path
 
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
@@ -33,7 +33,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
 
 
-def range_figures(study: Study, result: Result) -> dict[str, Figure]:
+def range_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
     """``workspace``: the region and what ends it, with the sketch; ``range``: which value decides there."""
     section = study.workspace
     assert section is not None
@@ -49,7 +49,7 @@ def range_figures(study: Study, result: Result) -> dict[str, Figure]:
     title = f"point {section.point} {'at every' if over.all else 'at some'} {ends}"
     tables = [table for _, table in shown]
     return {
-        "workspace": _region(study, shown, titles, title, known(result.drawn)),
+        "workspace": _region(study, shown, titles, title, before),
         "range": _deciding(study, tables, titles, name, style.axis_label(name, unit)),
     }
 
