@@ -59,7 +59,7 @@ def _kind(result: Result) -> str:
 
 
 def _names(study: Study, before: Study) -> tuple[str, str]:
-    """Files, with overrides where both have the name of one."""
+    """Labels of both studies, with their overrides where the labels are the same."""
     names = study.label, before.label
     if names[0] != names[1]:
         return names

@@ -1,4 +1,4 @@
-"""Write a result: tables, pictures, and last the manifest that vouches for them."""
+"""Write a result: tables, pictures, and last the manifest that lists them with their hashes."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from mechdesign.report.figures.rendering import Gallery
 
 DIMENSIONS = "dimensions"  # of `check`
-CREATOR = "mechdesign"  # by which a drawing is known that no manifest lists
+CREATOR = "mechdesign"  # mark of drawings that no manifest lists
 FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
 _UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")
-# Ends the names under which pictures stand as HTML.
+# Ending of the names of pictures as HTML.
 INLINE = ".html"
 
 
@@ -101,7 +101,7 @@ def write(
 
 
 def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
-    """The bytes of a table's file, block by block; tells how far those of a long one are."""
+    """The bytes of a table's file, block by block, with progress for a long table."""
     long = isinstance(table, LongTable)
     if long:
         progress.start(len(table), f"rows of {table.name}.csv")
@@ -111,7 +111,7 @@ def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
 
 
 def _check_room(directory: Path, result: Result) -> None:
-    """Find out before long tables are written that the disk would not hold them."""
+    """Check that the disk has room for long tables before they are written."""
     need = 0.0
     for table in result.tables.values():
         if isinstance(table, LongTable) and len(table.seen):
@@ -194,7 +194,7 @@ def figures(study: Study, result: Result, before: Before | None = None) -> Galle
 
     gallery = Gallery()
     shown = (study, result.seen) if before is None else (study, result.seen, before)
-    # What all pictures of a command share may fail too.
+    # Preparations that all pictures of a command share may fail, too.
     gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, *shown)
     return gallery
 

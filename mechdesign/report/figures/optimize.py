@@ -33,14 +33,14 @@ from mechdesign.study import Study
 MIN_MAP_DESIGNS = 9
 MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
-# More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
+# More lines than this merge into a blot: of more designs some are drawn, evenly spread in the order of their score.
 MAX_LINES = 300
-# Steps along a variable in which the best of scattered designs is found, and how many values no grid exceeds.
+# Scattered designs: the best in each of so many steps of a variable is taken. A grid has at most so many values.
 ENVELOPE_STEPS = 40
 MAX_VALUES = 200
-# Fewer designs of a grid are drawn as they are, a cell each: what a field shows between them is not known.
+# Fewer designs of a grid are drawn as cells, without interpolation.
 FEWEST_OF_FIELD = 1000
-# Directions from the centre of what the workspace contains to its outline.
+# Angles at which the outline of a contained shape is drawn.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _LETTER = 0.08  # inches
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
@@ -71,7 +71,7 @@ def figures(study: Study, result: Result) -> Gallery:
 
 
 def _optimum(drawn: DrawnDesigns, front: Table | None) -> Figure:
-    """The best design itself: in its workspace where that was judged, in its motion where that was.
+    """The best design: in its workspace if that was judged, else in its motion.
 
     Of a front those that are marked in it, side by side.
     """
@@ -83,10 +83,10 @@ def _optimum(drawn: DrawnDesigns, front: Table | None) -> Figure:
                   if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
         if len(parts) > 1 and len(moving) == len(parts):
             return designs_figure(moving)
-        found = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
+        judged_regions = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
                  if own.region is not None]  # fmt: skip
-        if len(parts) > 1 and len(found) == len(parts):
-            figure = regions_figure(found, "some designs of the front where they are best conditioned")
+        if len(parts) > 1 and len(judged_regions) == len(parts):
+            figure = regions_figure(judged_regions, "some designs of the front where they are best conditioned")
             for axes, (_, own) in zip(figure.axes, parts, strict=True):
                 _draw_contained(axes, own)
             return figure
@@ -135,7 +135,7 @@ def score_curves(designs: Designs) -> Figure:
                       label="designs")  # fmt: skip
         axes.locator_params(axis="x", nbins=6)
         chosen_only = tick(axes.xaxis, designs, name)
-        # Nothing lies between choices.
+        # There are no values between choices.
         axes.plot(column[best], score[best], "_" if chosen_only else "-", color=style.INK, markersize=18,
                   markeredgewidth=2.0, linewidth=1.6 if count > 1 else 2.0,
                   label="best near each value" if count > 1 else told)  # fmt: skip
@@ -322,8 +322,8 @@ def convergence(designs: Designs) -> Figure:
                   markeredgewidth=0, label="designs")  # fmt: skip
         axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
         axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
-        found = so_far[known]
-        if (found > 0).all() and found.max() > 20 * found.min():
+        best_values = so_far[known]
+        if (best_values > 0).all() and best_values.max() > 20 * best_values.min():
             axes.set_yscale("log")
         axes.set_ylabel(folded(label(designs, goal.name)))
     axes.set_xlabel("designs evaluated")

@@ -38,7 +38,7 @@ _LETTERS_AN_INCH = 13.5
 _CURVE_POSES = 240  # of the motion between listed poses
 # Of more poses the values are joined by a line.
 _MAX_DOTS = 15
-# Of places, by whether there are few.
+# Looks of wanted and reached places, for few places and for many.
 _LOOKS: dict[tuple[str, bool], dict[str, Any]] = {
     ("wanted", True): {"linestyle": "none", "marker": "x", "markersize": 6, "markeredgewidth": 1.5, "zorder": 4.6},
     ("reached", True): {"linestyle": "none", "marker": "o", "markersize": 2.6, "zorder": 4.5},
@@ -62,14 +62,14 @@ class Reached(NamedTuple):
 
 
 def reached(table: Table) -> list[Reached]:
-    """Outputs with targets of a table of motion; a path's error as the distance from it, if as nothing else."""
-    found = []
+    """Outputs with targets in a table of motion; the distance from a path only if there is no other error."""
+    outputs = []
     for column in table.columns:
         output = column.name.removesuffix("_error")
         if output != column.name and np.isfinite(column.values).any():
             known = output in table
-            found.append(Reached(output, column.unit, table[output] if known else None, column.values))
-    return [each for each in found if each.values is not None] or found
+            outputs.append(Reached(output, column.unit, table[output] if known else None, column.values))
+    return [each for each in outputs if each.values is not None] or outputs
 
 
 def design_figure(study: Study, motion: Result, words: str) -> Figure:
@@ -131,7 +131,7 @@ def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
 
 
 def _worst(shown: Sequence[Reached], valid: Ints) -> int:
-    """The valid pose with the largest error, in deviations of each output's own; the first without targets."""
+    """The valid pose with the largest error relative to the worst of its output; the first pose without targets."""
     if not shown:
         return int(valid[0])
     far = np.nanmax([np.abs(each.error) / (each.worst or 1.0) for each in shown], axis=0)
@@ -141,13 +141,13 @@ def _worst(shown: Sequence[Reached], valid: Ints) -> int:
 def _wanted(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
     """Places where points should be at the poses, by point: what they reach less the error."""
     errors = {each.output: each.error for each in shown}
-    found: dict[str, Complexes] = {}
+    wanted: dict[str, Complexes] = {}
     for point in dict.fromkeys(output.removesuffix(f".{axis}") for output in errors for axis in "xy"):
         names = [f"{point}.{axis}" for axis in "xy"]
         if all(name in table for name in names) and any(name in errors for name in names):
             x, y = (table[name] - errors.get(name, 0.0) for name in names)
-            found[point] = x + 1j * y
-    return found
+            wanted[point] = x + 1j * y
+    return wanted
 
 
 def _draw_wanted(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
@@ -175,7 +175,7 @@ def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float)
 
 
 def _between(sweep: Sweep) -> dict[str, Complexes]:
-    """Paths of the points while a single drive runs through its listed values; none where it does not meet them."""
+    """Paths of the points while a single drive runs through its listed values; none if they miss the listed poses."""
     mechanism: Mechanism = sweep.mechanism
     if len(mechanism.drives) != 1 or len(sweep.valid) < 2:
         return {}
@@ -183,12 +183,12 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     values = np.asarray(sweep.configuration.value(drive))[sweep.valid]
     moved = mechanism.forward.solve([np.linspace(values.min(), values.max(), _CURVE_POSES)], limits=False)
     at = mechanism.forward.solve([values], limits=False)
-    found = {}
+    paths = {}
     for point, path in sweep.places.items():
         same = np.abs(np.asarray(at.point(point)) - path[sweep.valid]) <= 1e-6 * mechanism.size
         if same.all():
-            found[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
-    return found
+            paths[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
+    return paths
 
 
 def _missed(each: Reached) -> str:

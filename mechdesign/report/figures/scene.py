@@ -280,12 +280,12 @@ def ranks(study: Study) -> dict[str, int]:
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
     asked = {name.split(".")[0] for name in (section and section.outputs) or ()}
-    found = {}
+    rank = {}
     for point in mechanism.points:
         if point in ground:
             continue
         if point in asked or (uses[point] == 1 and point not in simple):
-            found[point] = 2
+            rank[point] = 2
         else:
-            found[point] = 0 if point in simple else 1
-    return found
+            rank[point] = 0 if point in simple else 1
+    return rank

@@ -1,4 +1,4 @@
-"""What stands of one question in a report, as plain data: it is kept in the question's folder, as ``report.json``."""
+"""The part of a report about one question, as plain data: ``report.json`` in the folder of the question."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mechdesign.report.tables import cells, json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-# Of a mechanism that moves: the picture of the same curves is left out.
+# Beside a moving mechanism this picture of the same curves is left out.
 CURVES = "motion"
-# Tables of more rows than this are shown by their first ones.
+# Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
-# A table of few rows and many columns is turned: a line a column, with its meaning.
+# A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
 _DIGITS = 6

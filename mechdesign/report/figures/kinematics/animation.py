@@ -95,8 +95,8 @@ def _palette(pictures: list[Image.Image]) -> Image.Image:
     sheet = Image.new("RGB", (width, height * len(some)))
     for k, picture in enumerate(some):
         sheet.paste(picture, (0, k * height))
-    found = sheet.quantize(colors=_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    colors = np.array(found.getpalette()).reshape(-1, 3)
+    quantized = sheet.quantize(colors=_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colors = np.array(quantized.getpalette()).reshape(-1, 3)
     # Means of the lightest colours are not quite the white of the page.
     colors[colors.min(axis=1) >= _WHITE] = 255
     palette = Image.new("P", (1, 1))

@@ -128,7 +128,7 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): mechanism.size}
     # The condition of a single number is 1, that of each pose is for its table.
     left_out = {"conditioning"} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
-    found: dict[tuple[str, str], list[_Curve]] = {}
+    groups: dict[tuple[str, str], list[_Curve]] = {}
     for column in table.columns:
         if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
             continue
@@ -146,10 +146,10 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
         told = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
         if not told and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
             continue
-        found.setdefault((order, column.unit), []).append(_Curve(column, of, order))
+        groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
     rank = ranks(study)
     panels = []
-    for curves in sorted(found.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
+    for curves in sorted(groups.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
         if len(curves) > MAX_CURVES:
             curves.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
         panels.append(_Panel(curves[:MAX_CURVES], max(len(curves) - MAX_CURVES, 0)))
@@ -170,15 +170,15 @@ def _coincide(one: Floats, other: Floats) -> bool:
 def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
     """Ranges of x that are not valid, up to the limit of motion where one lies beside them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], invalid, [False]]).astype(int)))
-    found = []
+    ranges = []
     for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
         ends = []
         for inner, outer in ((first, max(first - 1, 0)), (last, min(last + 1, len(x) - 1))):
             low, high = sorted((x[inner], x[outer]))
             between = limits[(limits >= low) & (limits <= high)] if len(limits) else limits
             ends.append(float(between[0]) if len(between) else float(x[inner] + x[outer]) / 2)
-        found.append((ends[0], ends[1]))
-    return found
+        ranges.append((ends[0], ends[1]))
+    return ranges
 
 
 def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:

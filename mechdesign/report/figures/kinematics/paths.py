@@ -38,11 +38,11 @@ _LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 _TICK = 9.0  # points, across a path
 _MOST_TICKS = 24  # along a motion
 _FEWEST_TICKS = 4
-_UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
+_UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
 # Of centrodes.
 _CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
-_NEAR = 0.75  # larger sides of the mechanism from its middle up to which a centrode widens the window
-_STILL = 1e-9  # sizes of the mechanism that a centre moves which stays
+_NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
+_STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is fixed
 # Of the panels of assemblies.
 _MAX_COLUMNS = 4
 _PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
@@ -112,7 +112,7 @@ def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
     """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
     if centres is None:
         return {}
-    found = {}
+    centrodes = {}
     for name in centres.names:
         pair, _, column = name.rpartition(".")
         links = pair.split(".")
@@ -121,19 +121,19 @@ def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
             path[~np.isfinite(path)] = complex(np.nan, np.nan)
             known = path[np.isfinite(path)]
             if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
-                found[next(link for link in links if link != GROUND)] = path
-    return found
+                centrodes[next(link for link in links if link != GROUND)] = path
+    return centrodes
 
 
 def _leaps(path: Complexes, side: float) -> Flags:
-    """Points from which a path leaps through infinity, by its places about the mechanism's middle."""
+    """Points after which a path passes through infinity; `path` is relative to the mechanism's middle."""
     far = np.abs(path) > side
     turned = (np.conj(path[:-1]) * path[1:]).real < 0
     return np.append(far[:-1] & far[1:] & turned, False)
 
 
 def equal_times(sweep: Sweep) -> tuple[Ints, str] | None:
-    """Poses at equal steps of time, and how long these are in words; None where the swept drive has no one rate."""
+    """Poses at equal steps of time, and the step in words; None where the swept drive has no constant rate."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
     if section is None or not poses.motion or len(moving) != 1 or any(section.accelerations.values()):
@@ -199,9 +199,9 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     for name, link in sweep.mechanism.description.links.items():
         for point in link_points(link) if name != GROUND else ():
             owners.setdefault(point, name)
-    found = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
+    looks = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
              for point, path in sweep.traces.items()]  # fmt: skip
-    return sorted(found, key=lambda look: look.rank)
+    return sorted(looks, key=lambda look: look.rank)
 
 
 def modes_figure(study: Study, table: Table, modes: Mapping[str, Shown], count: int) -> Figure:

@@ -100,9 +100,9 @@ def transmission_figure(study: Study, tables: Mapping[str, Table], sweep: Sweep)
 
 def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) -> list[Transmission]:
     """Every loop that has a transmission angle along the motion; the worst is that of the table of loops."""
-    found: list[Transmission] = []
+    angles: list[Transmission] = []
     if table is None:
-        return found
+        return angles
     for k, loop in enumerate(four_bars(study.mechanism)):
         sine, cosine = loop.squareness(sweep.configuration, 3)
         with np.errstate(invalid="ignore"):
@@ -118,8 +118,8 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
             place = float(over.values[sweep.rows][nearest])
         least = float(np.degrees(table["transmission_min"][k] * study.units.angle_factor))
         least = least if np.isfinite(least) else _off(float(angle[nearest]))
-        found.append(Transmission(loop, angle, least if angle[nearest] <= 90 else 180 - least, place))
-    return found
+        angles.append(Transmission(loop, angle, least if angle[nearest] <= 90 else 180 - least, place))
+    return angles
 
 
 def _label(each: Transmission) -> str:
@@ -201,9 +201,9 @@ def boundless(x: Floats, values: Floats, toggles: Floats) -> Floats:
     inverse = np.where(np.isinf(values), 0.0, 1 / values)
     usual = np.nanmedian(np.abs(values[np.isfinite(values)])) if np.isfinite(values).any() else np.inf
     large = np.abs(values) > usual
-    found = x[np.isinf(values)].tolist()
+    places = x[np.isinf(values)].tolist()
     for k in np.flatnonzero((inverse[:-1] * inverse[1:] < 0) & large[:-1] & large[1:]):
         root = float(x[k] + (x[k + 1] - x[k]) * inverse[k] / (inverse[k] - inverse[k + 1]))
         between = [at for at in toggles.tolist() if min(x[k], x[k + 1]) <= at <= max(x[k], x[k + 1])]
-        found.append(min(between, key=lambda at: abs(at - root)) if between else root)
-    return np.sort(np.array(found, dtype=float))
+        places.append(min(between, key=lambda at: abs(at - root)) if between else root)
+    return np.sort(np.array(places, dtype=float))

@@ -20,7 +20,7 @@ from mechdesign.study.poses import Poses
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """Whatever the result holds enough of to draw."""
+    """Pictures of errors and failures that the tables of the result have data for."""
     drawn, tables = DrawnErrors.of(result), result.tables
     poses, samples = drawn.poses, drawn.samples
     swept, over = along(study, poses), plane(study, poses)
@@ -44,7 +44,7 @@ def figures(study: Study, result: Result) -> Gallery:
 def _sampled(study: Study, tables: Mapping[str, Table], poses: Poses, samples: Samples) -> Gallery:
     """Pictures of the tables that only methods which draw samples give."""
     gallery = Gallery()
-    # The tables are of the first method that samples errors; the moments hold its name.
+    # The tables are those of the first sampling method, which the moments name.
     method = next(name for name in tables["moments"]["method"].tolist() if look(name).sampled)
     makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {
         "density": density_figures, "histogram": histogram_figure, "convergence": convergence_figure,

@@ -77,7 +77,7 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
     names, on, by = (table[name][:joints].tolist() for name in ("joint", "on", "by"))
     forces, moments = [], []
     for k, name in enumerate(names):
-        # The load itself, at a point of one link.
+        # This is the load itself, at a point of one link.
         if on[k] == "asked" and on.count("asked") == 1:
             continue
         massless = on[k] == "asked" or on[k].startswith(("pin:", "slot:"))
@@ -94,7 +94,7 @@ def _peak(joints: Sequence[Joint]) -> float:
 
 
 def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
-    """Joints whose peak exceeds rounding, largest first; joints with equal magnitudes everywhere share one curve."""
+    """Joints with a peak above rounding, largest first; joints with equal magnitudes at every pose share one curve."""
     loaded: list[Joint] = []
     for joint in joints:
         if joint.peak <= rounding:
@@ -162,7 +162,7 @@ def _in_powers(axis: Axis, name: str, unit: str, most: float) -> None:
 def _mark_worst(
     study: Study, axes: Axes, names: Sequence[str], values: Floats, unit: str, over: Along
 ) -> str:  # fmt: skip
-    """Mark the largest value of curves, shape (joints, poses), and say it; an axis ends where few poses go beyond."""
+    """Mark the largest of some values, shape (joints, poses), and return it in words; rare peaks leave the axis."""
     sizes = np.nan_to_num(np.abs(values), nan=0.0, posinf=0.0)
     which, row = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
     least, most = np.nanmin(values, initial=0.0), float(sizes[which, row])
@@ -186,7 +186,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
     shown = np.array([joint.values[:, : len(loads)] for joint in joints])
     some = [number for number in range(len(loads)) if np.nan_to_num(shown[:, :, number]).any()]
     known = shown[np.isfinite(shown)]
-    # As of the curves: what grows without bounds near a singularity is left out.
+    # As for the curves, peaks near a singularity are left out.
     places = np.append(known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)], 0.0)
     columns, unit = len(some), study.units.label("force")
     window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
@@ -216,7 +216,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
 
 
 def _hodograph(axes: Axes, forces: Complexes, look: Mapping[str, Any]) -> None:
-    """The way of a force's tip, its first and its largest, and arrows that say which way it runs."""
+    """Hodograph of a force with its first and its largest value, and arrows in the direction of motion."""
     axes.plot(forces.real, forces.imag, linewidth=1.6, **look)
     known = forces[np.isfinite(forces)]
     if not len(known):

@@ -15,7 +15,7 @@ _LONGEST_NOTE = 900.0  # points of type times letters that fill a line above the
 _NOTE_SHARE = 0.65  # of the width of a narrow page
 _FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
 _LOGARITHMIC = 5.0  # ratio of values above which their axis is logarithmic
-# Such an axis ends at this ratio beyond what all but this share of the stiffnesses at either end are.
+# A logarithmic axis ends this factor beyond the quantiles at this share and its complement.
 _BEYOND = 10.0
 _TAIL = 0.04
 
@@ -51,7 +51,7 @@ def curves_figure(study: Study, table: Table, over: Along) -> Figure | None:
         low, high = axis.dataLim.intervaly
         if high > _LOGARITHMIC * low > 0:
             axis.set_yscale("log")
-            # Near a singularity a stiffness grows or vanishes without bounds; what it is elsewhere stays legible.
+            # Near a singularity a stiffness grows without bound or vanishes; elsewhere it stays legible.
             every = np.concatenate(
                 [table[name][np.isfinite(table[name]) & (table[name] > 0)] for name in curves or flat]
             )

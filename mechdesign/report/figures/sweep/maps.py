@@ -1,4 +1,4 @@
-"""Response maps: each result over two numbers that vary, with the bounds of what is required and where they are met."""
+"""Response maps: each result over two numbers that vary, with the limits of the requirements."""
 
 from __future__ import annotations
 

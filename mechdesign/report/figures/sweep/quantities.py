@@ -17,7 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.results import Column, Table
 from mechdesign.study.text.units import Amount
 
-# More values than that are gathered into classes of as many cases.
+# More values than this are gathered into classes of equal numbers of cases.
 MOST_VALUES = 12
 CLASSES = 8
 MOST_LETTERS = 10  # of a word at an axis
@@ -195,12 +195,12 @@ def title(words: str) -> tuple[str, float]:
 
 
 def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], what: str) -> str:
-    """How many quantities, each of which is a `what`, have no room."""
+    """How many entries or results (`what`) have no room, in words."""
     left = len([each for each in all_of if each not in shown])
     return f"; {left} more {what if left == 1 else PLURALS[what]} in sweep.csv" if left else ""
 
 
 def without_number(shown: Sequence[Axis], count: int) -> str:
-    """How many cases have not every number."""
+    """How many cases lack a number, in words."""
     lost = int(np.isnan([each.values for each in shown]).any(axis=0).sum())
     return f"; {lost} of {counted(count, 'case')} without a number left out" if lost else ""

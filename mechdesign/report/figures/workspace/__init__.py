@@ -29,18 +29,18 @@ def figures(study: Study, result: Result, before: Before | None = None) -> Mappi
         return path_figures(study, result, before)
     if "local" not in result.tables:
         return range_figures(study, result, before)
-    found = regions(study, result)
-    if not found:
+    shown = regions(study, result)
+    if not shown:
         return {}
     gallery = Gallery()
-    gallery.add("of indices", map_figures, study, found)
-    if len(found) == 1:
+    gallery.add("of indices", map_figures, study, shown)
+    if len(shown) == 1:
         drawn = DrawnRegion.of(result)
-        gallery.add("workspace", workspace_figure, study, drawn, found[0], before=before)
-        gallery.add("ellipses", ellipses_figure, study, found[0], drawn.ellipses)
+        gallery.add("workspace", workspace_figure, study, drawn, shown[0], before=before)
+        gallery.add("ellipses", ellipses_figure, study, shown[0], drawn.ellipses)
     else:
-        gallery.add("workspace", side_by_side, study, found, before)
-    gallery.add("inscribed", inscribed_figure, study, result, found)
-    if any(len(region.boundary) for region in found):
-        gallery.add("drives", drives_figure, study, found)
+        gallery.add("workspace", side_by_side, study, shown, before)
+    gallery.add("inscribed", inscribed_figure, study, result, shown)
+    if any(len(region.boundary) for region in shown):
+        gallery.add("drives", drives_figure, study, shown)
     return gallery

@@ -60,10 +60,10 @@ def workspace_figure(
     return page.figure
 
 
-def side_by_side(study: Study, found: Sequence[Region], before: Before | None) -> Figure:
+def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
     """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
     title = "the mechanism where it is best conditioned"
-    return regions_figure([(region.title, study, region) for region in some(found)], title, before)
+    return regions_figure([(region.title, study, region) for region in some(regions)], title, before)
 
 
 def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
@@ -100,12 +100,12 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     return plan.solve(np.broadcast_arrays(*values), limits=False)
 
 
-def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> Figure | None:
+def inscribed_figure(study: Study, result: Result, regions: Sequence[Region]) -> Figure | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
     table = result.tables["indices"]
     if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
         return None
-    shown = some(found)
+    shown = some(regions)
     places = np.concatenate([region.places() for region in shown])
     page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
                  bar=False)  # fmt: skip
@@ -132,12 +132,12 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
     return page.figure
 
 
-def drives_figure(study: Study, found: Sequence[Region]) -> Figure:
+def drives_figure(study: Study, regions: Sequence[Region]) -> Figure:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
     names, mechanism = study.mechanism.drives, study.mechanism
     parts = [
         (region.boundary, side, region.title)
-        for region in some([region for region in found if len(region.boundary)])
+        for region in some([region for region in regions if len(region.boundary)])
         for side in SIDES
         if (region.boundary["side"] == side).any()
     ][:MAX_PANELS]
@@ -184,9 +184,9 @@ def draw_before(axes: Axes, before: Before | None, held: Mapping[str, float] | N
 
 
 def places_before(before: Before | None) -> Complexes:
-    """Every place that it draws."""
-    found = [*_lines(before), sketch_places(before.study)] if before is not None else []
-    return np.concatenate([np.empty(0, dtype=complex), *found])
+    """All points of what is drawn of the study before."""
+    curves = [*_lines(before), sketch_places(before.study)] if before is not None else []
+    return np.concatenate([np.empty(0, dtype=complex), *curves])
 
 
 def sketch_places(study: Study) -> Complexes:

@@ -18,7 +18,7 @@ from mechdesign.report.figures.workspace.regions import ROOM, coloured, pieces, 
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-# The largest speed ratios may belong to dead centres, where they grow without bounds: this share has its own colours.
+# Speed ratios grow without bound at dead centres: colours end at this quantile.
 _SHOWN_RATIOS = 0.97
 
 
