@@ -99,9 +99,8 @@ def sketch_figure(study: Study) -> Figure:
     mechanism = study.mechanism
     scene = pose(mechanism, mechanism.sketch_configuration)
     assert scene is not None
-    places = [*scene.points.values(), *(end for guide in scene.guides for end in guide.ends({}, scene.span))]
     drawn = mechanism.description.sketch
-    figure, axes = framed([*places, *drawn.values()], study.units.label("length"), height=5.4, above=_TITLE)
+    figure, axes = framed([*scene.places({}), *drawn.values()], study.units.label("length"), height=5.4, above=_TITLE)
     ends = np.array([(place, scene.points[name]) for name, place in drawn.items()], dtype=complex).reshape(-1, 2)
     moves = paper(axes, ends[:, 0]) - paper(axes, ends[:, 1])
     rough = ends[np.hypot(*moves.T) > _ROUGH]
@@ -130,9 +129,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     for _, configuration, index in panels:
         scene = pose(mechanism, configuration, index)
         assert scene is not None
-        places += scene.points.values()
-        for guide in scene.guides:
-            places += guide.ends(travel, scene.span)
+        places += scene.places(travel)
     count = len(panels)
     beside, stacked = fit(places, *_room(count, 1)), fit(places, *_room(1, count))
     columns, window = (count, beside) if beside.scale >= 0.55 * stacked.scale else (1, stacked)

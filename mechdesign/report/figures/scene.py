@@ -69,6 +69,10 @@ class Scene:
         """Names of a link's points, its ends first."""
         return link_points(self.description.links[name])
 
+    def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
+        """Points, and ends of the guides for a range of each slide (see `Guide.ends`)."""
+        return [*self.points.values(), *(end for guide in self.guides for end in guide.ends(travel, self.span))]
+
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
         mine = self.link_points(link)

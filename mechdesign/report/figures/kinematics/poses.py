@@ -118,10 +118,7 @@ def poses_figure(study: Study, sweep: Sweep, drawn: DrawnMotion) -> Figure | Non
 def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:
     """Points and guides of a pose."""
     scene = pose(sweep.mechanism, each.configuration, each.index)
-    if scene is None:
-        return np.empty(0, dtype=complex)
-    ends = [end for guide in scene.guides for end in guide.ends(sweep.travel, scene.span)]
-    return np.array([*scene.points.values(), *ends])
+    return np.array([] if scene is None else scene.places(sweep.travel), dtype=complex)
 
 
 def _pointing(study: Study) -> list[str]:

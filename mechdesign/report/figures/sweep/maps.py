@@ -22,7 +22,7 @@ from mechdesign.report.figures.sweep.quantities import (
     NAME,
     TITLE,
     Axis,
-    draw_ticks,
+    frame,
     kinds_of,
     left_out,
     number_text,
@@ -84,7 +84,7 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
             _draw_gates(axes, plane, gates[k // len(taken)])
         for kind in kinds:
             kind.draw(axes, plane.x.values, plane.y.values, drawn, size)
-        _frame(axes, plane, _room(panels))
+        frame(axes, plane.x, plane.y, _room(panels), _TALL - 1)
     keys += [
         Line2D([], [], color=style.INK, linestyle=_dashes(k), linewidth=1.4, label=_limits_in_words(each))
         for k, each in enumerate(limited)
@@ -154,15 +154,6 @@ def _draw_gates(axes: Axes, plane: Plane, gates: Gates) -> None:
 
 def _dashes(k: int) -> Any:
     return style.DASHES[k % len(style.DASHES)]
-
-
-def _frame(axes: Axes, plane: Plane, room: float) -> None:
-    """Ends, ticks and names of the axes."""
-    axes.set_xlim(*plane.x.span())
-    axes.set_ylim(*plane.y.span())
-    draw_ticks(axes, plane.x, plane.y, room, outer_x=True, outer_y=True)
-    axes.set_xlabel(plane.x.label(room), fontsize=NAME)
-    axes.set_ylabel(plane.y.label(_TALL - 1), fontsize=NAME)
 
 
 def _limits_in_words(limited: Axis) -> str:

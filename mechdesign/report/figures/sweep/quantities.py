@@ -169,8 +169,17 @@ def draw_limits(axes: Axes, of: Axis, *, upright: bool) -> None:
             span(min(limit, end), max(limit, end), color=style.FAINT, alpha=0.18, linewidth=0, zorder=0.5)
 
 
-def draw_ticks(axes: Axes, x: Axis, y: Axis, room: float, *, outer_x: bool, outer_y: bool) -> None:
-    """Few ticks, words where there are words, at the outer edges only; `room` is the width of the panel."""
+def frame(
+    axes: Axes, x: Axis, y: Axis, room: float, tall: float, *, between: float = 0.0, outer_x: bool = True,
+    outer_y: bool = True,
+) -> None:  # fmt: skip
+    """Ends, few ticks and names of the axes of a panel, numbers and names at the outer edges only.
+
+    `room` is the width of the panel, `tall` the height for a name, `between` the part of the gap beside the panel that
+    a name may take (inches).
+    """
+    axes.set_xlim(*x.span())
+    axes.set_ylim(*y.span())
     for axis, of, outer in ((axes.xaxis, x, outer_x), (axes.yaxis, y, outer_y)):
         if of.words:
             letters = MOST_LETTERS if of is y else max(3, int(room / len(of.words) / _LETTER))
@@ -182,6 +191,10 @@ def draw_ticks(axes: Axes, x: Axis, y: Axis, room: float, *, outer_x: bool, oute
             axis.set_major_locator(FixedLocator(values.tolist()))
         axis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value)))
         axis.set_tick_params(labelbottom=outer, labelleft=outer)
+    if outer_x:
+        axes.set_xlabel(x.label(room + between), fontsize=NAME)
+    if outer_y:
+        axes.set_ylabel(y.label(tall), fontsize=NAME)
 
 
 def number_text(value: float) -> str:
