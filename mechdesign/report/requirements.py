@@ -274,11 +274,11 @@ def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> 
     missing = [scope.missing for _, scope in scoped if scope.missing]
     if missing and not requirement.unassembled:
         verdict = replace(verdict, met=False)
-    told = any(
+    isolated = any(
         scope.poses_only or (chosen.statistic and not chosen.picked and chosen.course is None)
         for chosen, scope in scoped
     )
-    notes = [POSES_ONLY] if told else []
+    notes = [POSES_ONLY] if isolated else []
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
 
 

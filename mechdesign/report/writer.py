@@ -88,12 +88,12 @@ def write(
             part, warnings = section.section(study, result, inline, mechanism, warnings, before, plots=asked.plots)
             drawn[pages.SECTION] = section.encoded(part)
         if drawn or more:
-            told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
-            verdicts = judged_again(study, verdicts, told.warnings)
+            final = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+            verdicts = judged_again(study, verdicts, final.warnings)
             own = {*digests, manifest.NAME}
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
-                written.stage(manifest.NAME, [manifest.compose(directory, study, told, verdicts, digests, asked)])
+                written.stage(manifest.NAME, [manifest.compose(directory, study, final, verdicts, digests, asked)])
                 written.commit(own, own, voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
@@ -158,7 +158,7 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     from mechdesign.report.figures.dimensions import dimensions_figure
     from mechdesign.report.figures.mechanism import sketch_figure
 
-    kinds, told = asked.formats.split(","), []
+    kinds, messages = asked.formats.split(","), []
     for name in (MECHANISM, DIMENSIONS):
         for kind in kinds:
             check_marked(directory / f"{name}.{kind}", CREATOR.encode())
@@ -171,12 +171,12 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
                 figure = make(study)
                 drawn = {path: style.encoded(figure, path.suffix[1:], CREATOR) for path in paths}
         except Exception as error:
-            told.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
+            messages.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
             continue
         for path, data in drawn.items():
             write_file(path, data, CREATOR.encode())
-        told.append(f"{what} in {', '.join(map(str, paths))}")
-    return "; ".join(told)
+        messages.append(f"{what} in {', '.join(map(str, paths))}")
+    return "; ".join(messages)
 
 
 def sketch(study: Study) -> bytes:

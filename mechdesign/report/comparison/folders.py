@@ -146,8 +146,8 @@ def notes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     ]
     changed = [name for name in entries[0] | entries[1] if entries[0].get(name) != entries[1].get(name)]
     if changed:
-        told = [f"{name} {entries[0].get(name)} -> {entries[1].get(name)}" for name in changed[:_MOST_ENTRIES]]
-        yield f"study: {', '.join(told)}{', ...' * (len(changed) > _MOST_ENTRIES)}"
+        changes = [f"{name} {entries[0].get(name)} -> {entries[1].get(name)}" for name in changed[:_MOST_ENTRIES]]
+        yield f"study: {', '.join(changes)}{', ...' * (len(changed) > _MOST_ENTRIES)}"
 
 
 def compare_results(
@@ -196,20 +196,20 @@ def compare_results(
         comparison.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
     verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
-        told = [_verdict(verdict.get(words)) for verdict in verdicts]
-        if told[0].split(",")[0] != told[1].split(",")[0]:
-            comparison.differences.append(Difference(folder, "", words, "verdict", old=told[0], new=told[1]))
+        outcomes = [_verdict(verdict.get(words)) for verdict in verdicts]
+        if outcomes[0].split(",")[0] != outcomes[1].split(",")[0]:
+            comparison.differences.append(Difference(folder, "", words, "verdict", old=outcomes[0], new=outcomes[1]))
     ends = [str(content.get("interrupted") or content.get("failed") or "done") for content in (before, after)]
     if ends[0] != ends[1]:
         comparison.differences.append(Difference(folder, "", "", "outcome", old=ends[0], new=ends[1]))
     return fitted
 
 
-def _verdict(told: Mapping[str, Any] | None) -> str:
-    if told is None:
+def _verdict(verdict: Mapping[str, Any] | None) -> str:
+    if verdict is None:
         return "not required"
-    worst = told.get("worst")
-    return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
+    worst = verdict.get("worst")
+    return f"{'met' if verdict['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
 
 
 def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:

@@ -156,7 +156,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
     if study.stiffness is None:
         return
     looks = {"elastic beam": (1.3, (0, (6, 2))), "rigid bracket": (2.2, "-")}
-    told = set()
+    labelled = set()
     for name in study.stiffness.elastic:
         lines = list(_lines(study, name, configuration, index))
         if len(lines) == 1 and len(lines[0][1]) < 3:
@@ -164,9 +164,9 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
         for kind, ends in lines:
             width, dashes = looks[kind]
             axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=_BEAM_ORDER,
-                      label=kind if kind not in told else None)  # fmt: skip
-            told.add(kind)
-    if told:
+                      label=kind if kind not in labelled else None)  # fmt: skip
+            labelled.add(kind)
+    if labelled:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
 
 

@@ -124,7 +124,7 @@ def score_curves(designs: Designs) -> Figure:
     down = -(-count // across)
     figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
     score = designs.cpi if many else designs.values[:, 0]
-    told = "CPI" if many else label(designs, one.name)
+    score_label = "CPI" if many else label(designs, one.name)
     feasible = np.flatnonzero(designs.feasible & np.isfinite(score))
     steep = not many and _steep(score[feasible])
     for number, (name, column) in enumerate(designs.variables.items()):
@@ -138,7 +138,7 @@ def score_curves(designs: Designs) -> Figure:
         # There are no values between choices.
         axes.plot(column[best], score[best], "_" if chosen_only else "-", color=style.INK, markersize=18,
                   markeredgewidth=2.0, linewidth=1.6 if count > 1 else 2.0,
-                  label="best near each value" if count > 1 else told)  # fmt: skip
+                  label="best near each value" if count > 1 else score_label)  # fmt: skip
         for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
             dashes = style.DASHES[(k + 1) % len(style.DASHES)]
             axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
@@ -147,7 +147,7 @@ def score_curves(designs: Designs) -> Figure:
         words = f"best: {listed({name: designs.design(winner)[name]})}"
         axes.set_title(words, loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
-        axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(told))
+        axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(score_label))
         axes.margins(x=0.2 if chosen_only else 0.02)
         if steep:
             axes.set_yscale("log")

@@ -217,8 +217,10 @@ class Sketcher:
 
 def add(parent: Element, kind: str, /, text: str | None = None, **looks: str | float) -> Element:
     """A new element with attributes, whose names have a hyphen for each underscore."""
-    told = {key.replace("_", "-"): look if isinstance(look, str) else _number(look) for key, look in looks.items()}
-    element = SubElement(parent, kind, told)
+    attributes = {
+        key.replace("_", "-"): look if isinstance(look, str) else _number(look) for key, look in looks.items()
+    }
+    element = SubElement(parent, kind, attributes)
     element.text = text
     return element
 

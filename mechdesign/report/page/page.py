@@ -206,12 +206,12 @@ def _about(study: Study) -> dict[str, Any]:
         lines = [*describe(mechanism).splitlines(), *in_words(study.reliability, graph, study.sizes)]
     except Exception as error:
         lines = [explain(error)[1]]
-    told: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}
+    listed: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}
     rest = []
     for line in lines:
         kind, _, words = line.partition(": ")
-        if kind in told:
-            told[kind].append(words)
+        if kind in listed:
+            listed[kind].append(words)
         elif kind not in ("links", "mobility"):
             rest.append(line.strip())
     links = [
@@ -221,7 +221,7 @@ def _about(study: Study) -> dict[str, Any]:
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": listed,
         "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip

@@ -56,13 +56,13 @@ def roaming(study: Study, result: Result) -> Moving | None:
         begin = int(np.argmax(np.nan_to_num(table["inverse_condition"], nan=-1.0)))
         numbers = Numbers(table, np.arange(len(rows)), begin, alike)
         alike = alike or numbers
-        told = [(column.name, [numbers.cell(column)]) for column in table.columns]
+        entries = [(column.name, [numbers.cell(column)]) for column in table.columns]
         links = mechanism.description.links
         step = sheet.scale * max(np.ptp(table[f"{section.point}.{axis}"]) for axis in "xy") / cells
         choice = {"title": region.title, "poses": len(rows), "first": begin, "step": round(step, 1)}
         choices.append(choice | {"numbers": numbers.tracks} | places(sheet, configuration, links))
-        drawn.append((begin, told))
-    (begin, told), (rows, configuration) = drawn[0], solved[0]
+        drawn.append((begin, entries))
+    (begin, entries), (rows, configuration) = drawn[0], solved[0]
     scene = pose(mechanism, configuration, begin)
     assert scene is not None
     root = sheet.root(f"the mechanism in the workspace of point {section.point}")
@@ -84,7 +84,7 @@ def roaming(study: Study, result: Result) -> Moving | None:
     _legend(root, sheet, shown, shown[0].local.column(index) if index else None, norm)
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
     words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
-    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], told)
+    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], entries)
 
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
@@ -112,8 +112,8 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
         drive = study.mechanism.coordinate(name)
         values = np.asarray(in_study_units(study, drive, configuration.value(drive)))
         columns.append(Column(name, np.broadcast_to(values, len(rows)), study.units.label(drive.quantity)))
-    told = [region.local.column(name) for name in index_columns(region)]
-    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in told]
+    indices = [region.local.column(name) for name in index_columns(region)]
+    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in indices]
     return Table("poses", tuple(columns))
 
 

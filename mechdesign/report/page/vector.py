@@ -174,20 +174,20 @@ def _path(text: str) -> str:
         else:
             # One command letter serves all following steps of its kind.
             letter = command.lower()
-            told = _joined(tuple(steps))
-            commands.append((letter if letter != last else "" if told[0] == "-" else " ") + told)
+            way = _joined(tuple(steps))
+            commands.append((letter if letter != last else "" if way[0] == "-" else " ") + way)
             last = letter
         here = points[-1]
     return "".join(commands)
 
 
 def _joined(numbers: tuple[int, ...]) -> str:
-    told = ""
+    joined = ""
     for number in numbers:
         text = f"{number / 10**_DECIMALS:.{_DECIMALS}f}".rstrip("0").rstrip(".")
         text = text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
-        told += text if not told or text[0] == "-" else f" {text}"
-    return told
+        joined += text if not joined or text[0] == "-" else f" {text}"
+    return joined
 
 
 def _ids(root: Element, used: set[str]) -> Iterator[str]:

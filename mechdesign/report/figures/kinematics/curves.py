@@ -143,8 +143,8 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
         if order in ("position", "velocity", "acceleration") and swept and _still(values - x, float(np.ptp(x))):
             continue  # the sweep over itself
         # Of what stands still only the position is drawn, and only where it is an output.
-        told = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
-        if not told and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
+        always = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
+        if not always and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
             continue
         groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
     rank = ranks(study)

@@ -77,8 +77,8 @@ def paths_figure(
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
     words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
              for link in centrodes]  # fmt: skip
-    if told := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
-        above = max(above, TITLE + _LEGEND_LINE * (told - 1))
+    if rows := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
+        above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
     for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)

@@ -75,9 +75,9 @@ def transmission_figure(study: Study, tables: Mapping[str, Table], sweep: Sweep)
         notes.append(f"{len(names)} of {len(asked)} mechanical advantages")
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names))
     loops = sorted(loops, key=lambda each: _off(each.worst))[:MOST_LOOPS]
-    told = [GOOD_WORDS, *map(_label, loops)] if loops else []
-    rows = -(-(len(told) + 1) // fitting(told)) if told else 0  # with the worst of them
-    rows += sum(label.count("\n") for label in told)
+    labels = [GOOD_WORDS, *map(_label, loops)] if loops else []
+    rows = -(-(len(labels) + 1) // fitting(labels)) if labels else 0  # with the worst of them
+    rows += sum(label.count("\n") for label in labels)
     figure, axes = stack(bool(loops) + len(names), heading, over.label, note="; ".join(notes), tall=_TALL,
                          bottom=BELOW_BARE + _LEGEND_LINE * rows)  # fmt: skip
     if loops:

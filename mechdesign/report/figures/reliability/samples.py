@@ -117,8 +117,8 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         axis.locator_params(axis="y", nbins=5)
         axis.tick_params(labelbottom=False)
     if far and not logarithmic:
-        told = ", ".join(f"{limit:+g}" for limit in far)
-        axis.text(0.99, 0.98, f"limit {told} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
+        beyond = ", ".join(f"{limit:+g}" for limit in far)
+        axis.text(0.99, 0.98, f"limit {beyond} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
     axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
     axis.locator_params(axis="x", nbins=4)

@@ -219,16 +219,16 @@ def directions_figure(study: Study, tables: Mapping[str, Table], shown: Shown) -
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_symbol_size(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
         axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
-        angle, said = float(table["k_angle"][row]) * study.units.angle_factor, []
+        angle, title_lines = float(table["k_angle"][row]) * study.units.angle_factor, []
         for name, what, turn, color, dashes in _MAIN_AXES:
             stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
             line = at + scale / stiff * way * np.array([-1, 1])
             axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
-            said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
+            title_lines.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        said = [words, *said, f"drawn {scale / force:g} times as large"]
-        axes.set_title("\n".join(said), loc="left", fontsize=8.5)
+        title_lines = [words, *title_lines, f"drawn {scale / force:g} times as large"]
+        axes.set_title("\n".join(title_lines), loc="left", fontsize=8.5)
     handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
                for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
     legend_at_left(figure, handles, len(handles))

@@ -103,8 +103,8 @@ def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, r
     kinds, (drawn, dot) = kinds_of(table, required=required), sample(table, MOST_DRAWN)
     cases = "cases" if len(drawn) == len(table) else f"an even sample of {len(drawn):,} of {len(table):,} cases"
     limits = "; grey: not met" if any(each.limits for each in taken) else ""
-    told = left_out(entries, taken, "entry") + left_out(results, taken, "result")
-    head, top = title(f"{cases}: every two quantities against each other{limits}{told}")
+    omitted = left_out(entries, taken, "entry") + left_out(results, taken, "result")
+    head, top = title(f"{cases}: every two quantities against each other{limits}{omitted}")
     columns = 1 if style.narrow() else 2
     words = [style.folded(kind.words, NAME, style.width() / columns - 0.6) for kind in kinds]
     legend = top

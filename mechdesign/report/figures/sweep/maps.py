@@ -95,9 +95,9 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
     words += [f"in {plane.classes} classes of each entry" for plane in planes[:1] if plane.classes]
     words += ["of the cases that meet every requirement, else of the nearest miss"] * bool(len(entries) > 2 and limited)
     words += ["hatched: what is required is not met"] * any(gate.unmet for gate in gates)
-    told = "; ".join(words) + without_number(taken, len(table)) + left_out(asked, taken, "result")
-    told = style.folded(told + left_out(numbers, numbers[:MOST_ENTRIES], "entry"), TITLE, style.width() - 0.2)
-    figure.suptitle(told, x=0.01, ha="left", fontsize=TITLE)
+    heading = "; ".join(words) + without_number(taken, len(table)) + left_out(asked, taken, "result")
+    heading = style.folded(heading + left_out(numbers, numbers[:MOST_ENTRIES], "entry"), TITLE, style.width() - 0.2)
+    figure.suptitle(heading, x=0.01, ha="left", fontsize=TITLE)
     columns = 1 if style.narrow() else 2
     labels = [style.folded(str(key.get_label()), NAME, style.width() / columns - 0.4) for key in keys]
     figure.legend(keys, labels, loc="outside lower left", ncols=columns)
@@ -158,5 +158,5 @@ def _dashes(k: int) -> Any:
 
 def _limits_in_words(limited: Axis) -> str:
     limits = [("at least", limited.low), ("at most", limited.high)]
-    told = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
-    return f"{limited.name} {told} {style.printed(limited.unit)}".rstrip()
+    words = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
+    return f"{limited.name} {words} {style.printed(limited.unit)}".rstrip()

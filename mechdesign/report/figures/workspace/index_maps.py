@@ -50,17 +50,17 @@ def index_columns(region: Region) -> list[str]:
 
 def _index_map(study: Study, regions: Sequence[Region], column: str) -> Figure:
     norm = index_norm(regions, column)
-    told = regions[0].local.column(column)
+    index = regions[0].local.column(column)
     places = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
     page = sheet(
-        study, places, [region.title for region in regions], f"{name} at point {point}: {told.meaning}", bar=True
+        study, places, [region.title for region in regions], f"{name} at point {point}: {index.meaning}", bar=True
     )
     for axes, region in zip(page.axes, regions, strict=True):
         contours(axes, list(grids(region.local, column)), norm, labels=len(regions) == 1)
     page.ends(regions)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=norm.boundaries)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, index.unit), ticks=norm.boundaries)
     return page.figure
 
 
