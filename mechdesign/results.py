@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -217,6 +217,11 @@ class Table:
         yield self
 
     @property
+    def seen(self) -> Table:
+        """The rows that pictures show: all of them."""
+        return self
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the columns, in order."""
         return tuple(column.name for column in self.columns)
@@ -260,17 +265,26 @@ class LongTable(Table):
 
     Parameters
     ----------
-    like : Table
-        A table with the same columns.
+    some : Table
+        Those of its rows that pictures show.
+    count : int
+        Number of all rows.
     source : callable
         Makes the rows, as tables one after the other; each call makes them anew.
     """
 
-    def __init__(self, like: Table, count: int, source: Callable[[], Iterator[Table]]) -> None:
-        columns = tuple(_LongColumn(column, self._values) for column in like.columns)
+    def __init__(self, some: Table, count: int, source: Callable[[], Iterator[Table]]) -> None:
+        columns = tuple(_LongColumn(column, self._values) for column in some.columns)
         self.__dict__.update(
-            name=like.name, columns=columns, meaning=like.meaning, scope=like.scope, _count=count, _source=source
-        )
+            name=some.name, columns=columns, meaning=some.meaning, scope=some.scope, _some=some, _count=count,
+            _source=source,
+        )  # fmt: skip
+
+    @property
+    def seen(self) -> Table:
+        """Those of its rows that pictures show."""
+        some: Table = self.__dict__["_some"]
+        return some
 
     def blocks(self) -> Iterator[Table]:
         """The rows, made anew, as tables one after the other."""
@@ -330,6 +344,23 @@ class _LongColumn(Column):
         return bool(self.__dict__["_numeric"])
 
 
+class Drawn:
+    """What the pictures of a result need besides its tables; each question has a record of its own."""
+
+    @classmethod
+    def of(cls, result: Result) -> Self:
+        """The record of this kind that a result carries.
+
+        Raises
+        ------
+        TypeError
+            If it carries none, or one of another kind.
+        """
+        if not isinstance(result.drawn, cls):
+            raise TypeError(f"a result of {result.command} carries no {cls.__name__}")
+        return result.drawn
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Answer of one command.
@@ -351,9 +382,8 @@ class Result:
     failed: str = ""  #: why a pose that a person asked for could not be assembled (exit code 3); tables are whole
     files: Mapping[str, str] = field(default_factory=dict)  #: texts to be written with the tables, by their file names
     interrupted: str = ""  #: how far it came, where it is the finished part of an interrupted computation
-    drawn: Mapping[str, Any] = field(default_factory=dict)  #: what pictures show besides, by name
+    drawn: Drawn | None = None  #: what pictures need besides the tables
     absent: Mapping[str, str] = field(default_factory=dict)  #: why columns and tables have no values, by their names
-    pictured: Result | None = None  #: of a long sweep the result at those of its poses that pictures show
     reached: bool = True  #: else `failed` says why a reliability is not reached, where all poses assemble
 
     def __repr__(self) -> str:
@@ -363,8 +393,8 @@ class Result:
 
     @property
     def seen(self) -> Result:
-        """What pictures show."""
-        return self.pictured or self
+        """The result with those rows of its tables that pictures show."""
+        return replace(self, tables={name: table.seen for name, table in self.tables.items()})
 
     @property
     def main(self) -> Table:

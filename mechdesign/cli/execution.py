@@ -25,7 +25,7 @@ from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, Study
 from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
 from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.before import laid_under
+from mechdesign.report.before import Before
 from mechdesign.report.cases import best_of
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
@@ -128,7 +128,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
     asked = extras(command, options)
-    before = None
+    before = under = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
         manifest.check_folder(directory, study, command, asked, before)
@@ -154,7 +154,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
                 study, seed=options.seed, jobs=options.jobs, progress=progress, **more
             )
             if before is not None:
-                result = laid_under(study, result, before, _earlier(before, command, options))
+                under = Before.of(study, result, before, _earlier(before, command, options))
     except Interrupted as interrupt:
         writer.write(directory, study, interrupt.result, (), asked)
         terminal.say(f"{study.label}: {command}: {interrupt}")
@@ -166,7 +166,7 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
         raise
     try:
         with progress:
-            verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress)
+            verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress, under)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -276,8 +276,9 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress
-) -> tuple[Sequence[Verdict], Sequence[Caution]]:
+    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress,
+    before: Before | None,
+) -> tuple[Sequence[Verdict], Sequence[Caution]]:  # fmt: skip
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
     try:
         verdicts = requirements.requirements(study, result)
@@ -286,7 +287,7 @@ def _judged_and_written(
             # A requirement that names a missing row must not lose a long computation.
             writer.write(directory, study, result, (), asked)
         raise
-    undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress)
+    undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress, before)
     return judged_again(study, verdicts, (*result.warnings, *undrawn)), undrawn
 
 

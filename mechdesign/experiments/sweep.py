@@ -22,7 +22,7 @@ from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.report.cases import text_of
-from mechdesign.report.requirements import in_words
+from mechdesign.report.requirements import DrawnCases, in_words
 from mechdesign.results import Column, Result
 from mechdesign.study import Study
 from mechdesign.study.text.units import QUANTITY, Units
@@ -110,13 +110,13 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
     )  # fmt: skip
 
 
-def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> dict[str, Any]:
-    """Data of the pictures: the entries that vary, the results with their limits, and the goals."""
+def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> DrawnCases:
+    """The entries that vary, the results with what is required of them, and which are goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
     results = limits | {number.title: (None, None) for number in wanted}
     entries = [name for name, _ in tally.cases[0]]
-    return {"cases": tally, "entries": entries, "results": results, "goals": _goals(study)}
+    return DrawnCases(entries, results, _goals(study), tally.verdicts)
 
 
 def _goals(study: Study) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""Cases of a sweep in words: what they change, and which of a table of them are best."""
+"""Cases of a sweep in words: their changes, and which cases are best."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ RANK, FRONT = "rank", "front"
 
 
 def short(name: str) -> str:
-    """An entry's name without what goes without saying."""
+    """The name of an entry without ``mechanism.parameters.`` or ``mechanism.``."""
     return name.removeprefix("mechanism.parameters.").removeprefix("mechanism.")
 
 
@@ -67,16 +67,16 @@ def best_of(table: Table) -> Best | None:
     """The best case of a sweep's table, which is read block by block; None where no case is ranked."""
     if FRONT not in table:
         return None
-    found: tuple[int, str] | None = None
+    best: tuple[int, str] | None = None
     numbers = np.zeros(3, dtype=np.intp)
     for part in table.blocks():
         rank = part[RANK]
         first = np.flatnonzero(rank == 1)
-        if found is None and len(first):
+        if best is None and len(first):
             row = first[0]
             changes = [
                 (column.name, column.values[row].tolist()) for column in part.columns if column.meaning == VARIED
             ]
-            found = int(part["case"][row]), changes_in_words(changes)
+            best = int(part["case"][row]), changes_in_words(changes)
         numbers += np.isfinite(rank).sum(), len(first), int(part[FRONT].sum())
-    return None if found is None else Best(*found, *numbers.tolist())
+    return None if best is None else Best(*best, *numbers.tolist())

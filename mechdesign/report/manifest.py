@@ -29,13 +29,13 @@ HELP_PAGE = "howto/report"
 NAME = "manifest.json"
 _TOOL = "mechdesign"
 _INPUTS_IN = "inputs_in"
-_MOST_BYTES = 100_000_000  # of a manifest; of a larger one the memory might not hold what it says
+_MOST_BYTES = 100_000_000  # of a manifest; a larger one might not fit into memory
 _LIBRARIES = ("numpy", "scipy", "matplotlib", "pillow", "jinja2", "pydantic", "pint", "pyyaml", "moocore")
 
 
 @dataclass(frozen=True)
 class Extras:
-    """What else than tables is wanted of a command: pictures, the animation, every assembly mode, an HTML report."""
+    """Options of a command's output: pictures, animation, every assembly mode, an HTML report."""
 
     plots: bool = True
     formats: str = "png"  # of the pictures, with commas between them
@@ -172,7 +172,7 @@ def computed_from(study: Study, command: str) -> dict[str, Any]:
 
 
 def shown_before(study: Study) -> dict[str, Any]:
-    """What the manifest says of a study that pictures show as well."""
+    """The entry of the manifest about a study before, which pictures show as well."""
     about = computed_from(study, "")
     return {key: about[key] for key in ("study", "inputs", "overrides") if key in about}
 
@@ -185,7 +185,7 @@ def _way_to_inputs(study: Study, directory: Path) -> dict[str, str]:
 
 
 def inputs_folder(directory: Path, content: Mapping[str, Any]) -> Path:
-    """Where the files lie that a study names: beside the study if it is known where that is, else its results."""
+    """The folder of the files that a study names: that of the study if it is known, else that of its results."""
     beside = directory / str(content.get(_INPUTS_IN, "."))
     names = content.get("inputs") or {}
     return beside if all((beside / name).is_file() for name in names) else directory
@@ -254,7 +254,7 @@ def own(directory: Path) -> set[str]:
 
 
 def check_folder(directory: Path, study: Study, command: str, asked: Extras, before: Study | None = None) -> None:
-    """Find out before a long computation that its results could not be written into a folder; creates nothing.
+    """Check before a long computation that its results can be written into a folder; creates nothing.
 
     Raises
     ------
@@ -272,7 +272,7 @@ def check_folder(directory: Path, study: Study, command: str, asked: Extras, bef
 
 
 def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:
-    """The manifest of a folder if it holds, whole, what this study would give again or more pictures; else None."""
+    """The manifest of a folder that completely holds what this study would give, or more pictures; else None."""
     try:
         content = whole(directory)
     except StudyError:

@@ -30,7 +30,7 @@ _STUDIES = {
 
 def names(command: str, formats: str = "", *, animate: bool = False) -> Iterator[str]:
     """Patterns of the names of a command's tables and studies, and of its pictures in these formats."""
-    # The one table of cases is named as its command.
+    # A table of cases has the name of its command.
     tables = [table.name for table in tables_of(command)] if command in COMMANDS else [command]
     yield from (f"{table}.csv" for table in tables)
     yield from _STUDIES.get(command, "").split()

@@ -1,8 +1,8 @@
-"""The gate: does the worst row of a result meet what the study requires of it?"""
+"""Requirements: does the worst row of a result meet what the study requires of it?"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
-from mechdesign.results import POSES_ONLY, Result, Table
+from mechdesign.results import POSES_ONLY, Drawn, Result, Table
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.schema.optimize import Requirement
@@ -23,13 +23,13 @@ HELP_PAGE = "reference/study/requirements"
 
 Bounds = tuple[float | None, float | None]
 """Lowest and highest value, in the unit of what is judged."""
-# Where a requirement is on a part of the motion, and none of it lies there.
+# Place of a verdict where the motion never enters the part that a requirement is about.
 _OUTSIDE = "no place of the motion"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one requirement."""
+    """The verdict on one requirement."""
 
     requirement: str  #: in words
     met: bool  #: whether the worst row meets it
@@ -44,8 +44,30 @@ class Verdict:
         return f"{self.requirement}: {'met' if self.met else 'NOT MET'}, worst {self.worst:.6g}{place}{note}"
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnCases(Drawn):
+    """Columns of the table of a sweep by what they are, and what became of the requirements over its cases.
+
+    Parameters
+    ----------
+    entries : sequence of str
+        Columns of the entries that vary.
+    results : mapping of str to Bounds
+        Columns of results, with the limits that a requirement sets, in the unit of the column.
+    goals : mapping of str to int
+        Columns of goals: 1 where one is to be small, -1 where it is to be large.
+    verdicts : tuple of Verdict
+        The worst over the cases, a requirement each.
+    """
+
+    entries: Sequence[str]
+    results: Mapping[str, Bounds]
+    goals: Mapping[str, int]
+    verdicts: tuple[Verdict, ...]
+
+
 def named(kind: str) -> str:
-    """The warnings that an entry of `fail_on` is about, in words."""
+    """An entry of `fail_on` in words."""
     return "warnings" if kind == ALL else f"warnings of kind {kind}"
 
 
@@ -62,7 +84,7 @@ def on_warnings(study: Study, warnings: Iterable[Caution]) -> tuple[Verdict, ...
 
 
 def judged_again(study: Study, verdicts: Sequence[Verdict], warnings: Iterable[Caution]) -> tuple[Verdict, ...]:
-    """The verdicts on a result that has other warnings now, as of pictures; none where there were none."""
+    """The verdicts after warnings were added, such as those of pictures; none if there were none before."""
     return (*verdicts[: len(verdicts) - len(study.barred)], *on_warnings(study, warnings)) if verdicts else ()
 
 
@@ -82,7 +104,7 @@ def number_of(study: Study, command: str) -> int:
 
 
 def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> None:
-    """Find, at a look, the requirements of commands that name what their results have not.
+    """Check before a long computation that the requirements of commands name columns that their results will have.
 
     Parameters
     ----------
@@ -109,11 +131,11 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
                 Evaluator(study)
         except StudyError as error:
             problems += error.problems
-            # Its requirements would meet the same mistakes.
+            # Its requirements would report the same mistakes.
             judged.discard("optimize")
     for command in [name for name in commands if name in judged]:
         try:
-            # Of so few designs some rows may be missing that all of them have.
+            # With so few designs rows may be missing that the full set has.
             requirements(study, look(study, command), whole=command != "optimize")
         except AssemblyError:
             # Its own computation reports it.
@@ -160,8 +182,8 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     ...     print(verdict)
     kinematics.P.x at least 90: NOT MET, worst 86.6025 at arm 30 (of the asked poses only)
     """
-    if "cases" in result.drawn:
-        return (*result.drawn["cases"].verdicts, *on_warnings(study, result.warnings))
+    if isinstance(result.drawn, DrawnCases):
+        return (*result.drawn.verdicts, *on_warnings(study, result.warnings))
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
@@ -188,8 +210,8 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
     if not is_plain(result, path):
         return _of_number(terms_of(result, path, requirement.where), requirement)
     table, column, rows = located(result, path)
-    found, begin = None, 0
-    # A word that names the rows may be in a few blocks only.
+    worst, begin = None, 0
+    # A word that selects rows may occur in a few blocks only.
     for part in table.blocks() if rows.all() else [table]:
         chosen = choose(
             replace(result, tables={**result.tables, table.name: part}), path, requirement.where,
@@ -201,23 +223,23 @@ def judge(result: Result, requirement: Requirement, freedom: int = 1, *, whole: 
             value = float(chosen.values[row])
             place = "" if len(table) == 1 else place_of(part, row, column, freedom, begin)
             verdict = _verdict(requirement, bounds, value, place, chosen.unit)
-            if found is None or (not np.isnan(found.margin) and not verdict.margin >= found.margin):
-                found = verdict
+            if worst is None or (not np.isnan(worst.margin) and not verdict.margin >= worst.margin):
+                worst = verdict
         begin += len(part)
     chosen = replace(chosen, table=table)
-    if found is None and chosen.part and chosen.course:
+    if worst is None and chosen.part and chosen.course:
         # Between two rows.
-        found = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
-        return _over_motion(found, chosen, requirement)
-    if found is None and whole and (missing := choose(result, path, requirement.where).missing):
+        worst = _verdict(requirement, bounds, float("nan"), _OUTSIDE, chosen.unit)
+        return _over_motion(worst, chosen, requirement)
+    if worst is None and whole and (missing := choose(result, path, requirement.where).missing):
         raise UnknownColumnError(missing)
-    if found is None:
+    if worst is None:
         return Verdict(in_words(requirement), met=False, worst=float("nan"), place=f"no row of {table.name}")
-    return found if np.isnan(found.margin) else _over_motion(found, chosen, requirement)
+    return worst if np.isnan(worst.margin) else _over_motion(worst, chosen, requirement)
 
 
 def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
-    """The verdict on one number: what is told of a column, or a sum."""
+    """The verdict on one number: a statistic of a column, or a sum."""
     value = float(terms.numbers(assembled=requirement.unassembled is not None)[0])
     value = abs(value) if requirement.abs else value
     place = _OUTSIDE if np.isnan(value) and any(chosen.part for chosen in terms.parts) else ""
@@ -235,7 +257,7 @@ def _verdict(requirement: Requirement, bounds: Bounds, value: float, place: str,
 
 
 def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> Verdict:
-    """The verdict of the worst row, or of a worse place of the motion between the rows; what it does not speak of."""
+    """The verdict on the worst row, or on a worse place of the motion between the rows, and what it does not cover."""
     bounds = _bounds(chosen, requirement)
     signs = [-1] * (requirement.at_least is not None) + [1] * (requirement.at_most is not None)
     course = chosen.course
@@ -249,21 +271,21 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
 
 
 def _scoped(verdict: Verdict, terms: Chosen | Sum, requirement: Requirement) -> Verdict:
-    """The verdict with what it does not speak of; not met where some of the motion is missing that has to be valid."""
+    """The verdict with a note of what it does not cover; not met where a part that must be valid is missing."""
     scoped = [(chosen, chosen.table.scope) for chosen in terms.parts if chosen.table.scope is not None]
     missing = [scope.missing for _, scope in scoped if scope.missing]
     if missing and not requirement.unassembled:
         verdict = replace(verdict, met=False)
-    told = any(
+    isolated = any(
         scope.poses_only or (chosen.statistic and not chosen.picked and chosen.course is None)
         for chosen, scope in scoped
     )
-    notes = [POSES_ONLY] if told else []
+    notes = [POSES_ONLY] if isolated else []
     return replace(verdict, note="; ".join([*notes, *dict.fromkeys(missing)]))
 
 
 def _worst_row(chosen: Chosen, requirement: Requirement, bounds: Bounds) -> int | None:
-    """The row that is worst: one without a value, or else the farthest beyond a limit; None where none counts."""
+    """The worst row: one without a value, or else the farthest beyond a limit; None without rows."""
     counts = chosen.counts
     if requirement.unassembled and "valid" in chosen.table:
         counts = counts & chosen.table["valid"].astype(bool)
@@ -295,7 +317,7 @@ def _margin(bounds: Bounds, value: float) -> float:
 
 
 def in_words(requirement: Requirement) -> str:
-    """What is required: the result, the rows that count, the bounds."""
+    """A requirement in words: the result, the rows that count, the bounds."""
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
     where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
     given = (("at least", requirement.at_least), ("at most", requirement.at_most))

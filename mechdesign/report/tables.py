@@ -17,7 +17,7 @@ from mechdesign.results import Column, Table
 
 _DIGITS = 12
 _BLOCK = 20_000
-# Begin a formula in the cell of a spreadsheet.
+# A cell that begins with one of these is a formula to a spreadsheet.
 _FORMULA = ("=", "+", "-", "@")
 
 
@@ -32,7 +32,7 @@ def _texts(values: NDArray[Any], digits: int) -> list[str]:
 
 
 def _harmless(text: str) -> str:
-    """A cell that no program takes for a formula: one that begins like one, and is no number, gets an apostrophe."""
+    """A cell that no spreadsheet takes for a formula: one that begins like one and is no number gets an apostrophe."""
     return f"'{text}" if text.startswith(_FORMULA) and not _is_number(text) else text
 
 
@@ -69,7 +69,7 @@ def csv_blocks(table: Table) -> Iterator[str]:
 
 
 def _lines(columns: Sequence[NDArray[Any]]) -> str:
-    """Lines of a table; of numbers alone they are formatted all at once, which takes a third of the time."""
+    """Lines of a table; tables of numbers only are formatted at once, in a third of the time."""
     if not all(values.dtype.kind in "fiub" for values in columns):
         stream = io.StringIO()
         cells = [_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in columns]
@@ -88,7 +88,7 @@ def from_csv(text: str, name: str, columns: Sequence[Mapping[str, Any]], meaning
     _, *rows = csv.reader(io.StringIO(text))
     texts = zip(*rows, strict=True) if rows else [()] * len(columns)
     return Table(
-        name, tuple(Column(**each, values=_values(told)) for each, told in zip(columns, texts, strict=True)), meaning
+        name, tuple(Column(**each, values=_values(cells)) for each, cells in zip(columns, texts, strict=True)), meaning
     )
 
 
@@ -102,7 +102,7 @@ def _values(texts: Sequence[str]) -> NDArray[Any]:
 
 
 def plain(value: Any) -> Any:
-    """Anything a study or a table holds, as JSON can say it.
+    """Values of a study or a table as values of JSON.
 
     Floats keep 12 significant digits; nan and infinities, which JSON does not know, become None; booleans of a
     table's column are the business of `json_blocks`.
@@ -125,7 +125,7 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any, **options: Any) -> str:
-    """A value as JSON: letters stand as they are, what is not printable as an escape, such as ``\\u202e``."""
+    """A value as JSON: letters unchanged, unprintable characters as escapes such as ``\\u202e``."""
     return printable_lines(json.dumps(value, ensure_ascii=False, **options), json.dumps)
 
 

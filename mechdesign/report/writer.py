@@ -1,4 +1,4 @@
-"""Write a result: tables, pictures, and last the manifest that vouches for them."""
+"""Write a result: tables, pictures, and last the manifest that lists them with their hashes."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechdesign.report.before import Before
     from mechdesign.report.figures.rendering import Gallery
 
 HELP_PAGE = "howto/report"
 
 DIMENSIONS = "dimensions"  # of `check`
-CREATOR = "mechdesign"  # by which a drawing is known that no manifest lists
+CREATOR = "mechdesign"  # mark of drawings that no manifest lists
 FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
 _UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")
-# Ends the names under which pictures stand as HTML.
+# Ending of the names of pictures as HTML.
 INLINE = ".html"
 
 
@@ -47,12 +48,14 @@ def write(
     asked: Extras,
     jobs: int | None = None,
     progress: Progress = NULL,
+    before: Before | None = None,
 ) -> tuple[Caution, ...]:
     """Write a result into a directory and return a warning for each picture that could not be drawn.
 
     The tables come first, all of them or none, with a manifest that vouches for them alone: whatever becomes of the
-    pictures, they are there. Of an interrupted computation no pictures are drawn. Files of an older
-    result that the new one does not have are removed, so that the directory never shows two results at once.
+    pictures, they are there. Of an interrupted computation no pictures are drawn. Pictures show a study `before` under
+    this one. Files of an older result that the new one does not have are removed, so that the directory never shows two
+    results at once.
 
     Raises
     ------
@@ -78,21 +81,21 @@ def write(
         drawn: dict[str, bytes] = {}
         plots = asked.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, asked, jobs)
+            drawn, warnings = pictures(study, result, asked, jobs, before)
         if asked.report:
             from mechdesign.report.page import section
 
             inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
             mechanism = inline.pop(MECHANISM, "")
-            part, warnings = section.section(study, result, inline, mechanism, warnings, plots=asked.plots)
+            part, warnings = section.section(study, result, inline, mechanism, warnings, before, plots=asked.plots)
             drawn[pages.SECTION] = section.encoded(part)
         if drawn or more:
-            told = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
-            verdicts = judged_again(study, verdicts, told.warnings)
+            final = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
+            verdicts = judged_again(study, verdicts, final.warnings)
             own = {*digests, manifest.NAME}
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
-                written.stage(manifest.NAME, [manifest.compose(directory, study, told, verdicts, digests, asked)])
+                written.stage(manifest.NAME, [manifest.compose(directory, study, final, verdicts, digests, asked)])
                 written.commit(own, own, voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
@@ -100,7 +103,7 @@ def write(
 
 
 def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
-    """The bytes of a table's file, block by block; tells how far those of a long one are."""
+    """The bytes of a table's file, block by block, with progress for a long table."""
     long = isinstance(table, LongTable)
     if long:
         progress.start(len(table), f"rows of {table.name}.csv")
@@ -110,11 +113,11 @@ def _encoded(table: Table, progress: Progress) -> Iterator[bytes]:
 
 
 def _check_room(directory: Path, result: Result) -> None:
-    """Find out before long tables are written that the disk would not hold them."""
+    """Check that the disk has room for long tables before they are written."""
     need = 0.0
-    for name, table in result.tables.items():
-        if isinstance(table, LongTable) and len(some := result.seen.tables[name]):
-            need += sum(map(len, csv_blocks(some))) / len(some) * len(table)
+    for table in result.tables.values():
+        if isinstance(table, LongTable) and len(table.seen):
+            need += sum(map(len, csv_blocks(table.seen))) / len(table.seen) * len(table)
     free = shutil.disk_usage(directory).free if need else 0
     if need > free:
         raise OutputError(
@@ -157,7 +160,7 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     from mechdesign.report.figures.dimensions import dimensions_figure
     from mechdesign.report.figures.mechanism import sketch_figure
 
-    kinds, told = asked.formats.split(","), []
+    kinds, messages = asked.formats.split(","), []
     for name in (MECHANISM, DIMENSIONS):
         for kind in kinds:
             check_marked(directory / f"{name}.{kind}", CREATOR.encode())
@@ -170,12 +173,12 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
                 figure = make(study)
                 drawn = {path: style.encoded(figure, path.suffix[1:], CREATOR) for path in paths}
         except Exception as error:
-            told.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
+            messages.append(f"warning: {_undrawn(paths[0].name, explain(error)[1])}")
             continue
         for path, data in drawn.items():
             write_file(path, data, CREATOR.encode())
-        told.append(f"{what} in {', '.join(map(str, paths))}")
-    return "; ".join(told)
+        messages.append(f"{what} in {', '.join(map(str, paths))}")
+    return "; ".join(messages)
 
 
 def sketch(study: Study) -> bytes:
@@ -187,18 +190,19 @@ def sketch(study: Study) -> bytes:
         return style.encoded(sketch_figure(study), "png")
 
 
-def figures(study: Study, result: Result) -> Gallery:
+def figures(study: Study, result: Result, before: Before | None = None) -> Gallery:
     """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
     from mechdesign.report.figures.rendering import Gallery
 
-    found, result = Gallery(), result.seen
-    # What all pictures of a command share may fail too.
-    found.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, study, result)
-    return found
+    gallery = Gallery()
+    shown = (study, result.seen) if before is None else (study, result.seen, before)
+    # Preparations that all pictures of a command share may fail, too.
+    gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, *shown)
+    return gallery
 
 
 def pictures(
-    study: Study, result: Result, asked: Extras, jobs: int | None = None
+    study: Study, result: Result, asked: Extras, jobs: int | None = None, before: Before | None = None
 ) -> tuple[dict[str, bytes], tuple[Caution, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
@@ -212,7 +216,7 @@ def pictures(
     formats = asked.formats.split(",")
     result = result.seen
     with style.context(asked.style):
-        gallery = figures(study, result)
+        gallery = figures(study, result, before)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
@@ -228,9 +232,10 @@ def pictures(
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if asked.animate:
+            from mechdesign.analyses.kinematics.drawn import DrawnMotion
             from mechdesign.report.figures.kinematics.animation import animation
 
-            drawings[ANIMATION] = lambda: {ANIMATION: animation(result)}
+            drawings[ANIMATION] = lambda: {ANIMATION: animation(DrawnMotion.of(result).shown)}
         drawn, failed = render(drawings, jobs)
     warnings = [_undrawn(name, why) for name, why in (gallery.failed | failed).items()]
     if drawn.get(ANIMATION) == b"":

@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 import mechdesign
 from mechdesign.cli.app import app
 from mechdesign.errors import StudyError
-from mechdesign.report.before import laid_under
+from mechdesign.report.before import Before
 from mechdesign.report.figures import kinematics, style, workspace
 from mechdesign.report.figures.overlay import COLOR
+from mechdesign.report.page.moving import moving
 
 FOUR_BAR = """
 mechanism:
@@ -40,7 +41,7 @@ workspace: {{point: P, scan: {{about: [0, 0]}}}}
 
 def overlaid(command, now, then):
     results = [getattr(mechdesign, command)(study) for study in (now, then)]
-    return laid_under(now, results[0], then, results[1]), results[1]
+    return results[0], Before.of(now, results[0], then, results[1])
 
 
 @pytest.mark.slow
@@ -49,9 +50,9 @@ def test_names_are_drawn_letter_by_letter():
     now, then = (
         study_of(FOUR_BAR.format(rocker=60, motion=SWEEP), f"name={name}") for name in ("a", "$\\frac$ \u202e")
     )
-    result, _ = overlaid("kinematics", now, then)
+    result, before = overlaid("kinematics", now, then)
     with style.context():
-        figure = kinematics.figures(now, result)["paths"]
+        figure = kinematics.figures(now, result, before)["paths"]
         drawn = style.encoded(figure, "svg").decode()
     (legend,) = figure.legends
     assert legend.get_texts()[1].get_text() == r"study, name=\$\frac\$ \u202e (before)"
@@ -61,13 +62,13 @@ def test_names_are_drawn_letter_by_letter():
 @pytest.mark.slow
 def test_curves_and_paths_before_are_dashed_under_those_now():
     now, then = (study_of(FOUR_BAR.format(rocker=rocker, motion=SWEEP)) for rocker in (60, 68))
-    result, earlier = overlaid("kinematics", now, then)
+    result, before = overlaid("kinematics", now, then)
     with style.context("paper"):
-        found = kinematics.figures(now, result)
+        found = kinematics.figures(now, result, before)
         assert not found.failed
         for figure in found.values():
             figure.canvas.draw()
-    table = earlier.tables["motion"]
+    table = before.result.tables["motion"]
     path = np.column_stack([table["C.x"], table["C.y"]])
     (axes,) = found["paths"].axes
     grey = [line.get_xydata() for line in axes.lines if line.get_color() == COLOR and line.get_linestyle() == "--"]
@@ -83,12 +84,20 @@ def test_curves_and_paths_before_are_dashed_under_those_now():
         assert len(found[name].legends[-1].get_texts()) == 2
 
 
+@pytest.mark.slow
+def test_curves_before_are_beside_the_mechanism_that_moves():
+    now, then = (study_of(FOUR_BAR.format(rocker=rocker, motion=SWEEP), f"name=arm{rocker}") for rocker in (60, 68))
+    result, before = overlaid("kinematics", now, then)
+    assert "(before)" in moving(now, result, before).beside
+    assert "(before)" not in moving(now, result).beside
+
+
 @pytest.mark.nightly
 def test_the_boundary_before_is_in_the_picture_of_the_workspace():
     now, then = (study_of(ARM.format(lower=lower)) for lower in (30, 40))
-    result, _ = overlaid("workspace", now, then)
+    result, before = overlaid("workspace", now, then)
     with style.context():
-        figure = workspace.figures(now, result)["workspace"]
+        figure = workspace.figures(now, result, before)["workspace"]
         figure.canvas.draw()
     grey = [line.get_xydata() for line in figure.axes[0].lines if line.get_color() == COLOR]
     radii = np.hypot(*np.concatenate([line for line in grey if len(line) > 3]).T)
@@ -108,7 +117,7 @@ def test_motions_of_other_coordinates_are_not_drawn_over_each_other():
         then = study_of(FOUR_BAR.format(rocker=60, motion=motion).replace("drives: {theta", f"drives: {{{drive}"))
         result = mechdesign.kinematics(now)
         with pytest.raises(StudyError, match=message):
-            laid_under(now, result, then, mechdesign.kinematics(then))
+            Before.of(now, result, then, mechdesign.kinematics(then))
 
 
 @pytest.mark.nightly

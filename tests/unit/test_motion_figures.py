@@ -45,7 +45,7 @@ def drawn(study, **options):
 
 
 def sweep_of(study):
-    return Sweep.of(mechdesign.kinematics(study).drawn["motion"])
+    return Sweep.of(mechdesign.kinematics(study).drawn.shown)
 
 
 def boxes(axes):
@@ -153,7 +153,7 @@ def test_limits_of_motion_and_what_is_not_valid_are_marked():
     limits = sorted(result.tables["limits"]["crank"])
     assert len(limits) == 2
     with style.context():
-        figure = curves_figure(study, result)
+        figure = curves_figure(study, result.tables, result.drawn.shown.poses)
     for axes in figure.axes:
         marks = sorted(line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
         assert marks == pytest.approx(limits)
@@ -169,7 +169,7 @@ def test_a_rate_without_bound_does_not_flatten_the_rest():
     study = study_of(ROCKER, f"kinematics.sweep={{crank: {{from: {limit + 1e-4}, to: 180, step: 2}}}}")
     result = mechdesign.kinematics(study)
     with style.context():
-        figure = curves_figure(study, result)
+        figure = curves_figure(study, result.tables, result.drawn.shown.poses)
     rates = result.tables["motion"]["rocker.angle_velocity"]
     usual = np.nanpercentile(np.abs(rates), 90)
     axes = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity\n[deg/s]")
@@ -226,7 +226,7 @@ def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
 
 @pytest.mark.slow
 def test_a_limit_of_motion_is_a_special_pose_without_rates():
-    poses = mechdesign.kinematics(study_of(ROCKER)).drawn["special"]()
+    poses = mechdesign.kinematics(study_of(ROCKER)).drawn.special
     limits = [each for each in poses.shown if each.what.startswith("limit of motion: dead centre")]
     assert len(limits) == 2
     for each in limits:
@@ -246,7 +246,7 @@ mechanism:
 kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10}, outputs: [P]}
 """
     study = study_of(arm)
-    poses = mechdesign.kinematics(study).drawn["special"]()
+    poses = mechdesign.kinematics(study).drawn.special
     singular = [each for each in poses.shown if each.what == "singular: det_J is 0"]
     assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
     assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
@@ -257,7 +257,7 @@ def test_special_poses_of_one_configuration_are_shown_once():
     slider = FOUR_BAR.replace("rocker: [D, B, 60]", "rocker: {B: [0, 0]}").replace(
         "  drives:", "  joints: {guide: {prismatic: [ground, rocker]}}\n  drives:"
     )
-    poses = mechdesign.kinematics(study_of(slider.replace("B: [75, 55]", "B: [85, 0]"))).drawn["special"]()
+    poses = mechdesign.kinematics(study_of(slider.replace("B: [75, 55]", "B: [85, 0]"))).drawn.special
     assert [each.place for each in poses.shown if each.what] == pytest.approx([0, 180])
 
 
@@ -298,7 +298,7 @@ def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_pla
     study = study_of(FOUR_BAR, advantage)
     result = mechdesign.kinematics(study)
     with style.context():
-        figure = transmission_figure(study, result)
+        figure = transmission_figure(study, result.tables, Sweep.of(result.drawn.shown))
     axes = figure.axes[1]
     assert axes.get_yscale() == "log"
     marks = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]

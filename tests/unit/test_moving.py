@@ -7,7 +7,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from helpers.gallery import FOLDER, result_of, study_named
+from helpers.studies import study_of
 
+import mechdesign
 from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS
@@ -191,3 +193,16 @@ def test_in_a_workspace_every_pose_keeps_the_links_and_has_its_numbers_from_the_
 def test_listed_poses_do_not_move():
     study = study_named("path_synthesis")
     assert moving(study, result_of("path_synthesis")) is None
+
+
+@pytest.mark.slow
+def test_a_design_that_is_judged_by_its_stiffness_alone_does_not_move() -> None:
+    study = study_of("""
+mechanism:
+  parameters: {r: 100}
+  links: {ground: {O: [0, 0]}, arm: [O, P, r]}
+  drives: [arm]
+stiffness: {at: P, actuators: {arm: 1000 N*m/rad}, poses: [{arm: 0}]}
+optimize: {variables: {r: {from: 80, to: 120, step: 20}}, maximize: [stiffness.k_y.min]}
+""")
+    assert moving(study, mechdesign.optimize(study)) is None

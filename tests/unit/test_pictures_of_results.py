@@ -58,9 +58,9 @@ def test_nothing_is_solved_for_a_picture(command, study, options, expected, monk
 
 
 def test_poses_of_a_long_motion_are_carried_whatever_their_chunks(monkeypatch):
-    whole = mechdesign.kinematics(study_of(FOUR_BAR)).drawn["motion"]
+    whole = mechdesign.kinematics(study_of(FOUR_BAR)).drawn.shown
     monkeypatch.setattr(poses, "POSES_AT_ONCE", 20)
-    parts = mechdesign.kinematics(study_of(FOUR_BAR)).drawn["motion"]
+    parts = mechdesign.kinematics(study_of(FOUR_BAR)).drawn.shown
     np.testing.assert_array_equal(parts.rows, whole.rows)
     for name in ("A", "B"):
         np.testing.assert_allclose(parts.configuration.point(name), whole.configuration.point(name), rtol=1e-12)

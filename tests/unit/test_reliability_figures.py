@@ -286,7 +286,7 @@ def test_density_is_true_to_scale_with_the_circle_of_the_limit() -> None:
 @pytest.mark.nightly
 def test_ellipses_hold_their_shares() -> None:
     axes, _, result = contours("reliability.methods=[analytic, monte_carlo]")
-    samples = result.drawn["samples"]
+    samples = result.drawn.samples
     lines = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 100 and line.get_marker() == "None"]
     for points, share in zip(lines, SHARES, strict=True):
         away = points - samples.mean

@@ -206,7 +206,7 @@ def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
         panels = [axes for axes in figures(study, result)["stiffness"].axes if axes.get_xlabel()]
     words = [f"hand.angle = {angle} deg, {name} [N/mm]" for angle in (-90, 0) for name in ("k_min", "k_max")]
     assert [axes.get_title(loc="left") for axes in panels] == words
-    over = plane(study, result.drawn["poses"])
+    over = plane(study, result.drawn.shown.poses)
     assert over is not None
     for (_, sectors), hand in zip(over.maps, (-10j, 10), strict=True):
         for curve in sectors.outline:

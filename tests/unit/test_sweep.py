@@ -90,7 +90,7 @@ def test_what_is_required_has_one_column_and_its_limits_in_pictures():
     result = mechdesign.sweep(study_of({"vary": {R: [25, 45]}, "results": [STROKE, "kinematics.rod.angle.max"]}))
     names = result.main.names
     assert len(names) == len(set(names))
-    assert result.drawn["results"][STROKE] == (70, None)
+    assert result.drawn.results[STROKE] == (70, None)
 
 
 def test_quantities_in_a_file_of_cases_are_numbers(tmp_path: Path):

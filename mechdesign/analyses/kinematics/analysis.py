@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.answers import answers_of
 from mechdesign.analyses.kinematics.columns import MODES
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.motion import Motion
 from mechdesign.analyses.kinematics.passage import Passage, pass_over
 from mechdesign.analyses.kinematics.question import motion_question
@@ -50,7 +51,8 @@ def kinematics(
         table, warnings, number, shown = _modes(passage, jobs)
         result = dataclasses.replace(
             result, tables={**result.tables, "modes": table}, warnings=[*result.warnings, *warnings],
-            counts={**result.counts, "modes": number}, drawn={**result.drawn, "modes": shown},
+            counts={**result.counts, "modes": number},
+            drawn=dataclasses.replace(DrawnMotion.of(result), modes=shown),
         )  # fmt: skip
     if not passage.long:
         return result
@@ -59,7 +61,7 @@ def kinematics(
         for name, make in A_ROW_A_POSE.items()
         if name in result.tables
     }
-    return dataclasses.replace(result, tables={**result.tables, **long}, pictured=result)
+    return dataclasses.replace(result, tables={**result.tables, **long})
 
 
 @one_thread()

@@ -11,13 +11,13 @@ import numpy as np
 
 from mechdesign.analyses.kinematics.along import Along, along_of
 from mechdesign.analyses.kinematics.courses import Followed, course_of
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.extremes import extremes, targets_table
 from mechdesign.analyses.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
 from mechdesign.analyses.kinematics.loops import Toggle, loops_table, measured, toggles_of, toggles_table
 from mechdesign.analyses.kinematics.passage import Passage, pass_over
 from mechdesign.analyses.kinematics.question import MotionQuestion
 from mechdesign.analyses.kinematics.remarks import marks_of, remarks, unfollowed, without_centre
-from mechdesign.analyses.kinematics.special_poses import special_poses
 from mechdesign.analyses.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.analyses.poses import invalid_in_words, judge_failures
 from mechdesign.analyses.together import End, Group
@@ -88,8 +88,7 @@ def answers_of(passage: Passage) -> list[Group]:
     uneven = {"limits": [*map(len, events.limits)], "toggles": [*map(len, _by_line(toggles, designs))]}
     result = Result("kinematics", scoped, absent=question.absent)
     if designs == 1:
-        special = cache(partial(special_poses, motion, passage.shown, along, limits, toggles))
-        drawn = {"poses": motion.question.poses, "motion": passage.shown, "special": special}
+        drawn = DrawnMotion(passage.shown, motion, along, limits, toggles)
         (end,) = ends
         result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
     return [Group(np.arange(designs), result, ends, uneven)]

@@ -5,10 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.look import ask
 from mechdesign.analyses.optimize import pareto
 from mechdesign.analyses.optimize import search as searching
@@ -26,7 +29,7 @@ from mechdesign.analyses.optimize.tables import (
     sensitivity_table,
 )
 from mechdesign.analyses.optimize.variables import Design, check_choices, from_cube, grid, in_words, parted, study_of
-from mechdesign.analyses.poses import solve_shown
+from mechdesign.analyses.poses import Shown, solve_shown
 from mechdesign.analyses.region.rays import SINGLE
 from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.analyses.workspace.answer import answer
@@ -37,7 +40,7 @@ from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result
+from mechdesign.results import Drawn, Result
 from mechdesign.study import Study
 from mechdesign.study import designs as study_designs
 from mechdesign.study.designs import variant
@@ -106,8 +109,8 @@ def optimize(
     files, wrong = design_files(study, designs, _optima(designs))
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
     warnings = (*doubts, *_warnings(evaluator, designs), *wrong)
-    drawn = {"designs": designs, "design": lambda design: drawn_design(designs, design)}
-    return Result("optimize", {table.name: table for table in tables}, warnings, counts, files=files, drawn=drawn)
+    named = {table.name: table for table in tables}
+    return Result("optimize", named, warnings, counts, files=files, drawn=DrawnDesigns(designs))
 
 
 def _ask(
@@ -308,8 +311,43 @@ def _shapes(judged: Iterable[Goal], study: Study, changed: Mapping[str, float]) 
     return [shape_of(outline, lambda number: float(numbers.of(number)[0])) for outline in outlines]
 
 
-def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
-    """The study of a design, and its workspace or else its motion with the errors from targets, as far as judged."""
+@dataclass(frozen=True, eq=False)
+class DrawnDesign:
+    """A design as a study, with what was judged of it.
+
+    Parameters
+    ----------
+    region : Result or None
+        Its workspace, without indices; None where no goal or condition is about that.
+    contained : sequence of (Shape, complex)
+        What the region is to contain, each with the place of its centre where it fits best.
+    motion : Result or None
+        Its motion with the errors of the targets; None where no goal is about that, or no pose assembles.
+    shown : Shown or None
+        The poses of its motion, judged or not; None beside a region, and where they cannot be solved.
+    """
+
+    study: Study
+    region: Result | None = None
+    contained: Sequence[tuple[Shape, complex]] = ()
+    motion: Result | None = None
+    shown: Shown | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnDesigns(Drawn):
+    """All designs that were evaluated."""
+
+    designs: Designs
+
+    @cached_property
+    def best(self) -> DrawnDesign:
+        """The best of them, computed when it is first drawn."""
+        return drawn_design(self.designs, self.designs.design(self.designs.best))
+
+
+def drawn_design(designs: Designs, design: Design) -> DrawnDesign:
+    """Compute what pictures of one design show: its workspace if that was judged, or else its motion."""
     study, numbers = parted(designs.study, design)
     made = variant(study, numbers)
     judged = (*designs.goals, *designs.conditions)
@@ -319,10 +357,10 @@ def drawn_design(designs: Designs, design: Design) -> tuple[Study, Result]:
         result = workspace(plain)
         if "local" in result.tables:
             shapes = _shapes(designs.conditions, study, numbers)
-            contained = list(zip(shapes, _centres(plain, shapes), strict=True))
-            return plain, dataclasses.replace(result, drawn={**result.drawn, "contained": contained})
+            return DrawnDesign(plain, result, list(zip(shapes, _centres(plain, shapes), strict=True)))
     with suppress(MechdesignError):
         if any(goal.command == "kinematics" for goal in designs.goals):
-            return made, kinematics(made).seen
-        return made, Result("kinematics", {}, drawn={"motion": solve_shown(made)})
-    return made, Result("kinematics", {})
+            motion = kinematics(made).seen
+            return DrawnDesign(made, motion=motion, shown=DrawnMotion.of(motion).shown)
+        return DrawnDesign(made, shown=solve_shown(made))
+    return DrawnDesign(made)

@@ -105,7 +105,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
         "reliability", of_poses(built, task.reason) | dict(allocated.tables),
         [*warnings, *method_warnings(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
-        {"poses": poses, "samples": tables.drawn_samples(task, sampled)}, reached=bool(failed) or not allocated.failed,
+        tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,
     )  # fmt: skip
     if interrupted:
         raise Interrupted(result)

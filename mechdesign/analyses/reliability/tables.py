@@ -26,7 +26,8 @@ from mechdesign.analyses.reliability.simulation import CELLS, REACH, Sums
 from mechdesign.analyses.reliability.sobol import SobolIndices
 from mechdesign.analyses.reliability.task import MethodResult, Strings, Task
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.results import Column, Table
+from mechdesign.results import Column, Drawn, Table
+from mechdesign.study.poses import Poses
 
 # Bins of a histogram.
 _BINS = 60
@@ -236,6 +237,14 @@ class Samples:
     pair: tuple[int, int] | None
     mean: Floats
     covariance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnErrors(Drawn):
+    """The poses at which errors were asked, and samples at one of them; None where no method samples errors."""
+
+    poses: Poses
+    samples: Samples | None
 
 
 def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:

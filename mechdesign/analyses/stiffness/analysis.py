@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,7 @@ from mechdesign.errors import AssemblyError
 from mechdesign.mechanism import Configuration, Reason
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.progress import NULL, Progress
-from mechdesign.results import Result, Scope, Table
+from mechdesign.results import Drawn, Result, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.work.chunks import map_chunks
@@ -102,9 +101,10 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
         uneven = {"springs": solved.springs.counts(designs, count)}
         return Group(np.arange(designs), Result("stiffness", scoped), ends, uneven)
     (end,) = ends
+    first, loose = (_drawn_pose(body, solved, pose) for pose in (solved.first, solved.loose))
     result = Result(
         "stiffness", of_poses(all_tables, solved.reason), end.warnings, end.counts, end.failed,
-        drawn=_drawn(body, poses, solved),
+        drawn=DrawnStiffness(solved.shown, first, loose),
     )  # fmt: skip
     return Group(np.arange(1), result, ends)
 
@@ -139,10 +139,17 @@ class Solved:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """A pose that pictures show, with its row.
+class DrawnPose:
+    """One solved pose as pictures show it.
 
-    `springs` are those of the pose; `twists` those of each vertex about the asked point, shape (3, loads).
+    Parameters
+    ----------
+    row : int
+        Its number among the poses.
+    springs : Springs
+        Equivalent springs of the legs in it.
+    twists : dict of str to ndarray, shape (3, loads)
+        By vertex, its twist about the asked point under each load, in the units of the mechanism.
     """
 
     body: Body
@@ -152,16 +159,31 @@ class Drawn:
     twists: dict[str, Floats]
 
 
-def _drawn(body: Body, poses: Poses, solved: Solved) -> dict[str, Any]:
-    """Data of the pictures: the poses, the first valid one, and the first with a free twist."""
-    drawn: dict[str, Any] = {"poses": poses, "shown": solved.shown}
-    for name, pose in (("first", solved.first), ("loose", solved.loose)):
-        if pose is not None:
-            row, configuration = pose
-            moved = by_forces(body, configuration).displacements if body.given.loads else {}
-            twists = {vertex: (twist @ body.loads[0, :, : body.size].T)[0] for vertex, twist in moved.items()}
-            drawn[name] = Drawn(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
-    return drawn
+@dataclass(frozen=True, eq=False)
+class DrawnStiffness(Drawn):
+    """The poses whose stiffness was asked.
+
+    Parameters
+    ----------
+    shown : Shown
+        The solved poses, evenly spread where they are many.
+    first, loose : DrawnPose or None
+        The first valid pose, and the first with a free twist; None where there is none.
+    """
+
+    shown: Shown
+    first: DrawnPose | None
+    loose: DrawnPose | None
+
+
+def _drawn_pose(body: Body, solved: Solved, pose: Pose | None) -> DrawnPose | None:
+    """A pose with its springs, and with the twists that the loads make."""
+    if pose is None:
+        return None
+    row, configuration = pose
+    moved = by_forces(body, configuration).displacements if body.given.loads else {}
+    twists = {vertex: (twist @ body.loads[0, :, : body.size].T)[0] for vertex, twist in moved.items()}
+    return DrawnPose(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
 
 
 def solve(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mechdesign.analyses.workspace.boundary import poses_along
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.analyses.workspace.ellipses import ellipses
 from mechdesign.analyses.workspace.point_path import point_path
 from mechdesign.analyses.workspace.question import questions
@@ -41,5 +42,5 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     first = full[0]
     assert first.boundary is not None
     along = poses_along(study, first.question.held, first.boundary)
-    drawn = {"along": along, "ellipses": ellipses(first.question.field, first.patches)}
+    drawn = DrawnRegion(along, ellipses(first.question.field, first.patches))
     return Result("workspace", named, tuple(warnings), counts, drawn=drawn)

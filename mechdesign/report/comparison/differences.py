@@ -1,4 +1,4 @@
-"""What two folders of results differ in, and by how much they may."""
+"""Differences of two folders of results, and their tolerances."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Difference:
-    """What is otherwise in a column, a table, a folder or a verdict."""
+    """A difference in a column, a table, a folder or a verdict."""
 
     folder: str
     table: str  # empty where it is the whole folder
@@ -77,7 +77,7 @@ class Difference:
 
 @dataclass
 class Comparison:
-    """Everything that two folders of results differ in; `compared` counts tables and columns of both."""
+    """All differences of two folders of results; `compared` counts the tables and columns that both have."""
 
     differences: list[Difference] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)

@@ -37,30 +37,30 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
         while a pattern of the tolerances fits nothing, as one that was mistyped.
     """
     before, after = results(old), results(new)
-    # A manifest alone is the folder that it lies in.
+    # A manifest stands for its folder.
     old, new = (each.parent if each.name == manifest.NAME else each for each in (old, new))
     if not before.keys() & after.keys():
-        there = [f"{root} has {', '.join(found) or 'none'}" for root, found in ((old, before), (new, after))]
+        there = [f"{root} has {', '.join(folders) or 'none'}" for root, folders in ((old, before), (new, after))]
         raise StudyError(f"nothing to compare: no result stands in both folders; {'; '.join(there)}")
-    found, noted = Comparison(), defaultdict[str, list[str]](list)
+    comparison, noted = Comparison(), defaultdict[str, list[str]](list)
     unused = set(tolerances.patterns)
     for folder in sorted(before.keys() | after.keys()):
         if folder not in before or folder not in after:
-            found.differences.append(Difference(folder, "", "", "missing" if folder in before else "new"))
+            comparison.differences.append(Difference(folder, "", "", "missing" if folder in before else "new"))
             continue
         for note in notes(before[folder], after[folder]):
             noted[note].append(folder)
         pair = (old / folder, before[folder]), (new / folder, after[folder])
-        unused -= compare_results(found, folder, *pair, tolerances)
+        unused -= compare_results(comparison, folder, *pair, tolerances)
     everywhere = len(before.keys() & after.keys())
-    found.notes += [
+    comparison.notes += [
         note if len(folders) == everywhere else f"{', '.join(folders)}: {note}" for note, folders in noted.items()
     ]
     unfit = [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
-    if unfit and not found.differences:
+    if unfit and not comparison.differences:
         raise StudyError([Problem(each) for each in unfit])
-    found.notes += unfit
-    return found
+    comparison.notes += unfit
+    return comparison
 
 
 def results(root: Path) -> dict[str, dict[str, Any]]:
@@ -132,7 +132,7 @@ def _fits(pattern: str, folder: str, command: str, table: str, column: str) -> b
 
 
 def notes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    """What two results were computed from that is not the same."""
+    """Differences in what two results were computed from: versions, inputs, overrides, seed, study."""
     for what in ("tool", "libraries", "inputs"):
         before, after = old.get(what) or {}, new.get(what) or {}
         for name in dict.fromkeys((*before, *after)):
@@ -148,12 +148,12 @@ def notes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     ]
     changed = [name for name in entries[0] | entries[1] if entries[0].get(name) != entries[1].get(name)]
     if changed:
-        told = [f"{name} {entries[0].get(name)} -> {entries[1].get(name)}" for name in changed[:_MOST_ENTRIES]]
-        yield f"study: {', '.join(told)}{', ...' * (len(changed) > _MOST_ENTRIES)}"
+        changes = [f"{name} {entries[0].get(name)} -> {entries[1].get(name)}" for name in changed[:_MOST_ENTRIES]]
+        yield f"study: {', '.join(changes)}{', ...' * (len(changed) > _MOST_ENTRIES)}"
 
 
 def compare_results(
-    found: Comparison,
+    comparison: Comparison,
     folder: str,
     old: tuple[Path, Mapping[str, Any]],
     new: tuple[Path, Mapping[str, Any]],
@@ -161,7 +161,7 @@ def compare_results(
     *,
     illegible: bool = False,
 ) -> set[str]:
-    """Add to what was found how two results of a command, folders and manifests, differ; the patterns that fitted.
+    """Add the differences of two results of a command (folder and manifest each); returns the patterns that matched.
 
     Raises
     ------
@@ -174,7 +174,9 @@ def compare_results(
     for name in dict.fromkeys((*before["tables"], *after["tables"])):
         table = name.removesuffix(".csv")
         if name not in before["tables"] or name not in after["tables"]:
-            found.differences.append(Difference(folder, table, "", "missing" if name in before["tables"] else "new"))
+            comparison.differences.append(
+                Difference(folder, table, "", "missing" if name in before["tables"] else "new")
+            )
             continue
         try:
             pair = _read_table(*old, name), _read_table(*new, name)
@@ -190,26 +192,26 @@ def compare_results(
             chosen[column] = tolerances.default
             if fitting:
                 chosen[column] = _in_unit(tolerances.patterns[fitting[-1]], fitting[-1], pair[0], column)
-        found.compared.update(tables=1, columns=len(chosen))
-        found.cases.append((folder, table))
+        comparison.compared.update(tables=1, columns=len(chosen))
+        comparison.cases.append((folder, table))
         same_poses = given[0] == given[1]
-        found.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
+        comparison.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
     verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
-        told = [_verdict(verdict.get(words)) for verdict in verdicts]
-        if told[0].split(",")[0] != told[1].split(",")[0]:
-            found.differences.append(Difference(folder, "", words, "verdict", old=told[0], new=told[1]))
+        outcomes = [_verdict(verdict.get(words)) for verdict in verdicts]
+        if outcomes[0].split(",")[0] != outcomes[1].split(",")[0]:
+            comparison.differences.append(Difference(folder, "", words, "verdict", old=outcomes[0], new=outcomes[1]))
     ends = [str(content.get("interrupted") or content.get("failed") or "done") for content in (before, after)]
     if ends[0] != ends[1]:
-        found.differences.append(Difference(folder, "", "", "outcome", old=ends[0], new=ends[1]))
+        comparison.differences.append(Difference(folder, "", "", "outcome", old=ends[0], new=ends[1]))
     return fitted
 
 
-def _verdict(told: Mapping[str, Any] | None) -> str:
-    if told is None:
+def _verdict(verdict: Mapping[str, Any] | None) -> str:
+    if verdict is None:
         return "not required"
-    worst = told.get("worst")
-    return f"{'met' if told['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
+    worst = verdict.get("worst")
+    return f"{'met' if verdict['met'] else 'not met'}{'' if worst is None else f', worst {worst:.6g}'}"
 
 
 def _read_table(directory: Path, content: Mapping[str, Any], name: str) -> Table:

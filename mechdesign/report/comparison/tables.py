@@ -14,7 +14,7 @@ from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.report.comparison.differences import Difference, Tolerance
 from mechdesign.results import Column, Table
 
-# Of the largest number of a unit in a table: what rounding leaves of zero there, on one machine or another.
+# Rounding error of zeros, as a part of the largest number of the same unit in a table.
 ROUNDING = 1e-12
 _MOST_COLUMNS = 6  # that name a row
 
@@ -70,7 +70,7 @@ def compare_tables(
 
 
 def _apart(old: Floats, new: Floats) -> Floats:
-    """How far numbers are apart: none where both are nan or the same infinity, infinitely where one of them is."""
+    """Absolute differences: 0 where both are nan or the same infinity, inf where only one of them is."""
     with np.errstate(invalid="ignore"):
         size = np.abs(new - old)
     same: Flags = (old == new) | (np.isnan(old) & np.isnan(new))
@@ -107,7 +107,7 @@ def _words(table: Table, keys: Sequence[str], row: int) -> str:
 
 
 def _keys(old: Table, new: Table, given: Iterable[str]) -> tuple[str, ...]:
-    """Columns that tell the rows of both tables apart: given coordinates, then the leading ones, as few as do."""
+    """Columns that identify the rows of both tables: given coordinates, then as few leading columns as needed."""
     known = set(given)
     names = sorted((name for name in old.names if name in new), key=lambda name: name not in known)
     tables = [table for table in (old, new) if len(table) > 1]
@@ -123,7 +123,7 @@ def _keys(old: Table, new: Table, given: Iterable[str]) -> tuple[str, ...]:
         return True
 
     keys = next((names[:count] for count in range(len(names)) if apart(names[:count])), names)
-    # Of results that stand between, such as those at the nodes of rays, none is needed.
+    # Result columns between them, such as values at the nodes of rays, are not needed.
     for name in [name for name in keys if name not in known and old.column(name).numeric]:
         if apart([key for key in keys if key != name]):
             keys = [key for key in keys if key != name]
@@ -134,7 +134,7 @@ def _matched(
     old: Table, new: Table, keys: Sequence[str], tolerances: Mapping[str, tuple[float, float]], same_poses: bool
 ) -> tuple[Rows, Rows]:
     """Rows of both tables that are the same, in the order of the old."""
-    # Equal rows are told apart by their order.
+    # Equal rows are matched in their order.
     known = {key: row for row, key in enumerate(_numbered(_texts(old, keys)))}
     pairs = [(known[key], row) for row, key in enumerate(_numbered(_texts(new, keys))) if key in known]
     numbers = [name for name in keys if old.column(name).numeric and new.column(name).numeric]
@@ -154,8 +154,8 @@ def _matched(
                 rows[side][:] = [row for row in rows[side] if row not in taken]
         if same_poses and len(rows[0]) == len(rows[1]):
             pairs += zip(*rows, strict=True)
-    found = np.array(sorted(pairs), dtype=np.intp).reshape(-1, 2)
-    return found[:, 0], found[:, 1]
+    matched = np.array(sorted(pairs), dtype=np.intp).reshape(-1, 2)
+    return matched[:, 0], matched[:, 1]
 
 
 def _texts(table: Table, names: Sequence[str]) -> Iterable[tuple[str, ...]]:

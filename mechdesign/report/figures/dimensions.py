@@ -52,8 +52,7 @@ def dimensions_figure(study: Study) -> Figure:
     mechanism, unit = study.mechanism, study.units.label("length")
     scene = pose(mechanism, mechanism.sketch_configuration)
     assert scene is not None
-    places = [*scene.points.values(), *(end for guide in scene.guides for end in guide.ends({}, scene.span))]
-    figure, axes = framed(places, unit, height=_HEIGHT, above=_TITLE, pad=0.75)
+    figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=_TITLE, pad=0.75)
     axes.grid(visible=False)
     axes.set_title(f"dimensions{f' in {unit}' if unit else ''}, in the sketch pose", loc="left")
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False)
@@ -109,7 +108,7 @@ def _dimension(
     along = (ends[1] - ends[0]) / length
     half = _half(text)
     window = paper(axes, np.array([complex(axes.get_xlim()[k], axes.get_ylim()[k]) for k in (0, 1)]))
-    best: tuple[float, float, complex] | None = None
+    best: tuple[float, float, complex, Floats] | None = None
     for away in _AWAY:
         line = ends + 1j * along * away
         # A number must leave room for arrows at both sides.
@@ -126,13 +125,13 @@ def _dimension(
             cost = _FAR * abs(away) + _CROSSED * crossed + _WRITTEN_OVER * under + abs(share - 0.5)
             cost += _ON_LINK * (away == 0.0)
             if best is None or cost < best[0]:
-                best = cost, away, middle
+                best = cost, away, middle, box
     if best is None or best[0] > _MOST:
         return net
-    _, away, middle = best
-    boxes.append(np.array([middle.real - half[0], middle.imag - half[1], middle.real + half[0], middle.imag + half[1]]))
+    _, away, middle, box = best
+    boxes.append(box)
     back = _back(axes)
-    drawn = [np.empty((0, 2)), _inside(boxes[-1])]
+    drawn = [_inside(box)]
     if away:
         line, side = ends + 1j * along * away, math.copysign(1.0, away) * 1j * along
         for end, foot in zip(line, ends, strict=True):

@@ -60,7 +60,7 @@ def draw_mechanism(
     arrows, named = shapes.drive_shapes(scene) if drives else ([], [])
     draw(axes, [*drawn, *arrows], size=size)
     if labels:
-        # The most needed first.
+        # The most important first.
         named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene)]
         named += shapes.link_labels(scene, colors)
         place_labels(axes, named, covered(axes), order=5.0)
@@ -70,7 +70,7 @@ def draw_ghost(
     axes: Axes, mechanism: Mechanism, configuration: Configuration, index: int, *, dashes: Dashes = "-",
     alpha: float = 0.4,
 ) -> None:  # fmt: skip
-    """Draw a further pose as thin grey lines, which lie below the paths and do not look like them."""
+    """Draw another pose as thin grey lines below the paths."""
     scene = pose(mechanism, configuration, index)
     if scene is not None:
         draw(axes, shapes.ghost_shapes(scene, dashes), order=2.0, alpha=alpha)
@@ -119,7 +119,7 @@ def _path(symbol: Symbol) -> Path:
 
 
 def _at(axes: Axes, symbol: Symbol, size: float) -> Transform:
-    """From points on paper to the place of a symbol, in its direction."""
+    """Transform from points on paper to the place and direction of a symbol."""
     figure = axes.get_figure(root=True)
     assert figure is not None
     # The stubs ask for an affine transform; any that maps the place to pixels will do.

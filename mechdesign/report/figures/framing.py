@@ -35,9 +35,9 @@ class Window(NamedTuple):
 
 def extent(places: Complexes | Iterable[complex]) -> tuple[complex, float, float]:
     """Middle, width and height of what lies at these places; nan are no places."""
-    found = np.asarray(places if isinstance(places, np.ndarray) else list(places), dtype=complex).reshape(-1)
-    found = found[np.isfinite(found)]
-    x, y = found.real, found.imag
+    finite = np.asarray(places if isinstance(places, np.ndarray) else list(places), dtype=complex).reshape(-1)
+    finite = finite[np.isfinite(finite)]
+    x, y = finite.real, finite.imag
     middle = complex((x.min() + x.max()) / 2, (y.min() + y.max()) / 2)
     return middle, max(float(np.ptp(x)), 1e-9), max(float(np.ptp(y)), 1e-9)
 

@@ -63,7 +63,7 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
 
 
 def growth_figure(growth: Table) -> Figure:
-    """Hypervolume of the front over the designs that were evaluated, and what the last quarter of them brought."""
+    """Hypervolume of the front over the number of designs, and its growth by the last tenth of them."""
     figure = style.new_figure(3.2)
     axes = figure.add_subplot()
     axes.plot(growth["designs"], growth["hypervolume"], "o-", color=style.BLUE, markersize=4)
@@ -78,13 +78,13 @@ def growth_figure(growth: Table) -> Figure:
 
 def marked(designs: Designs, front: Table) -> list[tuple[str, int]]:
     """Designs of a front that are shown, and their rows: the best of each goal, and the knee between them."""
-    found: dict[int, str] = {}
+    marks: dict[int, str] = {}
     for letter, goal in zip(ascii_uppercase, designs.goals, strict=False):
         best = np.argmin if goal.smallest else np.argmax
-        found.setdefault(int(best(front[goal.name])), f"{letter}: best {goal.name}")
-    found.setdefault(int(np.argmax(front["knee"])), "knee")
+        marks.setdefault(int(best(front[goal.name])), f"{letter}: best {goal.name}")
+    marks.setdefault(int(np.argmax(front["knee"])), "knee")
     # Along the first goal, as the front runs.
-    return [(found[row], row) for row in sorted(found)]
+    return [(marks[row], row) for row in sorted(marks)]
 
 
 def chosen(designs: Designs, front: Table, row: int) -> dict[str, float | str]:

@@ -1,4 +1,4 @@
-"""Names beside the things they name: each where it covers least of the drawing and of the other names."""
+"""Placement of names: each where it covers least of the drawing and of other names."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from mechdesign.numerics.arrays import Complexes, Floats
 HALO = [withStroke(linewidth=2.2, foreground="white")]  # keeps names clear of the lines below them
 _LETTER = 0.62  # mean width of a letter in font sizes
 _DIRECTIONS = 16
-_NET = 4.5  # points between two places of what names keep off
+_NET = 4.5  # spacing (points) of the net on what names must not cover
 _SYMBOL = 36.0  # largest diagonal of a symbol, points: nothing is written into it
 HATCHED = 10.0  # width of a hatched line, points
 _CLEARLY = 2.0  # points by which a name must be nearer to what it names than to another
-_UNCLEAR = 4.0  # what it costs where it is not
-_NO_ROOM = 5.5  # cost from which a name is left out that may be
-_LEADERLESS = 14.0  # points beyond a name's reach from where a line leads to its place
+_UNCLEAR = 4.0  # cost of a name that is not
+_NO_ROOM = 5.5  # cost from which an optional name is left out
+_LEADERLESS = 14.0  # points beyond its reach from which a name has a leader
 _LEADER: dict[str, Any] = {"arrowstyle": "-", "linewidth": 0.7, "shrinkA": 0.5}
 _PALE = 0.5  # opacity below which a drawing may be written on
 
@@ -92,7 +92,7 @@ def positions(
     taken = np.empty((poses, len(labels), 4))
     chosen: list[Position | None] = []
     for which, label in enumerate(labels):
-        # Names of one kind could change places.
+        # Names of one kind could be mistaken for each other.
         alike = [k for k, other in enumerate(labels) if k != which and other.size == label.size]
         half = label.half
         offsets, strains = _offsets(label, half)
@@ -224,7 +224,7 @@ def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
             toward = cmath.exp(1j * angle)
             turned = min(k, _DIRECTIONS - k) / _DIRECTIONS
             place = label.reach * stretch * np.array([toward.real, toward.imag])
-            # The text's nearest edge, not its middle, keeps the distance.
+            # The distance is that of the nearest edge of the text, not of its middle.
             place += half * np.clip(1.3 * np.array([toward.real, toward.imag]), -1, 1)
             places.append(place)
             strains.append(strain + turned * (0.5 if label.heading is None else 2.0))
@@ -232,7 +232,7 @@ def _offsets(label: Label, half: Floats) -> tuple[Floats, Floats]:
 
 
 def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> Floats:
-    """What each of some boxes (left, low, right, high; a row each) would cover, and how far it leaves the window."""
+    """Cost of each box (left, low, right, high; a row each): what it covers, and whether it leaves the window."""
     left, low, right, high = boxes.T[:, :, None]
     x, y = obstacles.T
     inside = (x > left - 1) & (x < right + 1) & (y > low - 1) & (y < high + 1)
@@ -241,5 +241,5 @@ def _costs(boxes: Floats, obstacles: Floats, taken: Floats, window: Floats) -> F
     over = np.where((wide > 0) & (tall > 0), 20 + wide * tall, 0.0)
     (x0, y0), (x1, y1) = window
     outside = (left < x0) | (right > x1) | (low < y0) | (high > y1)
-    found: Floats = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
-    return found
+    costs: Floats = 0.8 * inside.sum(axis=1) + over.sum(axis=1) + 40 * outside[:, 0]
+    return costs

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.poses import solve_rows, solve_shown
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
+from mechdesign.analyses.poses import Shown, solve_rows, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
@@ -24,6 +25,7 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 
 Panel = tuple[str, Configuration, int]
+SKETCH_POSE = "sketch pose"
 _POSES = 100  # poses from which the range of the motion is taken
 _TITLE = 0.42  # inches
 _TITLE_LINE = 0.18  # inches, a further line of a title
@@ -36,26 +38,30 @@ _MIN_BRACKET = 0.005  # part of the mechanism's size: nearer to a beam than this
 _BEAM_ORDER = 3.3  # above links and slots, below pins and names
 
 
-def mechanism_figure(study: Study, result: Result, title: str = "sketch pose") -> Figure:
-    """The sketch pose, under `title`, and the first pose of the study's kinematics, on one scale.
+def mechanism_figure(study: Study, result: Result) -> Figure:
+    """The sketch pose, and the first pose of the study's kinematics, on one scale.
 
-    Of a reliability it is the pose that its samples follow. Where the result carries no motion, a few poses of it are
-    solved. Use inside `style.context`.
+    Of a reliability it is the pose that its samples follow. Use inside `style.context`.
     """
+    worst = _worst(study, result)
+    if worst is not None:
+        sketch = study.mechanism.sketch_configuration
+        scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
+        if scenes[1] is not None:
+            return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
+    return sketch_and_first_pose(study, result.drawn.shown if isinstance(result.drawn, DrawnMotion) else None)
+
+
+def sketch_and_first_pose(study: Study, shown: Shown | None, title: str = SKETCH_POSE) -> Figure:
+    """The sketch pose under a title, and the first of some poses; without any, a few of the kinematics are solved."""
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
     panels: list[Panel] = [(title, sketch, 0)]
     scenes = [pose(mechanism, sketch)]
     try:
-        sweep = Sweep.of(result.drawn["motion"] if "motion" in result.drawn else solve_shown(study, _POSES))
+        sweep = Sweep.of(shown or solve_shown(study, _POSES))
     except MechdesignError:
         return _compose(study, panels, travels(scenes))
-    worst = _worst(study, result)
-    if worst is not None:
-        words, solved = worst
-        if (scene := pose(mechanism, solved)) is not None:
-            panels.append((words, solved, 0))
-            return _compose(study, panels, travels([*scenes, scene]))
     some = evenly(len(sweep.rows), _POSES).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
@@ -74,14 +80,15 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     table = result.tables.get("reliability")
     if result.command != "reliability" or table is None:
         return None
+    from mechdesign.analyses.reliability.tables import DrawnErrors
     from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
 
-    poses, rows = result.drawn["poses"], table.where(scope="pose", method=best_probability(table))
+    drawn = DrawnErrors.of(result)
+    poses, rows = drawn.poses, table.where(scope="pose", method=best_probability(table))
     failure = table["failure"][rows]
     if not np.isfinite(failure).any():
         return None
-    samples = result.drawn["samples"]
-    row = int(np.nanargmax(failure)) if samples is None else samples.pose
+    row = int(np.nanargmax(failure)) if drawn.samples is None else drawn.samples.pose
     # A line may be broken between coordinates only.
     words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
     return words, solve_rows(study, poses, np.array([row]))
@@ -92,9 +99,8 @@ def sketch_figure(study: Study) -> Figure:
     mechanism = study.mechanism
     scene = pose(mechanism, mechanism.sketch_configuration)
     assert scene is not None
-    places = [*scene.points.values(), *(end for guide in scene.guides for end in guide.ends({}, scene.span))]
     drawn = mechanism.description.sketch
-    figure, axes = framed([*places, *drawn.values()], study.units.label("length"), height=5.4, above=_TITLE)
+    figure, axes = framed([*scene.places({}), *drawn.values()], study.units.label("length"), height=5.4, above=_TITLE)
     ends = np.array([(place, scene.points[name]) for name, place in drawn.items()], dtype=complex).reshape(-1, 2)
     moves = paper(axes, ends[:, 0]) - paper(axes, ends[:, 1])
     rough = ends[np.hypot(*moves.T) > _ROUGH]
@@ -123,9 +129,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     for _, configuration, index in panels:
         scene = pose(mechanism, configuration, index)
         assert scene is not None
-        places += scene.points.values()
-        for guide in scene.guides:
-            places += guide.ends(travel, scene.span)
+        places += scene.places(travel)
     count = len(panels)
     beside, stacked = fit(places, *_room(count, 1)), fit(places, *_room(1, count))
     columns, window = (count, beside) if beside.scale >= 0.55 * stacked.scale else (1, stacked)
@@ -152,7 +156,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
     if study.stiffness is None:
         return
     looks = {"elastic beam": (1.3, (0, (6, 2))), "rigid bracket": (2.2, "-")}
-    told = set()
+    labelled = set()
     for name in study.stiffness.elastic:
         lines = list(_lines(study, name, configuration, index))
         if len(lines) == 1 and len(lines[0][1]) < 3:
@@ -160,9 +164,9 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
         for kind, ends in lines:
             width, dashes = looks[kind]
             axes.plot(ends.real, ends.imag, color=style.INK, linewidth=width, linestyle=dashes, zorder=_BEAM_ORDER,
-                      label=kind if kind not in told else None)  # fmt: skip
-            told.add(kind)
-    if told:
+                      label=kind if kind not in labelled else None)  # fmt: skip
+            labelled.add(kind)
+    if labelled:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none")
 
 

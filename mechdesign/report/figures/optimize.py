@@ -13,32 +13,34 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from matplotlib.tri import Triangulation
 
+from mechdesign.analyses.optimize.analysis import DrawnDesign, DrawnDesigns, drawn_design
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.analyses.optimize.variables import variables_of
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.designs import folded, head, label, listed, tick, value_text
 from mechdesign.report.figures.front import chosen, described, front_figure, growth_figure, marked
-from mechdesign.report.figures.mechanism import mechanism_figure
+from mechdesign.report.figures.mechanism import sketch_and_first_pose
 from mechdesign.report.figures.optimum import design_figure, designs_figure
 from mechdesign.report.figures.panels import fitting
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.boundary import regions_figure, workspace_figure
 from mechdesign.report.figures.workspace.regions import regions
-from mechdesign.results import Result
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
 MIN_MAP_DESIGNS = 9
 MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
-# More lines than that are one blot: of more designs every so many are drawn, in the order of their score.
+# More lines than this merge into a blot: of more designs some are drawn, evenly spread in the order of their score.
 MAX_LINES = 300
-# Steps along a variable in which the best of scattered designs is found, and how many values no grid exceeds.
+# Scattered designs: the best in each of so many steps of a variable is taken. A grid has at most so many values.
 ENVELOPE_STEPS = 40
 MAX_VALUES = 200
-# Fewer designs of a grid are drawn as they are, a cell each: what a field shows between them is not known.
+# Fewer designs of a grid are drawn as cells, without interpolation.
 FEWEST_OF_FIELD = 1000
-# Directions from the centre of what the workspace contains to its outline.
+# Angles at which the outline of a contained shape is drawn.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
 _LETTER = 0.08  # inches
 _UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
@@ -48,63 +50,65 @@ def figures(study: Study, result: Result) -> Gallery:
     """``CPI`` (``objective`` of one goal), ``indices``, ``designs``, ``pareto``, ``hypervolume``,
     ``convergence``, ``optimum``."""
     assert study.optimize is not None
-    designs: Designs = result.drawn["designs"]
-    found = Gallery()
+    drawn, gallery = DrawnDesigns.of(result), Gallery()
+    designs = drawn.designs
     score = "CPI" if len(designs.goals) > 1 else "objective"
     if len(designs.variables) == 2 and len(designs) >= MIN_MAP_DESIGNS:
-        found.add(score, score_surface, designs)
+        gallery.add(score, score_surface, designs)
         if len(designs.goals) > 1:
-            found.add("indices", goal_maps, designs)
+            gallery.add("indices", goal_maps, designs)
     else:
-        found.add(score, score_curves, designs)
+        gallery.add(score, score_curves, designs)
     if len(designs.variables) > 2:
-        found.add("designs", parallel_axes, designs)
+        gallery.add("designs", parallel_axes, designs)
     if "pareto" in result.tables:
-        found.add("pareto", front_figure, designs, result.tables["pareto"])
-        found.add("hypervolume", growth_figure, result.tables["hypervolume"])
+        gallery.add("pareto", front_figure, designs, result.tables["pareto"])
+        gallery.add("hypervolume", growth_figure, result.tables["hypervolume"])
     if study.optimize.method == "search":
-        found.add("convergence", convergence, designs)
-    found.add("optimum", _optimum, result, designs)
-    return found
+        gallery.add("convergence", convergence, designs)
+    gallery.add("optimum", _optimum, drawn, result.tables.get("pareto"))
+    return gallery
 
 
-def _optimum(result: Result, designs: Designs) -> Figure:
-    """The best design itself: in its workspace where that was judged, in its motion where that was.
+def _optimum(drawn: DrawnDesigns, front: Table | None) -> Figure:
+    """The best design: in its workspace if that was judged, else in its motion.
 
     Of a front those that are marked in it, side by side.
     """
-    if "pareto" in result.tables:
-        front = result.tables["pareto"]
-        parts = [(described(designs, front, name, row), *result.drawn["design"](chosen(designs, front, row)))
+    designs = drawn.designs
+    if front is not None:
+        parts = [(described(designs, front, name, row), drawn_design(designs, chosen(designs, front, row)))
                  for name, row in marked(designs, front)]  # fmt: skip
-        moving = ("motion" in own.drawn and own.drawn["motion"].configuration.valid.any() for _, _, own in parts)
-        if len(parts) > 1 and all(moving):
-            return designs_figure(parts)
-        if len(parts) > 1 and all(own.command == "workspace" for _, _, own in parts):
-            found = [(words, design, regions(design, own)[0]) for words, design, own in parts]
-            figure = regions_figure(found, "some designs of the front where they are best conditioned")
-            for axes, (_, _, own) in zip(figure.axes, parts, strict=True):
+        moving = [(words, own.shown, own.motion) for words, own in parts
+                  if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
+        if len(parts) > 1 and len(moving) == len(parts):
+            return designs_figure(moving)
+        judged_regions = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
+                 if own.region is not None]  # fmt: skip
+        if len(parts) > 1 and len(judged_regions) == len(parts):
+            figure = regions_figure(judged_regions, "some designs of the front where they are best conditioned")
+            for axes, (_, own) in zip(figure.axes, parts, strict=True):
                 _draw_contained(axes, own)
             return figure
-    best, own = result.drawn["design"](designs.design(designs.best))
-    words = listed(designs.design(designs.best))
-    if own.command == "workspace":
-        region = regions(best, own)[0]
+    best, words = drawn.best, listed(designs.design(designs.best))
+    if best.region is not None:
+        region = regions(best.study, best.region)[0]
         there = f", at {region.title}" if region.title else ""
-        dotted = "; dotted: what it contains" if own.drawn["contained"] else ""
-        figure = workspace_figure(best, own, region, f"the best design, {words}{there}{dotted}")
-        _draw_contained(figure.axes[0], own)
+        dotted = "; dotted: what it contains" if best.contained else ""
+        title = f"the best design, {words}{there}{dotted}"
+        figure = workspace_figure(best.study, DrawnRegion.of(best.region), region, title)
+        _draw_contained(figure.axes[0], best)
         return figure
     # A title may be broken between variables only.
     words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
-    if "motion" in own.tables:
-        return design_figure(best, own, words)
-    return mechanism_figure(best, own, words)
+    if best.motion is not None:
+        return design_figure(best.study, best.motion, words)
+    return sketch_and_first_pose(best.study, best.shown, words)
 
 
-def _draw_contained(axes: Axes, own: Result) -> None:
+def _draw_contained(axes: Axes, own: DrawnDesign) -> None:
     """Outline of what a workspace is to contain."""
-    for shape, centre in own.drawn["contained"]:
+    for shape, centre in own.contained:
         z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
         axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)
 
@@ -120,7 +124,7 @@ def score_curves(designs: Designs) -> Figure:
     down = -(-count // across)
     figure = style.new_figure(0.9 + (2.9 if across == 1 else 2.5) * down)
     score = designs.cpi if many else designs.values[:, 0]
-    told = "CPI" if many else label(designs, one.name)
+    score_label = "CPI" if many else label(designs, one.name)
     feasible = np.flatnonzero(designs.feasible & np.isfinite(score))
     steep = not many and _steep(score[feasible])
     for number, (name, column) in enumerate(designs.variables.items()):
@@ -131,10 +135,10 @@ def score_curves(designs: Designs) -> Figure:
                       label="designs")  # fmt: skip
         axes.locator_params(axis="x", nbins=6)
         chosen_only = tick(axes.xaxis, designs, name)
-        # Nothing lies between choices.
+        # There are no values between choices.
         axes.plot(column[best], score[best], "_" if chosen_only else "-", color=style.INK, markersize=18,
                   markeredgewidth=2.0, linewidth=1.6 if count > 1 else 2.0,
-                  label="best near each value" if count > 1 else told)  # fmt: skip
+                  label="best near each value" if count > 1 else score_label)  # fmt: skip
         for k, color in zip(range(len(designs.goals)) if many and count == 1 else (), style.PALETTE, strict=False):
             dashes = style.DASHES[(k + 1) % len(style.DASHES)]
             axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
@@ -143,7 +147,7 @@ def score_curves(designs: Designs) -> Figure:
         words = f"best: {listed({name: designs.design(winner)[name]})}"
         axes.set_title(words, loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
-        axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(told))
+        axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(score_label))
         axes.margins(x=0.2 if chosen_only else 0.02)
         if steep:
             axes.set_yscale("log")
@@ -318,8 +322,8 @@ def convergence(designs: Designs) -> Figure:
                   markeredgewidth=0, label="designs")  # fmt: skip
         axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
         axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
-        found = so_far[known]
-        if (found > 0).all() and found.max() > 20 * found.min():
+        best_values = so_far[known]
+        if (best_values > 0).all() and best_values.max() > 20 * best_values.min():
             axes.set_yscale("log")
         axes.set_ylabel(folded(label(designs, goal.name)))
     axes.set_xlabel("designs evaluated")

@@ -10,13 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
+from mechdesign.analyses.poses import Shown
 from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
 from mechdesign.report.figures.kinematics.paths import draw_paths, paths_figure
-from mechdesign.report.figures.panels import MAX_PANELS, abscissa, legend_below, tick_abscissa
+from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, legend_below, tick_abscissa
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -36,7 +38,7 @@ _LETTERS_AN_INCH = 13.5
 _CURVE_POSES = 240  # of the motion between listed poses
 # Of more poses the values are joined by a line.
 _MAX_DOTS = 15
-# Of places, by whether there are few.
+# Looks of wanted and reached places, for few places and for many.
 _LOOKS: dict[tuple[str, bool], dict[str, Any]] = {
     ("wanted", True): {"linestyle": "none", "marker": "x", "markersize": 6, "markeredgewidth": 1.5, "zorder": 4.6},
     ("reached", True): {"linestyle": "none", "marker": "o", "markersize": 2.6, "zorder": 4.5},
@@ -60,20 +62,20 @@ class Reached(NamedTuple):
 
 
 def reached(table: Table) -> list[Reached]:
-    """Outputs with targets of a table of motion; a path's error as the distance from it, if as nothing else."""
-    found = []
+    """Outputs with targets in a table of motion; the distance from a path only if there is no other error."""
+    outputs = []
     for column in table.columns:
         output = column.name.removesuffix("_error")
         if output != column.name and np.isfinite(column.values).any():
             known = output in table
-            found.append(Reached(output, column.unit, table[output] if known else None, column.values))
-    return [each for each in found if each.values is not None] or found
+            outputs.append(Reached(output, column.unit, table[output] if known else None, column.values))
+    return [each for each in outputs if each.values is not None] or outputs
 
 
-def design_figure(study: Study, own: Result, words: str) -> Figure:
+def design_figure(study: Study, motion: Result, words: str) -> Figure:
     """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
-    sweep = Sweep.of(own.drawn["motion"])
-    shown = reached(own.tables["motion"]) if "motion" in own.tables else []
+    sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
+    shown = reached(table)
     title = textwrap.fill(words, int((style.width() - LEFT) * _LETTERS_AN_INCH))
     above = _TITLE + _TITLE_LINE * title.count("\n")
     if sweep.poses.motion:
@@ -83,20 +85,20 @@ def design_figure(study: Study, own: Result, words: str) -> Figure:
         title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
         title = textwrap.fill(title.replace("\n", " "), int((style.width() - LEFT) * _LETTERS_AN_INCH))
         above = _TITLE + _TITLE_LINE * title.count("\n")
-        figure = _posed(sweep, worst, _wanted(own, shown), above)
+        figure = _posed(sweep, worst, _wanted(table, shown), above)
     axes = figure.axes[0]
     axes.set_title(title, loc="left", fontsize=10.5)
-    _draw_wanted(axes, own, shown)
+    _draw_wanted(axes, table, shown)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
     if shown:
-        _panels(figure, study, own, shown[: MAX_PANELS // 2])
+        _panels(figure, abscissa(study, sweep.poses), shown[: MAX_PANELS // 2])
     return figure
 
 
-def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
-    """Some designs side by side on one scale, each with its motion, under its words."""
-    sweeps = [Sweep.of(own.drawn["motion"]) for _, _, own in parts]
+def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
+    """Designs side by side on one scale: each in its poses, under its words, with its motion where that was judged."""
+    sweeps = [Sweep.of(shown) for _, shown, _ in parts]
     places = np.concatenate([sweep.extent for sweep in sweeps])
     count = len(parts)
     columns = 1 if style.narrow() else count
@@ -111,13 +113,14 @@ def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
     figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
                            below=_BELOW + _LEGEND)  # fmt: skip
-    for axes, title, sweep, (_, _, own) in zip(grid, titles, sweeps, parts, strict=True):
+    for axes, title, sweep, (_, _, motion) in zip(grid, titles, sweeps, parts, strict=True):
         axes.set_title(title, loc="left", fontsize=8.5)
         axes.locator_params(nbins=5)
         if sweep.poses.motion:
             draw_paths(axes, sweep, width=0.8)
-        shown = reached(own.tables["motion"]) if "motion" in own.tables else []
-        _draw_wanted(axes, own, shown)
+        if motion is not None:
+            table = motion.tables["motion"]
+            _draw_wanted(axes, table, reached(table))
         draw_mechanism(
             axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
             travel=sweep.travel, size=_SMALL_SYMBOLS,
@@ -128,29 +131,29 @@ def designs_figure(parts: Sequence[tuple[str, Study, Result]]) -> Figure:
 
 
 def _worst(shown: Sequence[Reached], valid: Ints) -> int:
-    """The valid pose with the largest error, in deviations of each output's own; the first without targets."""
+    """The valid pose with the largest error relative to the worst of its output; the first pose without targets."""
     if not shown:
         return int(valid[0])
     far = np.nanmax([np.abs(each.error) / (each.worst or 1.0) for each in shown], axis=0)
     return int(valid[np.nanargmax(np.nan_to_num(far[valid], nan=-1.0))])
 
 
-def _wanted(own: Result, shown: Sequence[Reached]) -> dict[str, Complexes]:
+def _wanted(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
     """Places where points should be at the poses, by point: what they reach less the error."""
-    table, errors = own.tables.get("motion"), {each.output: each.error for each in shown}
-    found: dict[str, Complexes] = {}
+    errors = {each.output: each.error for each in shown}
+    wanted: dict[str, Complexes] = {}
     for point in dict.fromkeys(output.removesuffix(f".{axis}") for output in errors for axis in "xy"):
         names = [f"{point}.{axis}" for axis in "xy"]
-        if table is not None and all(name in table for name in names) and any(name in errors for name in names):
+        if all(name in table for name in names) and any(name in errors for name in names):
             x, y = (table[name] - errors.get(name, 0.0) for name in names)
-            found[point] = x + 1j * y
-    return found
+            wanted[point] = x + 1j * y
+    return wanted
 
 
-def _draw_wanted(axes: Axes, own: Result, shown: Sequence[Reached]) -> None:
+def _draw_wanted(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
     """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
-    for point, wanted in _wanted(own, shown).items():
-        x, y = (own.tables["motion"][f"{point}.{axis}"] for axis in "xy")
+    for point, wanted in _wanted(table, shown).items():
+        x, y = (table[f"{point}.{axis}"] for axis in "xy")
         few = len(wanted) <= _MAX_DOTS
         axes.plot(wanted.real, wanted.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
         axes.plot(x, y, color=style.INK, label=f"{point} reached", **_LOOKS["reached", few])
@@ -172,7 +175,7 @@ def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float)
 
 
 def _between(sweep: Sweep) -> dict[str, Complexes]:
-    """Paths of the points while a single drive runs through its listed values; none where it does not meet them."""
+    """Paths of the points while a single drive runs through its listed values; none if they miss the listed poses."""
     mechanism: Mechanism = sweep.mechanism
     if len(mechanism.drives) != 1 or len(sweep.valid) < 2:
         return {}
@@ -180,12 +183,12 @@ def _between(sweep: Sweep) -> dict[str, Complexes]:
     values = np.asarray(sweep.configuration.value(drive))[sweep.valid]
     moved = mechanism.forward.solve([np.linspace(values.min(), values.max(), _CURVE_POSES)], limits=False)
     at = mechanism.forward.solve([values], limits=False)
-    found = {}
+    paths = {}
     for point, path in sweep.places.items():
         same = np.abs(np.asarray(at.point(point)) - path[sweep.valid]) <= 1e-6 * mechanism.size
         if same.all():
-            found[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
-    return found
+            paths[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
+    return paths
 
 
 def _missed(each: Reached) -> str:
@@ -194,9 +197,8 @@ def _missed(each: Reached) -> str:
     return style.folded(words, 9.5, style.width() - LEFT)
 
 
-def _panels(figure: Figure, study: Study, own: Result, shown: Sequence[Reached]) -> None:
+def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
     """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
-    over = abscissa(study, own.drawn["poses"])
     titles = {each.output: _missed(each) for each in shown}
     gap = _PANEL_GAP + style.line(9.5) * max(title.count("\n") for title in titles.values())
     rows = [(each, part) for each in shown for part in ("curve", "error")

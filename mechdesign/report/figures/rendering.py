@@ -1,4 +1,4 @@
-"""Figures to PNG bytes, on two processes where that is possible; one that fails costs no other."""
+"""Figures to bytes, in two processes where that is possible; a figure that fails does not stop the others."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from mechdesign.errors import explain
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.pool import LostWorkerError
 
-# To the files of one picture: their bytes by their names.
+# Draws one picture: the bytes of its files by their names.
 Drawing = Callable[[], dict[str, bytes]]
 Arguments = ParamSpec("Arguments")
 
-# Fewer pictures are drawn sooner than processes are forked and their bytes are read.
+# With fewer pictures, forking costs more time than it saves.
 FEWEST = 3
 
 
 class Gallery(dict[str, Figure]):
-    """Figures of a result by the names of their files, and why others could not be made."""
+    """Figures of a result by the names of their files, and why others failed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -36,7 +36,7 @@ class Gallery(dict[str, Figure]):
         *arguments: Arguments.args,
         **options: Arguments.kwargs,
     ) -> None:
-        """Put in what a function makes: a figure under this name, several under their own, or none."""
+        """Add the figure that a function makes under this name, or several figures under their own names, or none."""
         try:
             made = make(*arguments, **options)
         except Exception as error:
@@ -50,7 +50,7 @@ class Gallery(dict[str, Figure]):
             self.failed |= made.failed
 
 
-# Drawings under way, which a forked process has as well: figures do not travel.
+# Drawings in progress: a forked process inherits them, since figures cannot be sent to it.
 _here: dict[int, Mapping[str, Drawing]] = {}
 
 
@@ -76,16 +76,16 @@ def render(drawings: Mapping[str, Drawing], jobs: int | None = None) -> tuple[di
     """
 
     names = list(drawings)
-    found: dict[str, dict[str, bytes] | str] = {}
+    outcomes: dict[str, dict[str, bytes] | str] = {}
     key = id(drawings)
     _here[key] = drawings
     try:
         with suppress(LostWorkerError):
             count = min(2, worker_count(jobs)) if sys.platform == "linux" and len(names) >= FEWEST else 1
             for name, drawn in zip(names, map_chunks(partial(_draw, key), names, count, processes=True), strict=True):
-                found[name] = drawn
-        found |= {name: _draw(key, name) for name in names if name not in found}
+                outcomes[name] = drawn
+        outcomes |= {name: _draw(key, name) for name in names if name not in outcomes}
     finally:
         del _here[key]
-    files = {file: data for name in names if isinstance(drawn := found[name], dict) for file, data in drawn.items()}
-    return files, {name: why for name in names if isinstance(why := found[name], str)}
+    files = {file: data for name in names if isinstance(drawn := outcomes[name], dict) for file, data in drawn.items()}
+    return files, {name: why for name in names if isinstance(why := outcomes[name], str)}

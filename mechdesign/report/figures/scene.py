@@ -69,6 +69,10 @@ class Scene:
         """Names of a link's points, its ends first."""
         return link_points(self.description.links[name])
 
+    def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
+        """Points, and ends of the guides for a range of each slide (see `Guide.ends`)."""
+        return [*self.points.values(), *(end for guide in self.guides for end in guide.ends(travel, self.span))]
+
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
         mine = self.link_points(link)
@@ -280,12 +284,12 @@ def ranks(study: Study) -> dict[str, int]:
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
     asked = {name.split(".")[0] for name in (section and section.outputs) or ()}
-    found = {}
+    rank = {}
     for point in mechanism.points:
         if point in ground:
             continue
         if point in asked or (uses[point] == 1 and point not in simple):
-            found[point] = 2
+            rank[point] = 2
         else:
-            found[point] = 0 if point in simple else 1
-    return found
+            rank[point] = 0 if point in simple else 1
+    return rank

@@ -19,15 +19,15 @@ _LEFT, _RIGHT, _TOP, _BOTTOM, _DOWN = 1.75, 0.2, 0.75, 0.5, 0.75
 _BAR = 0.26
 _WORDS = 0.42  # part of the width of a panel at its right, for the derivatives in figures
 _NAME, _FIGURES, _TITLE = 9.0, 8.0, 10.0  # points
-# Elasticities below this part of the largest are as good as none.
+# Elasticities below this part of the largest count as zero.
 _NONE = 1e-9
 
 
 def figures(study: Study, result: Result) -> Gallery:
     """``sensitivities``."""
-    found = Gallery()
-    found.add("sensitivities", sensitivities_figure, result.main)
-    return found
+    gallery = Gallery()
+    gallery.add("sensitivities", sensitivities_figure, result.main)
+    return gallery
 
 
 def sensitivities_figure(table: Table) -> Figure:
@@ -52,7 +52,7 @@ def sensitivities_figure(table: Table) -> Figure:
 
 
 def _order(elasticity: Floats) -> Ints:
-    """Places of the largest first, of those that are not known last."""
+    """Order of elasticities by size, the largest first, unknown ones last."""
     return np.argsort(-np.nan_to_num(np.abs(elasticity), nan=-1.0), kind="stable")
 
 
@@ -87,7 +87,7 @@ def _panel(axes: Axes, table: Table, rows: Ints) -> None:
 
 
 def _figures(table: Table, row: int) -> str:
-    """The derivative in figures; of a kink both slopes."""
+    """The derivative as text; at a kink both one-sided ones."""
     unit = style.printed(str(table["unit"][row]))
     if np.isfinite(table["below"][row]):
         return f"kink: {table['below'][row]:.4g} below, {table['above'][row]:.4g} above {unit}".rstrip()

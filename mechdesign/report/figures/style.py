@@ -97,7 +97,7 @@ _SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def context(look: str = "screen") -> Iterator[None]:
-    """Matplotlib's defaults and one of `LOOKS` for the time of drawing and saving; the user's settings come back."""
+    """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again."""
     wide, dots, reduction = LOOKS[look]
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     with matplotlib.rc_context():
@@ -117,7 +117,7 @@ def narrow() -> bool:
 
 
 class Picture(Figure):
-    """A figure that a notebook shows as a PNG; Matplotlib's own it shows only if pyplot manages them."""
+    """A figure that notebooks show as a PNG; plain Matplotlib figures are shown only if pyplot manages them."""
 
     def _repr_png_(self) -> bytes:
         with context():
@@ -173,7 +173,7 @@ def grow(figure: Figure, above: float = 0.0, below: float = 0.0) -> None:
 
 
 def folded(words: str, size: float, room: float) -> str:
-    """Words of a size (points) in lines of at most so many inches; ``x = 2 mm`` is broken only where it has to be."""
+    """Text of a size (points) in lines of at most `room` inches; ``x = 2 mm`` is broken only where it does not fit."""
     font, lines = FontProperties(size=size), []
 
     def fits(line: str) -> bool:
@@ -206,14 +206,14 @@ def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options:
 
 
 def levels(low: float, high: float, number: int) -> Floats:
-    """About so many levels at round numbers over a range; about its value where it is only one."""
+    """About `number` levels at round numbers over a range; around the value where the range is a single one."""
     if high - low <= 1e-9 * max(abs(low), abs(high)):
         low, high = low - 0.5 * max(abs(low), 1e-12), high + 0.5 * max(abs(high), 1e-12)
     return np.asarray(MaxNLocator(nbins=number, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
 
 
 def steps(levels: Floats, low: float, high: float) -> BoundaryNorm:
-    """A colour between each two levels, and one beyond each end that values from `low` to `high` pass."""
+    """One colour between neighbouring levels, and one beyond each end that the values from `low` to `high` exceed."""
     ends: list[Literal["neither", "min", "max", "both"]] = ["neither", "min", "max", "both"]
     return BoundaryNorm(levels, 256, extend=ends[bool(low < levels[0]) + 2 * bool(high > levels[-1])])
 

@@ -1,4 +1,4 @@
-"""The few numbers of a result that a person asks for first, found by the kinds of its columns."""
+"""The most important numbers of a result, chosen by the kinds of its columns."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from mechdesign.results import Column, Result, Table, TableKind
 from mechdesign.rows import unit_of
 from mechdesign.statistics import Asked
 
-# Most numbers of a question.
+# Largest number of headlines of a question.
 MOST = 8
-# Kinds of columns whose extremes are not shown: of some the largest size is.
+# Rates and forces: their extremes are not shown, of some the largest absolute value is.
 _RATES_AND_FORCES = [
     MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
 ]
-# Kinds of the columns that make a pose.
+# Kinds of columns that say which pose a row is of.
 _POSE = (DRIVE, GIVEN, HELD)
-# Part of the numbers beside it below which one differs from zero by rounding alone.
+# A number below this part of the others in its unit is zero up to rounding.
 _NOISE = 1e-12
 _DIGITS = 4
 _SMALL, _LARGE = 1e-3, 1e7
@@ -40,17 +40,17 @@ _NARROW = "\N{NARROW NO-BREAK SPACE}"
 
 @dataclass(frozen=True)
 class Headline:
-    """A number with its unit, and under which name it stands."""
+    """A number with its unit and its name."""
 
     label: str
     value: str
     unit: str = ""
-    note: str = ""  # where it is so, or within which bounds
+    note: str = ""  # the pose where it occurs, or its bounds
 
 
 @dataclass(frozen=True)
 class _Rule:
-    """Which columns give a number, and of which row."""
+    """A rule that picks a number: which column, and which row."""
 
     table: TableKind
     column: str  # its kind, by its declared name; empty: any
@@ -96,7 +96,7 @@ _RULES: dict[str, tuple[_Rule, ...]] = {
 
 
 def shown(value: float) -> str:
-    """A number for people: four digits, thousands apart, a power of ten where it is very small or large."""
+    """A number with four digits, thousands separated, with a power of ten where it is very small or large."""
     value = float(value)
     if not np.isfinite(value):
         return "none" if np.isnan(value) else "infinite" if value > 0 else f"{_MINUS}infinite"
@@ -110,8 +110,8 @@ def shown(value: float) -> str:
 
 
 def headlines(result: Result) -> list[Headline]:
-    """The first numbers of a result, at most `MOST`, each of a name once."""
-    found = {each.label: each for each in _best(result.main)}
+    """The headlines of a result, at most `MOST`, no name twice."""
+    numbers = {each.label: each for each in _best(result.main)}
     for rule in _RULES[result.command]:
         table = result.tables.get(rule.table.name)
         if table is None or not len(table):
@@ -120,8 +120,8 @@ def headlines(result: Result) -> list[Headline]:
             fits = not rule.column or column.kind == rule.table[rule.column]
             if fits and column.numeric and _asked(result, rule, column):
                 for each in _of(result, rule, column):
-                    found.setdefault(each.label, each)
-    return list(found.values())[:MOST]
+                    numbers.setdefault(each.label, each)
+    return list(numbers.values())[:MOST]
 
 
 def _best(table: Table) -> Iterator[Headline]:
@@ -134,7 +134,7 @@ def _best(table: Table) -> Iterator[Headline]:
 
 
 def _asked(result: Result, rule: _Rule, column: Column) -> bool:
-    """Whether a column is one that the study asked for: the rate of an output, a goal with a weight."""
+    """Whether the study asked for a column: the rate of an output, or a goal with a weight."""
     if rule.column == "<output>_velocity" and "extremes" in result.tables:
         return column.name.removesuffix("_velocity") in result.tables["extremes"]["output"]
     if not rule.column:
@@ -170,7 +170,7 @@ def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
         label = rule.label.format_map({**words, "name": name, "meaning": column.meaning})
         low, high = (float(table[bound][row]) for bound in rule.bounds or (column.name, column.name))
         if rule.table is EXTREMES and low == high:
-            # Of a motion of one pose.
+            # The motion has a single pose.
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
@@ -183,7 +183,7 @@ def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
 
 
 def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | None:
-    """The number over the whole motion, and its place, where the table knows the motion between its rows."""
+    """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table."""
     if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
         return None
     course = table.scope.course(Asked(column.name))
@@ -201,7 +201,7 @@ def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
 
 
 def _pose(table: Table, row: int) -> str:
-    """The pose of a row, or what is held in it; nothing where all rows have the same."""
+    """The pose of a row, or its held coordinates, in words; empty where all rows agree."""
     leading = [column for column in table.columns if column.kind in _POSE]
     if all(len(np.unique(column.values)) == 1 for column in leading):
         return ""

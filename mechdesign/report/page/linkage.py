@@ -22,10 +22,11 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.report.figures import shapes
 from mechdesign.report.figures.framing import fit
 from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions, rows
+from mechdesign.report.figures.panels import round_down
 from mechdesign.report.figures.scene import Scene
 from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
 
-# Of a drawing, in its own units, which are about points on paper: its width, its height at most, room around.
+# Width, greatest height and margin of a drawing, in its own units of about one point on paper.
 WIDTH = 520.0
 MAX_HEIGHT = 470.0
 _PAD = 30.0
@@ -54,22 +55,22 @@ class Sheet:
         return cls(window.middle + complex(-WIDTH, height) / 2 / scale, scale, WIDTH, height + _STRIP)
 
     def at(self, place: complex) -> complex:
-        """A place of the study in the drawing, whose y axis points down."""
+        """A point of the plane in the drawing's coordinates, whose y axis points down."""
         return ((place - self.corner) * self.scale).conjugate()
 
     def all(self, places: Complexes) -> Complexes:
-        """Several places of the study in the drawing."""
+        """Points of the plane in the drawing's coordinates."""
         return np.conj((places - self.corner) * self.scale)
 
     def path(self, places: Complexes) -> str:
-        """Lines along places, with no more corners than can be seen, broken where they are nan."""
+        """SVG path through points, simplified as far as no difference is visible, interrupted at nan."""
         drawn = self.all(places)
         corners = Path(np.column_stack([drawn.real, drawn.imag])).cleaned(remove_nans=True, simplify=True)
         steps = zip(np.asarray(corners.vertices).tolist(), np.asarray(corners.codes).tolist(), strict=True)
         return "".join(f"{_LETTERS[code]}{x:.1f} {y:.1f}" for (x, y), code in steps if code in _LETTERS)
 
     def root(self, alt: str) -> Element:
-        """The drawing, empty but for its white card."""
+        """The empty drawing with a white background."""
         looks = {"viewBox": f"0 0 {self.width:g} {self.height:.1f}", "role": "img", "aria-label": alt, "fill": "none"}
         root = Element(
             "svg", looks | {"class": "moving-drawing", "stroke-linecap": "round", "stroke-linejoin": "round"}
@@ -106,7 +107,7 @@ class Sketcher:
         return add(self.root, "g", **moves, transform=place)
 
     def _local(self, link: str, place: complex) -> complex:
-        """A place from the first point of a link, in the link's frame and the drawing's units, the y axis down."""
+        """A point in the frame of a link at the link's first point, in the drawing's units, y axis down."""
         way = place - self.scene.points[self.scene.link_points(link)[0]]
         return (way / self.scene.rotations[link] * self.sheet.scale).conjugate()
 
@@ -154,7 +155,7 @@ class Sketcher:
             stroke_width=width, opacity=share)  # fmt: skip
 
     def names(self, scenes: Sequence[Scene]) -> None:
-        """Names of the points and links, each where it covers least in some poses of the motion.
+        """Names of the points and links, each where it covers least, averaged over some poses of the motion.
 
         Those of links stay level; the script shows them on request.
         """
@@ -189,7 +190,7 @@ class Sketcher:
         x, y = position.offset.tolist()
         color = to_hex(label.color)
         if position.leader:
-            # From what is named to the edge of the text.
+            # The leader runs from the named point to the edge of the text.
             middle, width = complex(x, -y), float((label.half / np.maximum(np.abs(position.offset), 1e-9)).min())
             begin, end = middle / abs(middle) * max(label.reach - 3.0, 3.0), middle * (1 - width)
             add(group, "line", x1=begin.real, y1=begin.imag, x2=end.real, y2=end.imag, stroke=color, stroke_width=0.7)
@@ -197,7 +198,7 @@ class Sketcher:
             fill=color, stroke="white", stroke_width=2.6, paint_order="stroke", **looks)  # fmt: skip
 
     def _outline(self, shape: Shape) -> tuple[Complexes, float, bool]:
-        """What a shape covers: its outline on paper, its width, whether it is an area."""
+        """The area that a shape covers: its outline on paper, its line width, and whether it is filled."""
         if isinstance(shape, Line):
             outline = self.sheet.all(np.array(shape.places)).conj() + shape.rail
             return outline, HATCHED if shape.rail else shape.width, shape.filled
@@ -207,7 +208,7 @@ class Sketcher:
 
     def ruler(self, unit: str) -> None:
         """A bar of the drawing's scale at its lower left corner."""
-        length = rounded(_RULER * self.sheet.width / self.sheet.scale)
+        length = round_down(_RULER * self.sheet.width / self.sheet.scale)
         begin, wide = complex(12, self.sheet.height - 6), length * self.sheet.scale
         add(self.root, "path", d=f"M{_pair(begin - 4j)}v4h{_number(wide)}v-4", stroke=_STEEL)
         add(self.root, "text", f"{length:g} {unit}".rstrip(), x=begin.real + wide / 2, y=begin.imag - 4,
@@ -216,26 +217,22 @@ class Sketcher:
 
 def add(parent: Element, kind: str, /, text: str | None = None, **looks: str | float) -> Element:
     """A new element with attributes, whose names have a hyphen for each underscore."""
-    told = {key.replace("_", "-"): look if isinstance(look, str) else _number(look) for key, look in looks.items()}
-    element = SubElement(parent, kind, told)
+    attributes = {
+        key.replace("_", "-"): look if isinstance(look, str) else _number(look) for key, look in looks.items()
+    }
+    element = SubElement(parent, kind, attributes)
     element.text = text
     return element
 
 
 def dashed(element: Element, dashes: Dashes, width: float) -> None:
-    """Give a line of some width its dashes."""
+    """Set the dashes of a line; they are multiples of its width."""
     if not isinstance(dashes, str):
         element.set("stroke-dasharray", " ".join(_number(width * part) for part in dashes[1]))
 
 
-def rounded(value: float) -> float:
-    """The largest of 1, 2, 5 times powers of ten that is not above a value."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(step * power for step in (1, 2, 5) if step * power <= value)
-
-
 def _number(value: float) -> str:
-    """Two decimals, as short as they can be written."""
+    """A number with at most two decimals, without trailing zeros."""
     return f"{round(value, 2) + 0.0:g}"
 
 

@@ -10,33 +10,36 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.rates import drive_rates
+from mechdesign.analyses.optimize.analysis import DrawnDesigns
 from mechdesign.analyses.outputs import expand_outputs
 from mechdesign.analyses.poses import Shown, SolvedPoses
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.kinematics.paths import path_looks
-from mechdesign.report.figures.panels import abscissa
+from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
-from mechdesign.report.page.linkage import Sheet, Sketcher, rounded
+from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
 from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
-# Of more poses some are left out, evenly.
+# Of more poses evenly spread ones are taken.
 MAX_POSES = 721
-_COMMON = 0.9  # part of the velocities that are smaller than the one whose arrow has the usual length
-_FEW_POSES = 24  # that the window shows whole, and in which names keep off the links
-# Seconds that a motion takes on the screen where it has no time of its own, and where its own is too short or long.
+_COMMON = 0.9  # quantile of the speeds whose arrow has the usual length
+_FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
+# Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
-_ASTRAY = 0.05  # part of a step by which the rates may lead elsewhere
+_ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
 _TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
 _WHY = {
@@ -48,24 +51,27 @@ _WHY = {
 _RATES = ("velocity", "acceleration")
 
 
-def moving(study: Study, result: Result) -> Moving | None:
-    """The mechanism of a result that has poses to move through: a sweep, a path, the grid of a workspace.
+def moving(study: Study, result: Result, before: Before | None = None) -> Moving | None:
+    """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
-    Of an optimisation it is that of the best design.
+    Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
     """
     name = f"{result.command}-curves"
-    if result.command == "optimize":
-        designs = result.drawn["designs"]
-        study, result = result.drawn["design"](designs.design(designs.best))
+    if isinstance(result.drawn, DrawnDesigns):
+        best = result.drawn.best
+        judged = best.region or best.motion
+        if judged is None:
+            return None
+        study, result = best.study, judged
     with style.context():
-        if "motion" in result.drawn and result.drawn["poses"].motion:
-            return _motion(study, result, name)
+        if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
+            return _motion(study, result, result.drawn.shown, name, before)
         return roaming(study, result) if "local" in result.tables else None
 
 
-def _motion(study: Study, result: Result, name: str) -> Moving | None:
+def _motion(study: Study, result: Result, motion: Shown, name: str, before: Before | None) -> Moving | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
-    whole = Sweep.of(result.drawn["motion"])
+    whole = Sweep.of(motion)
     some = evenly(len(whole.rows), MAX_POSES)
     shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
     sweep = Sweep.of(shown)
@@ -86,7 +92,7 @@ def _motion(study: Study, result: Result, name: str) -> Moving | None:
         [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
         for given in sweep.poses.values if given in table
     ]  # fmt: skip
-    figure, beside = curves_figure(study, result), ""
+    figure, beside = curves_figure(study, result.tables, motion.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
         data["curves"] = _curves(study, sweep, figure, table, numbers)
@@ -131,13 +137,13 @@ def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, li
                 names.append(point)
     rows = []
     for name in dict.fromkeys(names):
-        found = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
-        rows.append((name, [None if column is None else numbers.cell(column) for column in found]))
+        cells = [columns.get("_".join(filter(None, (name, kind)))) for kind in kinds]
+        rows.append((name, [None if column is None else numbers.cell(column) for column in cells]))
     return ["value", *kinds[1:]], rows
 
 
 def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
-    """When each pose is passed, from the rates of the study where these lead along the motion; else evenly."""
+    """Time of each pose, from the rates of the study if these follow the motion; else evenly spaced."""
     section, unit = study.kinematics, study.units.label("time")
     steps, own = _steps(sweep, table, section.rates if section else {}), None
     times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
@@ -154,10 +160,10 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
 
 
 def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | None:
-    """Time from each pose to the next, where the rates lead from one to the other; negative where they lead back."""
+    """Time from each pose to the next if the rates follow the motion, negative where they run against it; else None."""
     along, square, length = (np.zeros(len(sweep.rows) - 1) for _ in range(3))
     rated = [name for name in table.names if f"{name}_velocity" in table or name in rates]
-    # The drives, where their rates are known: they move at even rates more often than what they drive.
+    # The drives if their rates are known: their rates are constant more often than those of other coordinates.
     for name in [name for name in rated if name in sweep.poses.values] or rated:
         if f"{name}_velocity" in table:
             rate = table[f"{name}_velocity"][sweep.rows]
@@ -175,16 +181,16 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
     known = square > 0
     if not known.any():
         return None
-    found = np.where(known, along / np.where(known, square, 1.0), np.nan)
-    # What is left of a step where the rates have had their time.
-    astray = length - 2 * found * along + found**2 * square
-    if np.any(known & ((found * found[known][0] <= 0) | (astray > _ASTRAY * length))):
+    times = np.where(known, along / np.where(known, square, 1.0), np.nan)
+    # Squared distance of each step from what the rates predict for its time.
+    astray = length - 2 * times * along + times**2 * square
+    if np.any(known & ((times * times[known][0] <= 0) | (astray > _ASTRAY * length))):
         return None
-    return np.where(known, found, np.nanmedian(found))
+    return np.where(known, times, np.nanmedian(times))
 
 
 def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
-    """Velocities of the moving points as arrows of the drawing, and how long a round one is; nothing without rates."""
+    """Velocities of the moving points as arrows of the drawing, and the length of a round one; empty without rates."""
     section, configuration = study.kinematics, sweep.configuration
     if section is None or not (section.rates or section.speed):
         return {}
@@ -192,20 +198,20 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
     velocity = linear.velocity(drive_rates(study, section, sweep.poses, solved, linear).velocities)
     known = configuration.valid & (regularity(linear) >= STALLED)
-    found = {}
+    velocities = {}
     for point in sweep.places:
         x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
-        found[point] = np.where(known, x + 1j * y, np.nan)
-    speeds = np.abs(np.concatenate(list(found.values())))
+        velocities[point] = np.where(known, x + 1j * y, np.nan)
+    speeds = np.abs(np.concatenate(list(velocities.values())))
     speeds = speeds[np.isfinite(speeds)]
     if not speeds.any():
         return {}
-    # Near a dead centre some may grow without bounds: their arrows leave the drawing.
+    # Near a dead centre velocities grow without bound: their arrows leave the drawing.
     usual = float(np.quantile(speeds, _COMMON)) or float(speeds.max())
-    scale, length = _ARROW / usual, rounded(usual)
+    scale, length = _ARROW / usual, round_down(usual)
     unit = style.printed(study.units.label("velocity"))
     arrows = {point: [deltas(each.real * scale, PLACES), deltas(-each.imag * scale, PLACES)]
-              for point, each in found.items()}  # fmt: skip
+              for point, each in velocities.items()}  # fmt: skip
     return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
 
 
@@ -226,7 +232,7 @@ def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: N
             if column is None or axes.get_yscale() != "linear":
                 continue
             which = numbers.add(column)
-            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.found[column.name][2]
+            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.scaled[column.name][2]
             start = tall * (1 - box.y0) + tall * box.height * bottom / (top - bottom)
             dots.append([which, slope, round(start, 2), round(tall * (1 - box.y1), 1), round(tall * (1 - box.y0), 1),
                          to_hex(line.get_color())])  # fmt: skip

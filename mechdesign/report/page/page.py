@@ -1,4 +1,4 @@
-"""The report of a study as one HTML file that asks for nothing else, and the index of several."""
+"""The report of a study as one HTML file that loads no other file, and the index of several reports."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from mechdesign.study.schema.reliability import in_words
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import path_of
 
-# Pixels of the drawings in an index, twice as many as they are wide on the page, and their colours.
+# Pixels of the drawings in an index, twice their width on the page, and the number of their colours.
 _THUMBNAIL = (240, 180)
 _FEW_COLORS = 32
 
 
 @dataclass(frozen=True)
 class Answered:
-    """What became of one question."""
+    """The outcome of one question."""
 
     command: str
     outcome: str  # in words
@@ -107,7 +107,7 @@ def index(entries: Sequence[Entry]) -> bytes:
 
 
 def _sketch(study: Study) -> str:
-    """The sketch where no question has drawn the mechanism; nothing where it cannot be drawn."""
+    """The sketch, if no question has drawn the mechanism; empty if it cannot be drawn."""
     try:
         with style.context():
             return vector.inline(sketch_figure(study), "sketch", "the sketch, assembled")
@@ -155,7 +155,7 @@ def _page(template: str, *, moving: bool, **content: Any) -> bytes:
         **content,
         generator=Markup(GENERATOR),
         policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
-        # They are the package's own, and hold no end of their elements.
+        # These texts are files of the package, and none contains the end tag of its element.
         styles=Markup(styles),
         script=Markup(script),
     )
@@ -206,12 +206,12 @@ def _about(study: Study) -> dict[str, Any]:
         lines = [*describe(mechanism).splitlines(), *in_words(study.reliability, graph, study.sizes)]
     except Exception as error:
         lines = [explain(error)[1]]
-    told: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}
+    listed: dict[str, list[str]] = {"joint": [], "limit": [], "measure": [], "clearance": []}
     rest = []
     for line in lines:
         kind, _, words = line.partition(": ")
-        if kind in told:
-            told[kind].append(words)
+        if kind in listed:
+            listed[kind].append(words)
         elif kind not in ("links", "mobility"):
             rest.append(line.strip())
     links = [
@@ -221,7 +221,7 @@ def _about(study: Study) -> dict[str, Any]:
     parameters = [(name, shown(value), study.unit_of(name) or "") for name, value in study.parameters.nominal.items()]
     loops = len(graph.edges) - len(graph.nodes) + 1
     return {
-        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": told,
+        "links": links, "drives": drives_in_words(description), "parameters": parameters, "told": listed,
         "solution": rest, "loops": loops,
         "mobility": mechanism.mobility, "length_unit": units.label("length"),
     }  # fmt: skip

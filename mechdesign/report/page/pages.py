@@ -1,4 +1,4 @@
-"""The files of reports, and how they are known."""
+"""Names of the files of a report, and how a page of mechdesign is recognised."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ HELP_PAGE = "howto/report"
 REPORT = "report.html"
 INDEX = "index.html"
 SECTION = "report.json"  # what a page says of a result
-# By this a file is known as one of these pages.
+# A page of mechdesign is recognised by this mark.
 GENERATOR = '<meta name="generator" content="mechdesign">'
 
 
 def harmless(value: Any) -> Any:
-    """What a template is given, texts without what turns or hides the letters beside it; HTML as it is."""
+    """Values for a template: texts without control characters that reverse or hide letters, HTML unchanged."""
     return printable_lines(value) if type(value) is str else value
 
 

@@ -28,7 +28,7 @@ from mechdesign.report.page.tracks import Moving, Numbers, places
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
-# Cells of the region's larger side with one pose each at most, of a single region and of each of several.
+# Cells along the larger side of a region, each with at most one pose: for a single region, and for each of several.
 CELLS = 60
 FEW_CELLS = 32
 _DPI = 96  # of the map of an index
@@ -41,35 +41,35 @@ _COLORS = 64  # of the map
 
 def roaming(study: Study, result: Result) -> Moving | None:
     """The mechanism in its workspace, for each of a few values of held coordinates."""
-    found = some(regions(study, result))
+    shown = some(regions(study, result))
     section, mechanism = study.workspace, study.mechanism
-    if not found or section is None:
+    if not shown or section is None:
         return None
-    cells = CELLS if len(found) == 1 else FEW_CELLS
-    solved = [_solved(study, region, cells) for region in found]
+    cells = CELLS if len(shown) == 1 else FEW_CELLS
+    solved = [_solved(study, region, cells) for region in shown]
     reached = [np.ravel(configuration.point(point)) for _, configuration in solved for point in mechanism.points]
-    everywhere = np.concatenate([*(region.places() for region in found), *reached])
+    everywhere = np.concatenate([*(region.places() for region in shown), *reached])
     sheet = Sheet.around(everywhere[np.isfinite(everywhere)])
     choices, drawn, alike = [], [], None
-    for region, (rows, configuration) in zip(found, solved, strict=True):
+    for region, (rows, configuration) in zip(shown, solved, strict=True):
         table = _table(study, region, rows, configuration)
         begin = int(np.argmax(np.nan_to_num(table["inverse_condition"], nan=-1.0)))
         numbers = Numbers(table, np.arange(len(rows)), begin, alike)
         alike = alike or numbers
-        told = [(column.name, [numbers.cell(column)]) for column in table.columns]
+        entries = [(column.name, [numbers.cell(column)]) for column in table.columns]
         links = mechanism.description.links
         step = sheet.scale * max(np.ptp(table[f"{section.point}.{axis}"]) for axis in "xy") / cells
         choice = {"title": region.title, "poses": len(rows), "first": begin, "step": round(step, 1)}
         choices.append(choice | {"numbers": numbers.tracks} | places(sheet, configuration, links))
-        drawn.append((begin, told))
-    (begin, told), (rows, configuration) = drawn[0], solved[0]
+        drawn.append((begin, entries))
+    (begin, entries), (rows, configuration) = drawn[0], solved[0]
     scene = pose(mechanism, configuration, begin)
     assert scene is not None
     root = sheet.root(f"the mechanism in the workspace of point {section.point}")
-    index = next((name for name in index_columns(found[0])
-                  if all(np.isfinite(region.local[name]).any() for region in found)), "")  # fmt: skip
-    norm = index_norm(found, index) if index else None
-    for k, region in enumerate(found):
+    index = next((name for name in index_columns(shown[0])
+                  if all(np.isfinite(region.local[name]).any() for region in shown)), "")  # fmt: skip
+    norm = index_norm(shown, index) if index else None
+    for k, region in enumerate(shown):
         layer = add(root, "g", **{"class": "moving-region" if k == 0 else "moving-region moving-off"})
         _region(layer, sheet, region)
         if norm is not None:
@@ -81,10 +81,10 @@ def roaming(study: Study, result: Result) -> Moving | None:
     sketcher.draw()
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
-    _legend(root, sheet, found, found[0].local.column(index) if index else None, norm)
+    _legend(root, sheet, shown, shown[0].local.column(index) if index else None, norm)
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
-    words = f"point {section.point} in its workspace" + (f", at {found[0].title}" if found[0].title else "")
-    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], told)
+    words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
+    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], entries)
 
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
@@ -112,8 +112,8 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
         drive = study.mechanism.coordinate(name)
         values = np.asarray(in_study_units(study, drive, configuration.value(drive)))
         columns.append(Column(name, np.broadcast_to(values, len(rows)), study.units.label(drive.quantity)))
-    told = [region.local.column(name) for name in index_columns(region)]
-    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in told]
+    indices = [region.local.column(name) for name in index_columns(region)]
+    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in indices]
     return Table("poses", tuple(columns))
 
 
@@ -165,10 +165,10 @@ def _look(line: Element, kind: str) -> None:
 
 
 def _legend(
-    root: Element, sheet: Sheet, found: Sequence[Region], index: Column | None, norm: BoundaryNorm | None
+    root: Element, sheet: Sheet, shown: Sequence[Region], index: Column | None, norm: BoundaryNorm | None
 ) -> None:
     """Below the drawing what ends the regions, and what the colours of the map mean."""
-    seen = {fate(str(kind), str(at)) for region in found
+    seen = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip
     kinds = [kind for kind in LOOKS if kind in seen]
     columns = int(sheet.width // _ENTRY)

@@ -1,4 +1,4 @@
-"""What stands of one question in a report, as plain data: it is kept in the question's folder, as ``report.json``."""
+"""The part of a report about one question, as plain data: ``report.json`` in the folder of the question."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import explain
+from mechdesign.report.before import Before
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
 from mechdesign.report.tables import cells, json_text, plain
@@ -18,12 +19,12 @@ from mechdesign.study import Study
 
 HELP_PAGE = "howto/report"
 
-# Of a mechanism that moves: the picture of the same curves is left out.
+# Beside a moving mechanism this picture of the same curves is left out.
 CURVES = "motion"
-# Tables of more rows than this are shown by their first ones.
+# Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
-# A table of few rows and many columns is turned: a line a column, with its meaning.
+# A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
 _DIGITS = 6
@@ -31,8 +32,8 @@ _NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIG
 
 
 def section(
-    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[Caution], *,
-    plots: bool,
+    study: Study, result: Result, pictures: Mapping[str, str], mechanism: str, undrawn: Sequence[Caution],
+    before: Before | None = None, *, plots: bool,
 ) -> tuple[dict[str, Any], tuple[Caution, ...]]:  # fmt: skip
     """The part of a report that a result fills, and a warning if the mechanism cannot be shown moving.
 
@@ -42,13 +43,15 @@ def section(
         HTML of the pictures of the question by their names.
     mechanism : str
         HTML of the drawing of the mechanism; empty where there is none.
+    before : Before, optional
+        The study before, whose curves stand beside the mechanism that moves, too.
     plots : bool
         Whether pictures are wanted; without them nothing moves.
     """
     part, warnings = None, tuple(undrawn)
     if plots and not result.interrupted:
         try:
-            part = moving(study, result.seen)
+            part = moving(study, result.seen, before)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))

@@ -22,16 +22,16 @@ from mechdesign.results import Column, Table
 PLACES = 20
 TURNS = 100
 CURVES = 10
-# Steps of a number up to its usual size, at least.
+# Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
-_COMMON = 0.5  # part of the values that are smaller than what counts as the size of a column
-_ROUNDING = 1e-11  # of a number that should be zero, and its part of others of its unit
+_COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
+_ROUNDING = 1e-11  # a number that should be zero may be this part of the others of its unit
 _POWERS = (-3, 5)  # of ten, beyond which numbers are written with a power of their own
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A number of the pose drawn, which of the numbers it is, and its unit."""
+    """A number in the pose that is drawn: its index among all numbers, its text and its unit."""
 
     number: int
     text: str
@@ -51,7 +51,7 @@ class Moving:
 
 
 class Numbers:
-    """Columns as integers of their last decimal shown, and the text of each in the pose drawn.
+    """Columns as integers in units of their last shown decimal, and the text of each in the pose that is drawn.
 
     Those of further poses have as many decimals as `alike`, and the same units.
     """
@@ -63,17 +63,17 @@ class Numbers:
             if column.values.dtype.kind == "f":
                 self.sizes[column.unit] = max(self.sizes.get(column.unit, 0.0), _size(column.values[rows]))
         self.tracks: list[list[Any]] = []
-        self.found: dict[str, tuple[int, int, int]] = {}
+        self.scaled: dict[str, tuple[int, int, int]] = {}
         self.units: dict[str, str] = {}
 
     def add(self, column: Column) -> int:
-        """Take over a column; returns which of the numbers it is."""
-        if column.name in self.found:
-            return self.found[column.name][0]
+        """Add a column and return its index among the numbers."""
+        if column.name in self.scaled:
+            return self.scaled[column.name][0]
         values = column.values[self.rows]
-        decimals, power = self._digits(column) if self.alike is None else self.alike.found[column.name][1:]
+        decimals, power = self._digits(column) if self.alike is None else self.alike.scaled[column.name][1:]
         self.tracks.append([decimals, deltas(values, 10.0 ** (decimals - power))])
-        self.found[column.name] = len(self.tracks) - 1, decimals, power
+        self.scaled[column.name] = len(self.tracks) - 1, decimals, power
         factor = f"\N{MULTIPLICATION SIGN}10{style.raised(power)} " if power else ""
         self.units[column.name] = f"{factor}{style.printed(column.unit)}".rstrip()
         return len(self.tracks) - 1
@@ -82,7 +82,7 @@ class Numbers:
         """Decimals of a column, and the power of ten of its unit."""
         size, largest = _size(column.values[self.rows]), self.sizes.get(column.unit, 0.0)
         if size <= _ROUNDING * max(1.0, largest):
-            # What stands still but for rounding has the digits of what moves.
+            # A column that is constant up to rounding gets as many digits as the columns that vary.
             size = largest if largest > _ROUNDING else 1.0
         power = math.floor(math.log10(size))
         power = 0 if _POWERS[0] < power < _POWERS[1] else 3 * (power // 3)
@@ -91,7 +91,7 @@ class Numbers:
     def cell(self, column: Column) -> Cell:
         """The column's number in the pose drawn."""
         which = self.add(column)
-        _, decimals, power = self.found[column.name]
+        _, decimals, power = self.scaled[column.name]
         value = float(column.values[self.rows[self.begin]])
         text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
         return Cell(which, text, self.units[column.name])
@@ -108,28 +108,28 @@ def deltas(values: Floats, factor: float) -> list[int | None]:
 
     Steps of zero at the end are left out.
     """
-    found: list[int | None] = []
+    steps: list[int | None] = []
     last = 0
     for value in (values * factor).tolist():
         whole = round(value) if math.isfinite(value) else None
-        found.append(None if whole is None else whole - last)
+        steps.append(None if whole is None else whole - last)
         last = last if whole is None else whole
-    while found and found[-1] == 0:
-        found.pop()
-    return found
+    while steps and steps[-1] == 0:
+        steps.pop()
+    return steps
 
 
 def places(sheet: Sheet, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:
     """Places of the points and directions of the links in every pose, in the drawing's units and degrees."""
     valid = configuration.valid
-    found: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
+    tracks: dict[str, Any] = {"corner": [sheet.corner.real, sheet.corner.imag], "scale": sheet.scale,
                              "x": {}, "y": {}, "turn": {}}  # fmt: skip
     for point in dict.fromkeys(point for link in links.values() for point in link_points(link)):
         at = sheet.all(np.where(valid, configuration.point(point), complex(np.nan, np.nan)))
-        found["x"][point], found["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
+        tracks["x"][point], tracks["y"][point] = deltas(at.real, PLACES), deltas(at.imag, PLACES)
     for name in links:
         if name != GROUND:
             angles = np.full(len(valid), np.nan)
             angles[valid] = np.unwrap(-np.angle(configuration.rotation(name)[valid]))
-            found["turn"][name] = deltas(np.degrees(angles), TURNS)
-    return found
+            tracks["turn"][name] = deltas(np.degrees(angles), TURNS)
+    return tracks

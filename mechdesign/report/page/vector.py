@@ -1,4 +1,4 @@
-"""Figures as they stand in a page: inline SVG where that is small, else a picture of pixels as a data URI."""
+"""Figures in an HTML page: inline SVG where that is small, else a PNG as a data URI."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from mechdesign.report.figures import style
 
 Element = ElementTree.Element
 
-# Bytes that the lines and letters of SVG may cost more than a picture of pixels, which cannot be enlarged or searched.
+# SVG may have this many times the bytes of a PNG, which can be neither enlarged nor searched.
 MAX_RATIO = 1.5
-# Bytes of SVG below which nothing is weighed.
+# SVG with fewer bytes than this is always taken.
 SMALL = 40_000
 # Decimals of the places in SVG, in points of 1/72 inch.
 _DECIMALS = 2
@@ -29,15 +29,15 @@ _TOKEN = re.compile(rf"[A-Za-z]|{_NUMBER.pattern}")
 _REFERENCE = re.compile(r"#([\w.-]+)")
 _SPACE = "{http://www.w3.org/2000/svg}"
 _LINK = "{http://www.w3.org/1999/xlink}href"
-# What a page does not need, and what SVG assumes where nothing is said.
+# Attributes that a page does not need, and defaults of SVG.
 _LEFT_OUT = {f"{_SPACE}metadata", f"{_SPACE}style"}
 _ASSUMED = {"stroke-linejoin": "round", "stroke-linecap": "butt", "stroke-dasharray": "none", "text-anchor": "start"}
-# Marks texts with a white edge, by which they are found again in SVG.
+# Mark of texts with a white edge, so that they can be recognised in the SVG.
 _HALO = "halo"
 
 
 def described(figure: Figure) -> str:
-    """What a figure shows, for those who do not see it: the titles of its panels and what their axes count."""
+    """Alternative text of a figure: the titles of its panels and the labels of their axes."""
     parts: dict[str, None] = {}
     for axes in figure.axes:
         labels = axes.get_xlabel(), axes.get_ylabel()
@@ -69,12 +69,12 @@ def picture(figure: Figure, name: str, alt: str, png: bytes | None = None) -> st
 
 
 def inline(figure: Figure, name: str, alt: str) -> str:
-    """A figure as an SVG element for a page: its texts are texts, nothing in it names another file; see `picture`."""
+    """A figure as an SVG element for a page, with texts as texts and without links to other files; see `picture`."""
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
         halo = _halo(text)
         if halo is not None:
-            # As an effect it would be drawn as outlines of letters.
+            # As a path effect it would turn the letters into outlines.
             text.set_path_effects([])
             text.set_gid(f"{_HALO}{halo:g}")
     with matplotlib.rc_context({"svg.fonttype": "none"}):
@@ -99,7 +99,7 @@ def _halo(text: Text) -> float | None:
 
 
 def _clean(element: Element, halo: str) -> None:
-    """Bring names, looks and numbers of an element, and all in it, to the form that HTML takes, and round them."""
+    """Convert names, attributes and numbers of an element and its children to what HTML accepts, and round them."""
     halo = element.get("id", "").removeprefix(_HALO) if element.get("id", "").startswith(_HALO) else halo
     for child in list(element):
         if child.tag in _LEFT_OUT:
@@ -135,14 +135,14 @@ def _clean(element: Element, halo: str) -> None:
 
 def _rounded(number: str) -> str:
     text = f"{float(number):.{_DECIMALS}f}".rstrip("0").rstrip(".")
-    # Scales of one unit of a font are small numbers.
+    # Scales of font units are small numbers and keep more digits.
     return (text if abs(float(number)) >= 0.1 or float(number) == 0 else f"{float(number):.4g}").replace("-0.", "-.")
 
 
 def _length(text: str, look: dict[str, str]) -> float:
-    """How long a text was when the figure was laid out; it keeps this length where another font is taken."""
+    """Length of a text in the font of the layout; the browser keeps this length with another font."""
     weight = "bold" if look.get("font-weight") in ("bold", "700") else "normal"
-    # Matplotlib's own fonts, which it opens anew in a forked process: two that read one file at once find no letters.
+    # Fonts are opened anew in each forked process: two processes that share a file position find no glyphs.
     font = get_font(findfont(FontProperties(family="DejaVu Sans", weight=weight)))
     font.set_size(100.0, 72)
     font.set_text(text)
@@ -150,16 +150,16 @@ def _length(text: str, look: dict[str, str]) -> float:
 
 
 def _path(text: str) -> str:
-    """A path in steps from point to point, in whole units of the last decimal and as short as that can be written."""
+    """A path in relative steps, in whole units of the last decimal, as short as possible."""
     unit = 10**_DECIMALS
-    found: list[str] = []
+    commands: list[str] = []
     here, start, command, last = (0, 0), (0, 0), "", ""
     numbers: list[int] = []
     for token in _TOKEN.findall(text):
         if token.isalpha():
             command, numbers = token, []
             if token in "zZ":
-                found.append("z")
+                commands.append("z")
                 here, last = start, "z"
             continue
         numbers.append(round(float(token) * unit))
@@ -169,25 +169,25 @@ def _path(text: str) -> str:
         numbers = []
         steps = [each for x, y in points for each in (x - here[0], y - here[1])]
         if command == "M":
-            found.append("M" + _joined(points[0]))
+            commands.append("M" + _joined(points[0]))
             start, last = points[0], "m"
         else:
-            # One letter stands for all that follow it of its kind.
+            # One command letter serves all following steps of its kind.
             letter = command.lower()
-            told = _joined(tuple(steps))
-            found.append((letter if letter != last else "" if told[0] == "-" else " ") + told)
+            way = _joined(tuple(steps))
+            commands.append((letter if letter != last else "" if way[0] == "-" else " ") + way)
             last = letter
         here = points[-1]
-    return "".join(found)
+    return "".join(commands)
 
 
 def _joined(numbers: tuple[int, ...]) -> str:
-    told = ""
+    joined = ""
     for number in numbers:
         text = f"{number / 10**_DECIMALS:.{_DECIMALS}f}".rstrip("0").rstrip(".")
         text = text.replace("0.", ".", 1) if text.startswith(("0.", "-0.")) else text
-        told += text if not told or text[0] == "-" else f" {text}"
-    return told
+        joined += text if not joined or text[0] == "-" else f" {text}"
+    return joined
 
 
 def _ids(root: Element, used: set[str]) -> Iterator[str]:
@@ -206,7 +206,7 @@ def _rename(root: Element, names: dict[str, str]) -> None:
 
 
 def _unwrap(element: Element) -> None:
-    """Take out groups and definitions that say nothing of what is in them."""
+    """Remove groups and definitions without attributes or content."""
     for child in list(element):
         _unwrap(child)
     children = []

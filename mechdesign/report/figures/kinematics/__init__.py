@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mechdesign.report.before import known
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
+from mechdesign.report.before import Before
 from mechdesign.report.figures.kinematics.curves import curves_figure
 from mechdesign.report.figures.kinematics.paths import modes_figure, paths_figure
 from mechdesign.report.figures.kinematics.poses import poses_figure
@@ -13,22 +14,21 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 
 
-def figures(study: Study, result: Result) -> Gallery:
+def figures(study: Study, result: Result, before: Before | None = None) -> Gallery:
     """``motion``, ``paths``, ``poses``, ``transmission`` and ``modes``.
 
     They are curves of a sweep or path, poses and point paths, limits or listed poses one by one, how force is passed
     on, and every assembly. Lists of poses have neither curves nor paths, grids have no pictures but their assemblies.
     """
-    found = Gallery()
-    if result.drawn["poses"].motion:
-        found.add("motion", curves_figure, study, result)
-        sweep = Sweep.of(result.drawn["motion"])
+    gallery, drawn, tables = Gallery(), DrawnMotion.of(result), result.tables
+    sweep = Sweep.of(drawn.shown)
+    if sweep.poses.motion:
+        gallery.add("motion", curves_figure, study, tables, sweep.poses, before)
         if len(sweep.valid):
-            centres = result.tables.get("instant_centres")
-            found.add("paths", paths_figure, sweep, centres=centres, before=known(result.drawn))
-    found.add("poses", poses_figure, study, result)
-    if result.drawn["poses"].motion:
-        found.add("transmission", transmission_figure, study, result)
-    if "modes" in result.tables:
-        found.add("modes", modes_figure, study, result)
-    return found
+            gallery.add("paths", paths_figure, sweep, centres=tables.get("instant_centres"), before=before)
+    gallery.add("poses", poses_figure, study, sweep, drawn)
+    if sweep.poses.motion:
+        gallery.add("transmission", transmission_figure, study, tables, sweep)
+    if "modes" in tables:
+        gallery.add("modes", modes_figure, study, tables["modes"], drawn.modes, result.counts["modes"])
+    return gallery

@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
+from mechdesign.analyses.poses import Shown
 from mechdesign.numerics.arrays import Ints, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import TITLE, framed
 from mechdesign.report.figures.kinematics.paths import HEIGHT, draw_paths
 from mechdesign.report.figures.scene import Sweep
-from mechdesign.results import Result
 
 FRAMES = 36  # at most
 _COLORS = 32
@@ -28,7 +28,7 @@ _MIN_FRAME = 50
 _MAX_FRAME = 160
 
 
-def animation(result: Result) -> bytes:
+def animation(shown: Shown) -> bytes:
     """The valid poses of a sweep or path as an endless GIF; back again where it does not end where it began.
 
     At most `FRAMES` frames. Poses that are not valid have none; the title says how many. Lists and grids of poses are
@@ -37,7 +37,7 @@ def animation(result: Result) -> bytes:
     Matplotlib draws what stands still once and what moves in every frame; Pillow gives all frames one small palette, so
     that a frame stores only what changed: a tenth of the time and the bytes of `matplotlib.animation.PillowWriter`.
     """
-    sweep = Sweep.of(result.drawn["motion"])
+    sweep = Sweep.of(shown)
     if not sweep.poses.motion or not len(sweep.valid):
         return b""
     valid, closed = in_order(sweep), sweep.closed
@@ -95,8 +95,8 @@ def _palette(pictures: list[Image.Image]) -> Image.Image:
     sheet = Image.new("RGB", (width, height * len(some)))
     for k, picture in enumerate(some):
         sheet.paste(picture, (0, k * height))
-    found = sheet.quantize(colors=_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    colors = np.array(found.getpalette()).reshape(-1, 3)
+    quantized = sheet.quantize(colors=_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colors = np.array(quantized.getpalette()).reshape(-1, 3)
     # Means of the lightest colours are not quite the white of the page.
     colors[colors.min(axis=1) >= _WHITE] = 255
     palette = Image.new("P", (1, 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.overlay import DASHES, name_both
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.scene import ranks
-from mechdesign.results import Column, Result, Table
-from mechdesign.study import Study, Units
+from mechdesign.results import Column, Table
+from mechdesign.study import Poses, Study, Units
 
 MAX_CURVES = 7  # in one panel; more cannot be told apart
 MAX_PANELS = 12
@@ -78,18 +79,19 @@ class _Panel(NamedTuple):
         return -(-len(self.curves) // self.columns) + bool(self.left_out)
 
 
-def curves_figure(study: Study, result: Result) -> Figure | None:
+def curves_figure(
+    study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None
+) -> Figure | None:
     """Every output over the swept coordinate, or along the path; None where nothing changes."""
-    table = result.tables["motion"]
-    if not moving_names(result.drawn["poses"]):
+    table = tables["motion"]
+    if not moving_names(poses):
         return None
-    over = abscissa(study, result.drawn["poses"])
+    over = abscissa(study, poses)
     swept, x = over.name, over.values
     panels = _panels(study, table, swept, x)
     if not panels:
         return None
-    before = known(result.drawn)
-    limits, marks = result.tables.get("limits"), []
+    limits, marks = tables.get("limits"), []
     if limits is not None and swept in limits:
         marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
@@ -126,7 +128,7 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): mechanism.size}
     # The condition of a single number is 1, that of each pose is for its table.
     left_out = {"conditioning"} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
-    found: dict[tuple[str, str], list[_Curve]] = {}
+    groups: dict[tuple[str, str], list[_Curve]] = {}
     for column in table.columns:
         if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
             continue
@@ -141,13 +143,13 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
         if order in ("position", "velocity", "acceleration") and swept and _still(values - x, float(np.ptp(x))):
             continue  # the sweep over itself
         # Of what stands still only the position is drawn, and only where it is an output.
-        told = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
-        if not told and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
+        always = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
+        if not always and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
             continue
-        found.setdefault((order, column.unit), []).append(_Curve(column, of, order))
+        groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
     rank = ranks(study)
     panels = []
-    for curves in sorted(found.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
+    for curves in sorted(groups.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
         if len(curves) > MAX_CURVES:
             curves.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
         panels.append(_Panel(curves[:MAX_CURVES], max(len(curves) - MAX_CURVES, 0)))
@@ -168,15 +170,15 @@ def _coincide(one: Floats, other: Floats) -> bool:
 def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
     """Ranges of x that are not valid, up to the limit of motion where one lies beside them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], invalid, [False]]).astype(int)))
-    found = []
+    ranges = []
     for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
         ends = []
         for inner, outer in ((first, max(first - 1, 0)), (last, min(last + 1, len(x) - 1))):
             low, high = sorted((x[inner], x[outer]))
             between = limits[(limits >= low) & (limits <= high)] if len(limits) else limits
             ends.append(float(between[0]) if len(between) else float(x[inner] + x[outer]) / 2)
-        found.append((ends[0], ends[1]))
-    return found
+        ranges.append((ends[0], ends[1]))
+    return ranges
 
 
 def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
@@ -220,7 +222,7 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
 
 def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
     """The curves of the study before, dashed, each in the colour of its name."""
-    table, x = before.result.tables["motion"], abscissa(before.study, before.result.drawn["poses"]).values
+    table, x = before.result.tables["motion"], abscissa(before.study, DrawnMotion.of(before.result).shown.poses).values
     low, high = axis.get_ylim()
     for curve in panel.curves:
         if curve.column.name in table:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
+from mechdesign.analyses.poses import Shown
 from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
@@ -21,7 +24,7 @@ from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.report.figures.shapes import link_colors
-from mechdesign.results import Result, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
@@ -35,11 +38,11 @@ _LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
 _TICK = 9.0  # points, across a path
 _MOST_TICKS = 24  # along a motion
 _FEWEST_TICKS = 4
-_UNEVEN = 2e-3  # part of the mean step by which those of a sweep may differ
+_UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
 # Of centrodes.
 _CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
-_NEAR = 0.75  # larger sides of the mechanism from its middle up to which a centrode widens the window
-_STILL = 1e-9  # sizes of the mechanism that a centre moves which stays
+_NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
+_STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is fixed
 # Of the panels of assemblies.
 _MAX_COLUMNS = 4
 _PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
@@ -65,7 +68,7 @@ def paths_figure(
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
-    earlier = Sweep.of(before.result.drawn["motion"]) if before is not None else None
+    earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
     centrodes = _centrodes(sweep, centres)
     middle, *sides = extent(sweep.extent)
     near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
@@ -74,8 +77,8 @@ def paths_figure(
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
     words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
              for link in centrodes]  # fmt: skip
-    if told := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
-        above = max(above, TITLE + _LEGEND_LINE * (told - 1))
+    if rows := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
+        above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
     for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
@@ -109,7 +112,7 @@ def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
     """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
     if centres is None:
         return {}
-    found = {}
+    centrodes = {}
     for name in centres.names:
         pair, _, column = name.rpartition(".")
         links = pair.split(".")
@@ -118,19 +121,19 @@ def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
             path[~np.isfinite(path)] = complex(np.nan, np.nan)
             known = path[np.isfinite(path)]
             if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
-                found[next(link for link in links if link != GROUND)] = path
-    return found
+                centrodes[next(link for link in links if link != GROUND)] = path
+    return centrodes
 
 
 def _leaps(path: Complexes, side: float) -> Flags:
-    """Points from which a path leaps through infinity, by its places about the mechanism's middle."""
+    """Points after which a path passes through infinity; `path` is relative to the mechanism's middle."""
     far = np.abs(path) > side
     turned = (np.conj(path[:-1]) * path[1:]).real < 0
     return np.append(far[:-1] & far[1:] & turned, False)
 
 
 def equal_times(sweep: Sweep) -> tuple[Ints, str] | None:
-    """Poses at equal steps of time, and how long these are in words; None where the swept drive has no one rate."""
+    """Poses at equal steps of time, and the step in words; None where the swept drive has no constant rate."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
     if section is None or not poses.motion or len(moving) != 1 or any(section.accelerations.values()):
@@ -196,21 +199,20 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     for name, link in sweep.mechanism.description.links.items():
         for point in link_points(link) if name != GROUND else ():
             owners.setdefault(point, name)
-    found = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
+    looks = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
              for point, path in sweep.traces.items()]  # fmt: skip
-    return sorted(found, key=lambda look: look.rank)
+    return sorted(looks, key=lambda look: look.rank)
 
 
-def modes_figure(study: Study, result: Result) -> Figure:
-    """A panel an assembly that has a valid pose, as many as the result carries, on one scale."""
-    shown = [(title, Sweep.of(each)) for title, each in result.drawn["modes"].items()]
-    found = result.counts["modes"]
-    moving = int((result.tables["modes"]["valid"].reshape(found, -1) > 0).any(axis=1).sum())
+def modes_figure(study: Study, table: Table, modes: Mapping[str, Shown], count: int) -> Figure:
+    """A panel an assembly that has a valid pose, as many of all as there are `modes`, on one scale."""
+    shown = [(title, Sweep.of(each)) for title, each in modes.items()]
+    moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
     notes = []
     if moving > len(shown):
         notes.append(f"{len(shown)} of {moving} assemblies")
-    if found > moving:
-        notes.append(f"{found - moving} of {found} assemblies have no valid pose")
+    if count > moving:
+        notes.append(f"{count - moving} of {count} assemblies have no valid pose")
     places = np.concatenate([sweep.extent for _, sweep in shown])
     columns, window = tiled(places, len(shown), _MAX_COLUMNS, gap=_GAP, pads=_PADS, page=_PAGE, least=_MIN_HEIGHT)
     unit, top = study.units.label("length"), _NOTE if notes else 0.0

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
 
+from mechdesign.analyses.kinematics.drawn import DrawnMotion
 from mechdesign.analyses.kinematics.instant_centres import Centre
 from mechdesign.analyses.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
@@ -21,7 +22,6 @@ from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, window
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.scene import Sweep, pose, ranks
-from mechdesign.results import Result
 from mechdesign.study import Study
 
 _MAX_COLUMNS = 3
@@ -73,34 +73,33 @@ _KINDS = (
 )
 
 
-def poses_figure(study: Study, result: Result) -> Figure | None:
+def poses_figure(study: Study, sweep: Sweep, drawn: DrawnMotion) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
-    found: SpecialPoses = result.drawn["special"]()
-    centres = list(found.shown[0].centres) if found.shown else []
-    if not found.shown or not (found.special or found.rates or centres or result.drawn["poses"].listed):
+    chosen = drawn.special
+    centres = list(chosen.shown[0].centres) if chosen.shown else []
+    if not chosen.shown or not (chosen.special or chosen.rates or centres or sweep.poses.listed):
         return None
-    sweep = Sweep.of(result.drawn["motion"])
     mechanism, points = study.mechanism, _pointing(study)
-    places = [mechanism_places(sweep, each) for each in found.shown]
+    places = [mechanism_places(sweep, each) for each in chosen.shown]
     middle, wide, tall = extent(np.concatenate(places))
     side = max(wide, tall)
     # Lengths of arrows by their rates.
-    scales = [_scale(found.shown, points, order, side) for order in range(len(_KINDS))]
-    for each in found.shown:
+    scales = [_scale(chosen.shown, points, order, side) for order in range(len(_KINDS))]
+    for each in chosen.shown:
         for order, scale in enumerate(scales):
             tips = [_place(each, point) + scale * _rates(each, order)[point] for point in points]
             places.append(np.array(tips, dtype=complex))
         places.append(np.array([z for z in each.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
-    everything, count = np.concatenate(places), len(found.shown)
+    everything, count = np.concatenate(places), len(chosen.shown)
     columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=_PAGE, least=_MIN_HEIGHT)
-    titles = [_title(each, found.rates, int(window.width * _LETTERS_AN_INCH)) for each in found.shown]
+    titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
     above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
-    heading = style.folded(_heading(found, result), 11, style.width() - LEFT - RIGHT)
+    heading = style.folded(_heading(chosen, listed=sweep.poses.listed), 11, style.width() - LEFT - RIGHT)
     top = _HEADING + _HEADING_LINE * heading.count("\n") + _KEY * (arrows + len(rows))
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
-    for axes, title, each in zip(grid, titles, found.shown, strict=True):
+    for axes, title, each in zip(grid, titles, chosen.shown, strict=True):
         axes.set_title(title, loc="left", fontsize=_TITLE_SIZE)
         axes.locator_params(nbins=5)
         # The last number of a panel would lie over the first of the next.
@@ -119,10 +118,7 @@ def poses_figure(study: Study, result: Result) -> Figure | None:
 def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:
     """Points and guides of a pose."""
     scene = pose(sweep.mechanism, each.configuration, each.index)
-    if scene is None:
-        return np.empty(0, dtype=complex)
-    ends = [end for guide in scene.guides for end in guide.ends(sweep.travel, scene.span)]
-    return np.array([*scene.points.values(), *ends])
+    return np.array([] if scene is None else scene.places(sweep.travel), dtype=complex)
 
 
 def _pointing(study: Study) -> list[str]:
@@ -162,16 +158,16 @@ def _title(each: SpecialPose, rates: bool, letters: int) -> str:
     return "\n".join(textwrap.fill(line, letters) for line in (each.where, what) if line)
 
 
-def _heading(found: SpecialPoses, result: Result) -> str:
-    heading = "poses asked for" if result.drawn["poses"].listed else "poses spread evenly over the motion"
-    if found.special:
-        ends = [each.what.startswith(LIMIT) for each in found.shown if each.what]
-        singular = [each.what.startswith(SINGULAR) for each in found.shown if each.what]
+def _heading(chosen: SpecialPoses, *, listed: bool) -> str:
+    heading = "poses asked for" if listed else "poses spread evenly over the motion"
+    if chosen.special:
+        ends = [each.what.startswith(LIMIT) for each in chosen.shown if each.what]
+        singular = [each.what.startswith(SINGULAR) for each in chosen.shown if each.what]
         parts = ["limits of the motion"] * any(ends) + ["singular poses"] * any(singular)
         parts += ["links that come into line"] * (sum(ends) + sum(singular) < len(ends))
-        parts += ["poses between"] * any(not each.what for each in found.shown)
+        parts += ["poses between"] * any(not each.what for each in chosen.shown)
         heading = ", ".join(parts)
-    return heading + (f"; the first {len(found.shown)}, and {found.left_out} more" if found.left_out else "")
+    return heading + (f"; the first {len(chosen.shown)}, and {chosen.left_out} more" if chosen.left_out else "")
 
 
 def arrow(base: complex, along: complex, kind: _Kind, inches: float, **more: Any) -> Line2D:

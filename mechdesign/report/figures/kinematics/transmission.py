@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
 )
 from mechdesign.report.figures.scene import Sweep
-from mechdesign.results import Result
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Transmission angles that textbooks call good, degrees.
@@ -55,16 +56,14 @@ class Transmission(NamedTuple):
     at: float
 
 
-def transmission_figure(study: Study, result: Result) -> Figure | None:
+def transmission_figure(study: Study, tables: Mapping[str, Table], sweep: Sweep) -> Figure | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
-    poses = result.drawn["poses"]
     section = study.kinematics
-    if not moving_names(poses):
+    if not moving_names(sweep.poses):
         return None
-    over = abscissa(study, poses)
-    sweep = Sweep.of(result.drawn["motion"])
+    over = abscissa(study, sweep.poses)
     x = over.values[sweep.rows]
-    loops = transmissions(study, result, sweep, over)
+    loops = transmissions(study, tables.get("loops"), sweep, over)
     asked = list((section.mechanical_advantage if section is not None else {}).items())
     names = asked[:MOST_ADVANTAGES]
     if not loops and not names:
@@ -76,17 +75,17 @@ def transmission_figure(study: Study, result: Result) -> Figure | None:
         notes.append(f"{len(names)} of {len(asked)} mechanical advantages")
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names))
     loops = sorted(loops, key=lambda each: _off(each.worst))[:MOST_LOOPS]
-    told = [GOOD_WORDS, *map(_label, loops)] if loops else []
-    rows = -(-(len(told) + 1) // fitting(told)) if told else 0  # with the worst of them
-    rows += sum(label.count("\n") for label in told)
+    labels = [GOOD_WORDS, *map(_label, loops)] if loops else []
+    rows = -(-(len(labels) + 1) // fitting(labels)) if labels else 0  # with the worst of them
+    rows += sum(label.count("\n") for label in labels)
     figure, axes = stack(bool(loops) + len(names), heading, over.label, note="; ".join(notes), tall=_TALL,
                          bottom=BELOW_BARE + _LEGEND_LINE * rows)  # fmt: skip
     if loops:
         _draw_angles(axes[0], x, loops, over)
         legend_below(figure, *axes[0].get_legend_handles_labels())
-    toggles = result.tables.get("toggles")
+    toggles = tables.get("toggles")
     known = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
-    motion = result.tables["motion"]
+    motion = tables["motion"]
     for axis, (output, given) in zip(axes[bool(loops) :], names, strict=True):
         column = motion.column(f"{output}_advantage")
         large = _draw_advantage(axis, over, column.values, known)
@@ -99,12 +98,11 @@ def transmission_figure(study: Study, result: Result) -> Figure | None:
     return figure
 
 
-def transmissions(study: Study, result: Result, sweep: Sweep, over: Along) -> list[Transmission]:
+def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) -> list[Transmission]:
     """Every loop that has a transmission angle along the motion; the worst is that of the table of loops."""
-    found: list[Transmission] = []
-    table = result.tables.get("loops")
+    angles: list[Transmission] = []
     if table is None:
-        return found
+        return angles
     for k, loop in enumerate(four_bars(study.mechanism)):
         sine, cosine = loop.squareness(sweep.configuration, 3)
         with np.errstate(invalid="ignore"):
@@ -120,8 +118,8 @@ def transmissions(study: Study, result: Result, sweep: Sweep, over: Along) -> li
             place = float(over.values[sweep.rows][nearest])
         least = float(np.degrees(table["transmission_min"][k] * study.units.angle_factor))
         least = least if np.isfinite(least) else _off(float(angle[nearest]))
-        found.append(Transmission(loop, angle, least if angle[nearest] <= 90 else 180 - least, place))
-    return found
+        angles.append(Transmission(loop, angle, least if angle[nearest] <= 90 else 180 - least, place))
+    return angles
 
 
 def _label(each: Transmission) -> str:
@@ -203,9 +201,9 @@ def boundless(x: Floats, values: Floats, toggles: Floats) -> Floats:
     inverse = np.where(np.isinf(values), 0.0, 1 / values)
     usual = np.nanmedian(np.abs(values[np.isfinite(values)])) if np.isfinite(values).any() else np.inf
     large = np.abs(values) > usual
-    found = x[np.isinf(values)].tolist()
+    places = x[np.isinf(values)].tolist()
     for k in np.flatnonzero((inverse[:-1] * inverse[1:] < 0) & large[:-1] & large[1:]):
         root = float(x[k] + (x[k + 1] - x[k]) * inverse[k] / (inverse[k] - inverse[k + 1]))
         between = [at for at in toggles.tolist() if min(x[k], x[k + 1]) <= at <= max(x[k], x[k + 1])]
-        found.append(min(between, key=lambda at: abs(at - root)) if between else root)
-    return np.sort(np.array(found, dtype=float))
+        places.append(min(between, key=lambda at: abs(at - root)) if between else root)
+    return np.sort(np.array(places, dtype=float))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
+from mechdesign.analyses.reliability.tables import DrawnErrors, Samples
 from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
 from mechdesign.report.figures.reliability.densities import density_figures
@@ -13,38 +14,37 @@ from mechdesign.report.figures.reliability.errors import MAX_LISTED, estimate_fi
 from mechdesign.report.figures.reliability.looks import Sampled, look
 from mechdesign.report.figures.reliability.samples import convergence_figure, histogram_figure, trend_figure
 from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Result
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """Whatever the result holds enough of to draw."""
-    poses, tables = result.drawn["poses"], result.tables
+    """Pictures of errors and failures that the tables of the result have data for."""
+    drawn, tables = DrawnErrors.of(result), result.tables
+    poses, samples = drawn.poses, drawn.samples
     swept, over = along(study, poses), plane(study, poses)
-    found = Gallery()
+    gallery = Gallery()
     if swept is not None:
-        found.add("of errors along the motion", sweep_figures, study, tables, swept)
+        gallery.add("of errors along the motion", sweep_figures, study, tables, swept)
     if over is not None:
-        found.add("of errors over the poses", map_figures, study, result, over)
+        gallery.add("of errors over the poses", map_figures, study, result, over)
     few = poses.listed or (over is None and poses.count <= MAX_LISTED)
     if "reliability" in tables and (few or swept is not None):
-        found.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
-    found.add("of samples", _sampled, study, result, poses)
-    worst = result.drawn["samples"].pose if result.drawn["samples"] is not None else 0
-    found.add("contributions", contributions_figure, study, tables["contributions"], poses, worst)
+        gallery.add("reliability", estimate_figure, study, tables["reliability"], poses, swept)
+    if samples is not None:
+        gallery.add("of samples", _sampled, study, tables, poses, samples)
+    worst = samples.pose if samples is not None else 0
+    gallery.add("contributions", contributions_figure, study, tables["contributions"], poses, worst)
     if "allocation" in tables:
-        found.add("allocation", allocation_figure, study, tables)
-    return found
+        gallery.add("allocation", allocation_figure, study, tables)
+    return gallery
 
 
-def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
+def _sampled(study: Study, tables: Mapping[str, Table], poses: Poses, samples: Samples) -> Gallery:
     """Pictures of the tables that only methods which draw samples give."""
-    tables, samples = result.tables, result.drawn["samples"]
-    found = Gallery()
-    if samples is None:
-        return found
-    # The tables are of the first method that samples errors; the moments hold its name.
+    gallery = Gallery()
+    # The tables are those of the first sampling method, which the moments name.
     method = next(name for name in tables["moments"]["method"].tolist() if look(name).sampled)
     makers: dict[str, Callable[[Sampled], Figure | Mapping[str, Figure]]] = {
         "density": density_figures, "histogram": histogram_figure, "convergence": convergence_figure,
@@ -52,5 +52,5 @@ def _sampled(study: Study, result: Result, poses: Poses) -> Gallery:
     }  # fmt: skip
     for name, make in makers.items():
         if name in tables:
-            found.add(name, make, Sampled(study, tables, method, samples, poses))
-    return found
+            gallery.add(name, make, Sampled(study, tables, method, samples, poses))
+    return gallery

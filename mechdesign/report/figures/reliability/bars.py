@@ -21,7 +21,7 @@ from mechdesign.study.poses import Poses
 MAX_SOURCES = 16
 MAX_TOLERANCES = 20
 MAX_POSE_BARS = 4
-# A Sobol' index that differs from the first-order share by more than this part of the variance is marked.
+# Sobol' indices that differ from the first-order share by more than this part of the variance are marked.
 _SAME_SHARE = 0.01
 # Inches.
 _SOURCE_HEIGHT = 0.24
@@ -92,7 +92,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
 
 
 def _sobol_pose(table: Table, poses: Poses, worst: int) -> int | None:
-    """The worst pose where it has Sobol indices, or else the first that has."""
+    """The worst pose if it has Sobol' indices, else the first pose that has."""
     if "sobol_first" not in table:
         return None
     known = np.isfinite(table["sobol_first"]).reshape(poses.count, -1).any(axis=1)
@@ -100,7 +100,7 @@ def _sobol_pose(table: Table, poses: Poses, worst: int) -> int | None:
 
 
 def _shares(shares: Floats, pose: int | None, each: bool) -> Floats:
-    """Shares of a pose, of each pose or on the average of those that have them, shape (bars, sources)."""
+    """Shares of one pose, of each pose, or averaged over the poses that have them, shape (bars, sources)."""
     if pose is not None or each:
         return shares if pose is None else shares[[pose]]
     known = shares[np.isfinite(shares).all(axis=1)]

@@ -1,4 +1,4 @@
-"""Where two errors of made mechanisms lie together: regions that hold their shares beside ellipses, and in 3-D [S2]."""
+"""Joint density of two errors of made mechanisms: regions of given shares beside ellipses, and surfaces [S2]."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mechdesign.report.figures.shapes import lighter
 SHARES = (0.5, 0.9, 0.997)
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 _TINTS = (0.3, 0.55, 0.78)
-# A region is drawn where at least so many samples lie outside it: of fewer its edge is chance.
+# A region is drawn if at least this many samples lie outside it: with fewer its edge is random.
 _FEWEST_OUTSIDE = 30
 # Of the net that samples are counted on before they are smoothed: half width, in deviations, and cells a side.
 _NET_REACH = 5.5

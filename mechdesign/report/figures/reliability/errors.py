@@ -45,7 +45,7 @@ from mechdesign.study.schema.methods import METHODS, Method
 MAX_OUTPUTS = 7
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
 MAX_MAPS = 4
-# A limit so many times as far out as all errors is named and not drawn.
+# A limit this many times beyond all errors is named, not drawn.
 _FAR_FROM_ERRORS = 3.0
 # Listed poses whose names fit below a picture.
 MAX_LISTED = 12
@@ -63,13 +63,13 @@ Legend = dict[str, Any]
 
 def sweep_figures(study: Study, tables: Mapping[str, Table], swept: Along) -> dict[str, Figure]:
     """Bands of the errors, means, standard deviations and the methods' difference over the sweep [S3, Figs. 5 to 7]."""
-    moments, found = tables["moments"], {"bands": _bands(study, tables, swept)}
+    moments, made = tables["moments"], {"bands": _bands(study, tables, swept)}
     for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
-        found[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
+        made[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
     reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).sampled]
     if look(reference).sampled and computed:
-        found["difference"] = _difference(moments, swept, reference, computed)
-    return found
+        made["difference"] = _difference(moments, swept, reference, computed)
+    return made
 
 
 def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
@@ -107,8 +107,8 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
             elif len(beyond := limit[np.isfinite(limit)]):
                 far.append(" to ".join(dict.fromkeys(f"{end:+g}" for end in (beyond.min(), beyond.max()))))
         if far:
-            told = f"limit {', '.join(far)} {unit}, outside"
-            axis.set_title(told, loc="right", fontsize=8, color=style.VERMILION)
+            words = f"limit {', '.join(far)} {unit}, outside"
+            axis.set_title(words, loc="right", fontsize=8, color=style.VERMILION)
         axis.set_ylabel(style.axis_label("error", unit))
         axis.set_title(heading(output, order), loc="left", fontsize=9.5)
     legend_below(figure, list(entries.values()), list(entries))
@@ -207,17 +207,17 @@ def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
         rows = moments.where(output=output, order=order, method=method)
         parts.append((style.axis_label(output, unit), moments["sigma"][rows].reshape(over.x.shape)))
     note = f"by {look(method).words}; the error is that of made mechanisms at this pose"
-    found = {"deviation_map": map_sheet(study, over, parts, "Standard deviation of the error", note)}
+    made = {"deviation_map": map_sheet(study, over, parts, "Standard deviation of the error", note)}
     if "reliability" in result.tables:
         table = result.tables["reliability"]
         method = best_probability(table)
         rows = table.where(method=method, scope="pose")
         failure = table["failure"][rows].reshape(over.x.shape)
-        found["failure_map"] = map_sheet(
+        made["failure_map"] = map_sheet(
             study, over, [("", failure)], "Probability that an error leaves its limits", f"by {look(method).words}",
             logarithmic=True,
         )  # fmt: skip
-    return found
+    return made
 
 
 def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
@@ -226,7 +226,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
     count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
     written = swept is None and count * len(known) <= (MAX_WRITTEN // 2 if style.narrow() else MAX_WRITTEN)
-    # Methods stand beside each other at a listed pose; of a sweep those that are simulated, a little.
+    # At listed poses methods stand side by side; along a sweep simulated ones are shifted a little.
     beside = known if swept is None else [method for method in known if look(method).sampled]
     step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count
     lines = 1 if swept is not None else min(len(poses.names), 4)
@@ -241,7 +241,7 @@ def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | Non
         if drawn.sampled:
             _dots(axes, table, rows, at, method, floor, entries)
         elif swept is None:
-            # What is 0 stands on the floor of a logarithmic axis.
+            # Zero is drawn at the lower end of a logarithmic axis.
             (entries[drawn.words],) = axes.plot(
                 at, np.maximum(value, floor), drawn.marker, color=drawn.color, clip_on=False
             )
@@ -289,7 +289,7 @@ def _scale(axes: Axes, table: Table) -> float:
 
 
 def _unseen(table: Table) -> Flags:
-    """Rows of samples without a failure: only an upper end is known."""
+    """Rows whose samples have no failure: only an upper bound is known."""
     return np.asarray((table["failure_low"] == 0) & (table["failure_high"] > 0) & (table["samples"] > 0))
 
 

@@ -45,11 +45,11 @@ class Sampled(NamedTuple):
 
     def rows(self, table: str) -> Flags:
         """Rows of a table that are about this pose."""
-        found = np.ones(len(self.tables[table]), dtype=bool)
+        matching = np.ones(len(self.tables[table]), dtype=bool)
         for name, values in self.poses.values.items():
             column, value = self.tables[table][name], values[self.samples.pose]
-            found &= (column == value) | (np.isnan(column) & np.isnan(value))
-        return found
+            matching &= (column == value) | (np.isnan(column) & np.isnan(value))
+        return matching
 
 
 def followed_in_words(study: Study, poses: Poses, pose: int) -> str:
@@ -81,8 +81,10 @@ def best_moments(table: Table) -> str:
 
 def channels(table: Table) -> list[tuple[str, str, str]]:
     """Output, order and unit of each quantity of a table, positions first."""
-    found = dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True))
-    return sorted(found, key=lambda channel: list(SUFFIXES).index(channel[1]))
+    quantities = dict.fromkeys(
+        zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True)
+    )
+    return sorted(quantities, key=lambda channel: list(SUFFIXES).index(channel[1]))
 
 
 def heading(output: str, order: str) -> str:

@@ -70,20 +70,20 @@ def histogram_figure(given: Sampled) -> Figure:
 def _histograms(given: Sampled) -> list[_Histogram]:
     """Distances that a circle limits, then the errors that vary."""
     samples, table = given.samples, given.tables["histogram"]
-    found = []
+    histograms = []
     for x, y, radius in samples.discs:
         distance = np.hypot(samples.errors[x], samples.errors[y])
         edges = np.linspace(distance.min(), distance.max(), _BINS + 1)
         name = f"{samples.outputs[x].rpartition('.')[0]}: distance from no error"
-        found.append(_counted(samples, name, x, distance, edges, None, (-np.inf, radius)))
+        histograms.append(_counted(samples, name, x, distance, edges, None, (-np.inf, radius)))
     bands = {channel: (low, high) for channel, low, high in samples.bands}
     for k, (output, order) in enumerate(zip(samples.outputs.tolist(), samples.orders.tolist(), strict=True)):
         rows = table.where(output=output, order=order)
         if rows.any():
             edges, ends = np.append(table["low"][rows], table["high"][rows][-1]), bands.get(k, (-np.inf, np.inf))
             name, normal = heading(output, order), table["normal"][rows]
-            found.append(_counted(samples, name, k, samples.errors[k], edges, normal, ends))
-    return found[:MAX_PANELS]
+            histograms.append(_counted(samples, name, k, samples.errors[k], edges, normal, ends))
+    return histograms[:MAX_PANELS]
 
 
 def _counted(
@@ -117,8 +117,8 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         axis.locator_params(axis="y", nbins=5)
         axis.tick_params(labelbottom=False)
     if far and not logarithmic:
-        told = ", ".join(f"{limit:+g}" for limit in far)
-        axis.text(0.99, 0.98, f"limit {told} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
+        beyond = ", ".join(f"{limit:+g}" for limit in far)
+        axis.text(0.99, 0.98, f"limit {beyond} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
     axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
     axis.locator_params(axis="x", nbins=4)

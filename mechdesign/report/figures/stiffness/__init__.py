@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mechdesign.analyses.stiffness.analysis import DrawnStiffness
 from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.stiffness.deflections import deflections_figure, directions_figure
@@ -17,18 +18,18 @@ def figures(study: Study, result: Result) -> Gallery:
 
     Under loads ``deflections`` (first pose), and along a sweep or path what the joints bear.
     """
-    found = Gallery()
-    drawn, poses = result.drawn, result.drawn["poses"]
-    if "first" in drawn:
-        found.add("springs", springs_figure, study, poses, drawn["first"])
-        found.add("deflections", deflections_figure, study, poses, drawn["first"])
-    if "loose" in drawn:
-        found.add("free", free_motion_figure, study, result, drawn["loose"])
-    found.add("directions", directions_figure, study, result)
+    gallery, drawn, tables = Gallery(), DrawnStiffness.of(result), result.tables
+    poses = drawn.shown.poses
+    if drawn.first is not None:
+        gallery.add("springs", springs_figure, study, poses, drawn.first)
+        gallery.add("deflections", deflections_figure, study, poses, drawn.first)
+    if drawn.loose is not None:
+        gallery.add("free", free_motion_figure, study, tables["stiffness"], poses, drawn.loose)
+    gallery.add("directions", directions_figure, study, tables, drawn.shown)
     if (over := plane(study, poses)) is not None:
-        found.add("stiffness", map_figure, study, result, over)
+        gallery.add("stiffness", map_figure, study, tables["stiffness"], over)
     if (swept := along(study, poses)) is not None:
-        found.add("stiffness", curves_figure, study, result, swept)
-    if "forces" in result.tables:
-        found.add("joint_forces", joint_force_figures, study, result)
-    return found
+        gallery.add("stiffness", curves_figure, study, tables["stiffness"], swept)
+        if "forces" in tables:
+            gallery.add("joint_forces", joint_force_figures, study, tables["forces"], poses.count, swept)
+    return gallery

@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from mechdesign.analyses.poses import pose_in_words
-from mechdesign.analyses.stiffness.analysis import Drawn
+from mechdesign.analyses.poses import Shown, pose_in_words
+from mechdesign.analyses.stiffness.analysis import DrawnPose
 from mechdesign.analyses.stiffness.elements import beam_line, corners_of
 from mechdesign.analyses.stiffness.network import NetworkEdge
 from mechdesign.mechanism import Configuration
@@ -27,7 +27,7 @@ from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import ARC, arc, force
 from mechdesign.report.figures.stiffness.joint_forces import load_in_words
 from mechdesign.report.figures.stiffness.springs import LARGEST_MOVE
-from mechdesign.results import Result
+from mechdesign.results import Table
 from mechdesign.study import Poses, Study
 
 MAX_LOADS = 4
@@ -51,7 +51,7 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
                    3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
 
 
-def deflections_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
+def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
     """The whole mechanism where each load moves it, a panel a load, each with its own magnification."""
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
@@ -112,7 +112,7 @@ def _symbol_size(panels: int) -> float:
     return 1.0 if panels == 1 else 0.7
 
 
-def _shapes(drawn: Drawn, scene: Scene) -> list[tuple[Complexes, Complexes]]:
+def _shapes(drawn: DrawnPose, scene: Scene) -> list[tuple[Complexes, Complexes]]:
     """Lines of all links at rest, shape (n,), and their displacements by each load, shape (n, loads).
 
     The first begins at the asked point.
@@ -180,10 +180,9 @@ def _beam(
     return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
 
 
-def directions_figure(study: Study, result: Result) -> Figure | None:
+def directions_figure(study: Study, tables: Mapping[str, Table], shown: Shown) -> Figure | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
-    table, soft, poses = result.tables["stiffness"], result.tables["compliance"], result.drawn["poses"]
-    shown, section = result.drawn["shown"], study.stiffness
+    table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
     assert section is not None
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
     some = np.unique(np.linspace(0, len(index) - 1, min(MAX_DIRECTIONS, len(index))).astype(int))
@@ -209,7 +208,7 @@ def directions_figure(study: Study, result: Result) -> Figure | None:
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
     wide = (style.width() - RIGHT) / min(len(scenes), 2) - LEFT
     # Broken between coordinates only.
-    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, poses, int(row), 4)) for row in rows]
+    named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, shown.poses, int(row), 4)) for row in rows]
     where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]
     lines = 4 + max(words.count("\n") for words in where)
     figure, panels = _panels(study, np.concatenate(places), len(scenes), heading, lines=lines)
@@ -220,16 +219,16 @@ def directions_figure(study: Study, result: Result) -> Figure | None:
         draw_mechanism(axes, study.mechanism, shown.configuration, k, faint=True, size=_symbol_size(len(panels)))
         axes.fill((at + ellipse).real, (at + ellipse).imag, color=style.SKY, alpha=0.35, linewidth=0, zorder=4)
         axes.plot((at + ellipse).real, (at + ellipse).imag, color=style.INK, linewidth=1.2, zorder=5)
-        angle, said = float(table["k_angle"][row]) * study.units.angle_factor, []
+        angle, title_lines = float(table["k_angle"][row]) * study.units.angle_factor, []
         for name, what, turn, color, dashes in _MAIN_AXES:
             stiff, way = float(table[name][row]), np.exp(1j * (angle + turn))
             line = at + scale / stiff * way * np.array([-1, 1])
             axes.plot(line.real, line.imag, color=color, linestyle=dashes, linewidth=1.8, zorder=5.2)
             toward = np.mod(np.angle(way), np.pi) / study.units.angle_factor
-            said.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
+            title_lines.append(f"{what} {quantity(stiff, units[0])} at {toward:.3g} {units[1]}")
         axes.plot(at.real, at.imag, "o", color=style.INK, markersize=4, zorder=5.4)
-        said = [words, *said, f"drawn {scale / force:g} times as large"]
-        axes.set_title("\n".join(said), loc="left", fontsize=8.5)
+        title_lines = [words, *title_lines, f"drawn {scale / force:g} times as large"]
+        axes.set_title("\n".join(title_lines), loc="left", fontsize=8.5)
     handles = [Line2D([], [], color=color, linestyle=dashes, linewidth=1.8, label=f"{what} direction, {name}")
                for name, what, _, color, dashes in _MAIN_AXES]  # fmt: skip
     legend_at_left(figure, handles, len(handles))

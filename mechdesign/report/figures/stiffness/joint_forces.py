@@ -18,7 +18,6 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import (
     Along,
-    along,
     clear_of_ticks,
     fitting,
     legend_below,
@@ -26,7 +25,7 @@ from mechdesign.report.figures.panels import (
     stack,
     tick_abscissa,
 )
-from mechdesign.results import Result, Table
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 MAX_JOINTS = 6  # curves with a look of their own
@@ -78,7 +77,7 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
     names, on, by = (table[name][:joints].tolist() for name in ("joint", "on", "by"))
     forces, moments = [], []
     for k, name in enumerate(names):
-        # The load itself, at a point of one link.
+        # This is the load itself, at a point of one link.
         if on[k] == "asked" and on.count("asked") == 1:
             continue
         massless = on[k] == "asked" or on[k].startswith(("pin:", "slot:"))
@@ -95,7 +94,7 @@ def _peak(joints: Sequence[Joint]) -> float:
 
 
 def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
-    """Joints whose peak exceeds rounding, largest first; joints with equal magnitudes everywhere share one curve."""
+    """Joints with a peak above rounding, largest first; joints with equal magnitudes at every pose share one curve."""
     loaded: list[Joint] = []
     for joint in joints:
         if joint.peak <= rounding:
@@ -109,13 +108,11 @@ def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
     return sorted(loaded, key=lambda joint: -joint.peak)
 
 
-def joint_force_figures(study: Study, result: Result) -> dict[str, Figure]:
-    """``joint_forces`` over the sweep or path, and ``force_hodographs``; none where no joint bears anything."""
-    poses, section = result.drawn["poses"], study.stiffness
-    over = along(study, poses)
-    if over is None or section is None:
-        return {}
-    forces, moments = borne(result.tables["forces"], poses.count, study.mechanism.size)
+def joint_force_figures(study: Study, table: Table, count: int, over: Along) -> dict[str, Figure]:
+    """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
+    section = study.stiffness
+    assert section is not None
+    forces, moments = borne(table, count, study.mechanism.size)
     if not forces:
         return {}
     loads = [f"{load_in_words(study, load)} at {section.at}" for load in section.loads[:MAX_LOADS]]
@@ -165,7 +162,7 @@ def _in_powers(axis: Axis, name: str, unit: str, most: float) -> None:
 def _mark_worst(
     study: Study, axes: Axes, names: Sequence[str], values: Floats, unit: str, over: Along
 ) -> str:  # fmt: skip
-    """Mark the largest value of curves, shape (joints, poses), and say it; an axis ends where few poses go beyond."""
+    """Mark the largest of some values, shape (joints, poses), and return it in words; rare peaks leave the axis."""
     sizes = np.nan_to_num(np.abs(values), nan=0.0, posinf=0.0)
     which, row = np.unravel_index(int(np.argmax(sizes)), sizes.shape)
     least, most = np.nanmin(values, initial=0.0), float(sizes[which, row])
@@ -189,7 +186,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
     shown = np.array([joint.values[:, : len(loads)] for joint in joints])
     some = [number for number in range(len(loads)) if np.nan_to_num(shown[:, :, number]).any()]
     known = shown[np.isfinite(shown)]
-    # As of the curves: what grows without bounds near a singularity is left out.
+    # As for the curves, peaks near a singularity are left out.
     places = np.append(known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)], 0.0)
     columns, unit = len(some), study.units.label("force")
     window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
@@ -219,7 +216,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
 
 
 def _hodograph(axes: Axes, forces: Complexes, look: Mapping[str, Any]) -> None:
-    """The way of a force's tip, its first and its largest, and arrows that say which way it runs."""
+    """Hodograph of a force with its first and its largest value, and arrows in the direction of motion."""
     axes.plot(forces.real, forces.imag, linewidth=1.6, **look)
     known = forces[np.isfinite(forces)]
     if not len(known):

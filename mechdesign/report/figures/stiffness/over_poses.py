@@ -8,21 +8,21 @@ from matplotlib.figure import Figure
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import Along, Plane, map_sheet, quantity, tick_abscissa
-from mechdesign.results import Result
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 _LONGEST_NOTE = 900.0  # points of type times letters that fill a line above the curves
 _NOTE_SHARE = 0.65  # of the width of a narrow page
 _FLAT = 0.02  # part of its value by which a stiffness changes that is written, not drawn
 _LOGARITHMIC = 5.0  # ratio of values above which their axis is logarithmic
-# Such an axis ends at this ratio beyond what all but this share of the stiffnesses at either end are.
+# A logarithmic axis ends this factor beyond the quantiles at this share and its complement.
 _BEYOND = 10.0
 _TAIL = 0.04
 
 
-def curves_figure(study: Study, result: Result, over: Along) -> Figure | None:
+def curves_figure(study: Study, table: Table, over: Along) -> Figure | None:
     """Stiffnesses to a force and to a moment along a path; what is the same everywhere is written, not drawn."""
-    table, units = result.tables["stiffness"], study.units
+    units = study.units
     forces = {"k_x": ("-", style.BLUE, "o"), "k_y": ("-", style.ORANGE, "s"), "k_min": ("--", style.INK, ""),
               "k_max": (":", style.INK, "")}  # fmt: skip
     moments = {"k_phi": ("-", style.GREEN, "")}
@@ -51,7 +51,7 @@ def curves_figure(study: Study, result: Result, over: Along) -> Figure | None:
         low, high = axis.dataLim.intervaly
         if high > _LOGARITHMIC * low > 0:
             axis.set_yscale("log")
-            # Near a singularity a stiffness grows or vanishes without bounds; what it is elsewhere stays legible.
+            # Near a singularity a stiffness grows without bound or vanishes; elsewhere it stays legible.
             every = np.concatenate(
                 [table[name][np.isfinite(table[name]) & (table[name] > 0)] for name in curves or flat]
             )
@@ -79,9 +79,9 @@ def _constant(values: Floats) -> bool:
     return len(known) == len(values) and float(np.ptp(known)) <= _FLAT * float(np.abs(known).max())
 
 
-def map_figure(study: Study, result: Result, over: Plane) -> Figure:
+def map_figure(study: Study, table: Table, over: Plane) -> Figure:
     """k_min over the poses, and k_max beside it."""
-    table, unit = result.tables["stiffness"], study.units.label("stiffness")
+    unit = study.units.label("stiffness")
     parts = []
     for name in ("k_min", "k_max"):
         values = np.where(np.isfinite(table[name]) & (table[name] > 0), table[name], np.nan)

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.analyses.poses import pose_in_words
-from mechdesign.analyses.stiffness.analysis import Drawn
+from mechdesign.analyses.stiffness.analysis import DrawnPose
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -21,7 +21,7 @@ from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import quantity
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import point_labels
-from mechdesign.results import Result
+from mechdesign.results import Table
 from mechdesign.study import Poses, Study
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
@@ -31,7 +31,7 @@ _ORDER = 5.0  # above the mechanism
 LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
 
-def springs_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
+def springs_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
     scene = pose(study.mechanism, drawn.configuration)
     coils = _coils(study, drawn, scene) if scene is not None else []
     if scene is None or not coils:
@@ -43,7 +43,7 @@ def springs_figure(study: Study, poses: Poses, drawn: Drawn) -> Figure | None:
     return figure
 
 
-def _coils(study: Study, drawn: Drawn, scene: Scene) -> list[Coil]:
+def _coils(study: Study, drawn: DrawnPose, scene: Scene) -> list[Coil]:
     legs, length = drawn.body.legs or (), _COIL_LENGTH * scene.span
     coils, own = [], drawn.springs
     columns = (own.leg, own.place, own.angle, own.stiffness)
@@ -123,9 +123,9 @@ def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: obje
     axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_ORDER + lift, **options))
 
 
-def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | None:
+def free_motion_figure(study: Study, table: Table, poses: Poses, drawn: DrawnPose) -> Figure | None:
     """The asked body moved both ways along its free twist, at the first pose that has one."""
-    table, section, row = result.tables["stiffness"], drawn.body.section, drawn.row
+    section, row = drawn.body.section, drawn.row
     scene = pose(study.mechanism, drawn.configuration)
     if scene is None:
         return None
@@ -143,7 +143,7 @@ def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | N
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = posed(study, result.drawn["poses"], drawn, places, "free motion")
+    figure, axes = posed(study, poses, drawn, places, "free motion")
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
@@ -151,7 +151,9 @@ def free_motion_figure(study: Study, result: Result, drawn: Drawn) -> Figure | N
     return figure
 
 
-def posed(study: Study, poses: Poses, drawn: Drawn, places: Complexes, what: str, **look: Any) -> tuple[Figure, Axes]:
+def posed(
+    study: Study, poses: Poses, drawn: DrawnPose, places: Complexes, what: str, **look: Any
+) -> tuple[Figure, Axes]:
     """The mechanism in a pose, in a window that holds these places, too."""
     title = style.folded(f"{what} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
     above = TITLE + style.line(11.0) * title.count("\n")

@@ -6,18 +6,19 @@ from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.sweep.effects import main_effects, scatter
 from mechdesign.report.figures.sweep.maps import response
 from mechdesign.report.figures.sweep.quantities import Axis
+from mechdesign.report.requirements import DrawnCases
 from mechdesign.results import Result
 from mechdesign.study import Study
 
 
 def figures(study: Study, result: Result) -> Gallery:
     """``main_effects`` and ``scatter``; of two numbers that vary or more ``response``."""
-    table, found = result.main, Gallery()
-    entries = [Axis.of(table.column(name)) for name in result.drawn["entries"]]
+    table, gallery, drawn = result.main, Gallery(), DrawnCases.of(result)
+    entries = [Axis.of(table.column(name)) for name in drawn.entries]
     entries = [entry for entry in entries if len(entry.distinct) > 1]
-    results = [Axis.of(table.column(name), *limits, varied=False) for name, limits in result.drawn["results"].items()]
+    results = [Axis.of(table.column(name), *limits, varied=False) for name, limits in drawn.results.items()]
     if entries and results:
-        found.add("main_effects", main_effects, entries, results, len(table))
-        found.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
-        found.add("response", response, entries, results, table, result.drawn["goals"])
-    return found
+        gallery.add("main_effects", main_effects, entries, results, len(table))
+        gallery.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
+        gallery.add("response", response, entries, results, table, drawn.goals)
+    return gallery

@@ -19,7 +19,7 @@ from mechdesign.report.figures.sweep.quantities import (
     TITLE,
     Axis,
     draw_limits,
-    draw_ticks,
+    frame,
     kinds_of,
     left_out,
     sample,
@@ -75,11 +75,7 @@ def main_effects(entries: Sequence[Axis], results: Sequence[Axis], count: int) -
             continue
         named = len(blocks) > 1 or row == len(down) - 1
         _effect(axes, block[column], number)
-        draw_ticks(axes, block[column], number, room, outer_x=named, outer_y=column == 0)
-        if named:
-            axes.set_xlabel(block[column].label(room + _ACROSS / 2), fontsize=NAME)
-        if column == 0:
-            axes.set_ylabel(number.label(tall), fontsize=NAME)
+        frame(axes, block[column], number, room, tall, between=_ACROSS / 2, outer_x=named, outer_y=column == 0)
     return figure
 
 
@@ -95,8 +91,6 @@ def _effect(axes: Axes, entry: Axis, number: Axis) -> None:
         places, [values.mean() for _, values in groups], "o", color=style.BLUE, markersize=3 if style.narrow() else 4,
         linestyle="none" if entry.words else "-", linewidth=1.2, zorder=3,
     )  # fmt: skip
-    axes.set_xlim(*entry.span())
-    axes.set_ylim(*number.span())
 
 
 def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, required: bool) -> Figure:
@@ -109,8 +103,8 @@ def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, r
     kinds, (drawn, dot) = kinds_of(table, required=required), sample(table, MOST_DRAWN)
     cases = "cases" if len(drawn) == len(table) else f"an even sample of {len(drawn):,} of {len(table):,} cases"
     limits = "; grey: not met" if any(each.limits for each in taken) else ""
-    told = left_out(entries, taken, "entry") + left_out(results, taken, "result")
-    head, top = title(f"{cases}: every two quantities against each other{limits}{told}")
+    omitted = left_out(entries, taken, "entry") + left_out(results, taken, "result")
+    head, top = title(f"{cases}: every two quantities against each other{limits}{omitted}")
     columns = 1 if style.narrow() else 2
     words = [style.folded(kind.words, NAME, style.width() / columns - 0.6) for kind in kinds]
     legend = top
@@ -133,13 +127,7 @@ def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, r
         draw_limits(axes, y, upright=False)
         for kind in kinds:
             kind.draw(axes, x.values, y.values, drawn, min(dot, 3.0) if style.narrow() else dot)
-        axes.set_xlim(*x.span())
-        axes.set_ylim(*y.span())
-        draw_ticks(axes, x, y, room, outer_x=row == size - 1, outer_y=column == 0)
-        if row == size - 1:
-            axes.set_xlabel(x.label(room + _ACROSS / 2), fontsize=NAME)
-        if column == 0:
-            axes.set_ylabel(y.label(side), fontsize=NAME)
+        frame(axes, x, y, room, side, between=_ACROSS / 2, outer_x=row == size - 1, outer_y=column == 0)
     return figure
 
 

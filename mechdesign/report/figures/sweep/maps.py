@@ -1,4 +1,4 @@
-"""Response maps: each result over two numbers that vary, with the bounds of what is required and where they are met."""
+"""Response maps: each result over two numbers that vary, with the limits of the requirements."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mechdesign.report.figures.sweep.quantities import (
     NAME,
     TITLE,
     Axis,
-    draw_ticks,
+    frame,
     kinds_of,
     left_out,
     number_text,
@@ -84,7 +84,7 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
             _draw_gates(axes, plane, gates[k // len(taken)])
         for kind in kinds:
             kind.draw(axes, plane.x.values, plane.y.values, drawn, size)
-        _frame(axes, plane, _room(panels))
+        frame(axes, plane.x, plane.y, _room(panels), _TALL - 1)
     keys += [
         Line2D([], [], color=style.INK, linestyle=_dashes(k), linewidth=1.4, label=_limits_in_words(each))
         for k, each in enumerate(limited)
@@ -95,9 +95,9 @@ def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goa
     words += [f"in {plane.classes} classes of each entry" for plane in planes[:1] if plane.classes]
     words += ["of the cases that meet every requirement, else of the nearest miss"] * bool(len(entries) > 2 and limited)
     words += ["hatched: what is required is not met"] * any(gate.unmet for gate in gates)
-    told = "; ".join(words) + without_number(taken, len(table)) + left_out(asked, taken, "result")
-    told = style.folded(told + left_out(numbers, numbers[:MOST_ENTRIES], "entry"), TITLE, style.width() - 0.2)
-    figure.suptitle(told, x=0.01, ha="left", fontsize=TITLE)
+    heading = "; ".join(words) + without_number(taken, len(table)) + left_out(asked, taken, "result")
+    heading = style.folded(heading + left_out(numbers, numbers[:MOST_ENTRIES], "entry"), TITLE, style.width() - 0.2)
+    figure.suptitle(heading, x=0.01, ha="left", fontsize=TITLE)
     columns = 1 if style.narrow() else 2
     labels = [style.folded(str(key.get_label()), NAME, style.width() / columns - 0.4) for key in keys]
     figure.legend(keys, labels, loc="outside lower left", ncols=columns)
@@ -156,16 +156,7 @@ def _dashes(k: int) -> Any:
     return style.DASHES[k % len(style.DASHES)]
 
 
-def _frame(axes: Axes, plane: Plane, room: float) -> None:
-    """Ends, ticks and names of the axes."""
-    axes.set_xlim(*plane.x.span())
-    axes.set_ylim(*plane.y.span())
-    draw_ticks(axes, plane.x, plane.y, room, outer_x=True, outer_y=True)
-    axes.set_xlabel(plane.x.label(room), fontsize=NAME)
-    axes.set_ylabel(plane.y.label(_TALL - 1), fontsize=NAME)
-
-
 def _limits_in_words(limited: Axis) -> str:
     limits = [("at least", limited.low), ("at most", limited.high)]
-    told = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
-    return f"{limited.name} {told} {style.printed(limited.unit)}".rstrip()
+    words = " and ".join(f"{word} {number_text(limit)}" for word, limit in limits if limit is not None)
+    return f"{limited.name} {words} {style.printed(limited.unit)}".rstrip()

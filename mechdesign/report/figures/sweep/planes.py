@@ -13,13 +13,13 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints, evenly
 from mechdesign.report.figures.sweep.quantities import MOST_DRAWN, Axis
 from mechdesign.results import Table
 
-# Places of a map along each axis, between which nothing is interpolated any more.
+# Points of a map along each axis.
 _FINE = 141
-# Where cases are scattered over three entries or more: as many classes of each as leave so many cases in a cell.
+# Scattered cases of three entries or more: classes of each entry such that a cell holds about this many cases.
 _CELL, _FEWEST_CLASSES, _MOST_CLASSES = 12, 3, 13
 _FLAT = 1e-6  # part of the range of entries below which cases lie on a line
 
-# Of values, and the first places of those that are made one number: these numbers.
+# Reduces groups of values, each of which begins at one of the given indices, to one number a group.
 Reduction = Callable[[Floats, Ints], Floats]
 
 
@@ -30,7 +30,7 @@ def _mean(values: Floats, starts: Ints) -> Floats:
     return np.asarray(np.where(number > 0, total / np.maximum(number, 1.0), np.nan))
 
 
-# What is shown of several cases, and its word, by the way that is better: none is known, or small or large values are.
+# Reduction of several cases, and its name, by what is better: 0 not known, 1 small values, -1 large values.
 REDUCTIONS: Mapping[int, tuple[Reduction, str]] = {
     0: (_mean, "mean"), 1: (np.fmin.reduceat, "smallest"), -1: (np.fmax.reduceat, "largest"),
 }  # fmt: skip

@@ -17,7 +17,7 @@ from mechdesign.report.figures import style
 from mechdesign.results import Column, Table
 from mechdesign.study.text.units import Amount
 
-# More values than that are gathered into classes of as many cases.
+# More values than this are gathered into classes of equal numbers of cases.
 MOST_VALUES = 12
 CLASSES = 8
 MOST_LETTERS = 10  # of a word at an axis
@@ -169,8 +169,17 @@ def draw_limits(axes: Axes, of: Axis, *, upright: bool) -> None:
             span(min(limit, end), max(limit, end), color=style.FAINT, alpha=0.18, linewidth=0, zorder=0.5)
 
 
-def draw_ticks(axes: Axes, x: Axis, y: Axis, room: float, *, outer_x: bool, outer_y: bool) -> None:
-    """Few ticks, words where there are words, at the outer edges only; `room` is the width of the panel."""
+def frame(
+    axes: Axes, x: Axis, y: Axis, room: float, tall: float, *, between: float = 0.0, outer_x: bool = True,
+    outer_y: bool = True,
+) -> None:  # fmt: skip
+    """Ends, few ticks and names of the axes of a panel, numbers and names at the outer edges only.
+
+    `room` is the width of the panel, `tall` the height for a name, `between` the part of the gap beside the panel that
+    a name may take (inches).
+    """
+    axes.set_xlim(*x.span())
+    axes.set_ylim(*y.span())
     for axis, of, outer in ((axes.xaxis, x, outer_x), (axes.yaxis, y, outer_y)):
         if of.words:
             letters = MOST_LETTERS if of is y else max(3, int(room / len(of.words) / _LETTER))
@@ -182,6 +191,10 @@ def draw_ticks(axes: Axes, x: Axis, y: Axis, room: float, *, outer_x: bool, oute
             axis.set_major_locator(FixedLocator(values.tolist()))
         axis.set_major_formatter(FuncFormatter(lambda value, _: number_text(value)))
         axis.set_tick_params(labelbottom=outer, labelleft=outer)
+    if outer_x:
+        axes.set_xlabel(x.label(room + between), fontsize=NAME)
+    if outer_y:
+        axes.set_ylabel(y.label(tall), fontsize=NAME)
 
 
 def number_text(value: float) -> str:
@@ -195,12 +208,12 @@ def title(words: str) -> tuple[str, float]:
 
 
 def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], what: str) -> str:
-    """How many quantities, each of which is a `what`, have no room."""
+    """How many entries or results (`what`) have no room, in words."""
     left = len([each for each in all_of if each not in shown])
     return f"; {left} more {what if left == 1 else PLURALS[what]} in sweep.csv" if left else ""
 
 
 def without_number(shown: Sequence[Axis], count: int) -> str:
-    """How many cases have not every number."""
+    """How many cases lack a number, in words."""
     lost = int(np.isnan([each.values for each in shown]).any(axis=0).sum())
     return f"; {lost} of {counted(count, 'case')} without a number left out" if lost else ""

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from mechdesign.report.before import known
+from mechdesign.analyses.workspace.drawn import DrawnRegion
+from mechdesign.report.before import Before
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.workspace.boundary import drives_figure, inscribed_figure, side_by_side, workspace_figure
 from mechdesign.report.figures.workspace.ellipses import ellipses_figure
@@ -18,27 +19,28 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 
 
-def figures(study: Study, result: Result) -> Mapping[str, Figure]:
+def figures(study: Study, result: Result, before: Before | None = None) -> Mapping[str, Figure]:
     """A map of each local index, the boundary with poses, the largest shapes inside, the drives along the boundary.
 
     Several values of held coordinates stand side by side. Of a point with one degree of freedom its path is drawn; over
     a range of a held coordinate, what ends the region.
     """
     if "path" in result.tables:
-        return path_figures(study, result)
+        return path_figures(study, result, before)
     if "local" not in result.tables:
-        return range_figures(study, result)
-    found = regions(study, result)
-    if not found:
+        return range_figures(study, result, before)
+    shown = regions(study, result)
+    if not shown:
         return {}
-    drawn = Gallery()
-    drawn.add("of indices", map_figures, study, found)
-    if len(found) == 1:
-        drawn.add("workspace", workspace_figure, study, result, found[0])
-        drawn.add("ellipses", ellipses_figure, study, found[0], result.drawn["ellipses"])
+    gallery = Gallery()
+    gallery.add("of indices", map_figures, study, shown)
+    if len(shown) == 1:
+        drawn = DrawnRegion.of(result)
+        gallery.add("workspace", workspace_figure, study, drawn, shown[0], before=before)
+        gallery.add("ellipses", ellipses_figure, study, shown[0], drawn.ellipses)
     else:
-        drawn.add("workspace", side_by_side, study, found, known(result.drawn))
-    drawn.add("inscribed", inscribed_figure, study, result, found)
-    if any(len(region.boundary) for region in found):
-        drawn.add("drives", drives_figure, study, found)
-    return drawn
+        gallery.add("workspace", side_by_side, study, shown, before)
+    gallery.add("inscribed", inscribed_figure, study, result, shown)
+    if any(len(region.boundary) for region in shown):
+        gallery.add("drives", drives_figure, study, shown)
+    return gallery

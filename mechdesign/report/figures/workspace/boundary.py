@@ -12,11 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.analyses.poses import in_study_units, radians
+from mechdesign.analyses.workspace.drawn import DrawnRegion
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO
@@ -36,12 +37,13 @@ _DRIVES_HEIGHT = 1.9  # inches, of a panel
 _SMALL_SYMBOLS = 0.7
 
 
-def workspace_figure(study: Study, result: Result, region: Region, title: str = "") -> Figure:
+def workspace_figure(
+    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
+) -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
     section, mechanism = study.workspace, study.mechanism
     assert section is not None
-    configuration: Configuration = result.drawn["along"]
-    reached, before = np.concatenate([configuration.point(point) for point in mechanism.points]), known(result.drawn)
+    reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
     extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
                              places_before(before)])  # fmt: skip
     where = f" at {region.title}" if region.title else ""
@@ -51,17 +53,17 @@ def workspace_figure(study: Study, result: Result, region: Region, title: str = 
     fill(axes, region.local)
     page.ends([region])
     draw_before(axes, before)
-    for index in range(len(configuration.reason)):
-        draw_mechanism(axes, mechanism, configuration, index, faint=True)
+    for index in range(len(drawn.along.reason)):
+        draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
     name_both(page.figure, before)
     return page.figure
 
 
-def side_by_side(study: Study, found: Sequence[Region], before: Before | None) -> Figure:
+def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
     """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
     title = "the mechanism where it is best conditioned"
-    return regions_figure([(region.title, study, region) for region in some(found)], title, before)
+    return regions_figure([(region.title, study, region) for region in some(regions)], title, before)
 
 
 def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
@@ -98,12 +100,12 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     return plan.solve(np.broadcast_arrays(*values), limits=False)
 
 
-def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> Figure | None:
+def inscribed_figure(study: Study, result: Result, regions: Sequence[Region]) -> Figure | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
     table = result.tables["indices"]
     if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
         return None
-    shown = some(found)
+    shown = some(regions)
     places = np.concatenate([region.places() for region in shown])
     page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
                  bar=False)  # fmt: skip
@@ -130,12 +132,12 @@ def inscribed_figure(study: Study, result: Result, found: Sequence[Region]) -> F
     return page.figure
 
 
-def drives_figure(study: Study, found: Sequence[Region]) -> Figure:
+def drives_figure(study: Study, regions: Sequence[Region]) -> Figure:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
     names, mechanism = study.mechanism.drives, study.mechanism
     parts = [
         (region.boundary, side, region.title)
-        for region in some([region for region in found if len(region.boundary)])
+        for region in some([region for region in regions if len(region.boundary)])
         for side in SIDES
         if (region.boundary["side"] == side).any()
     ][:MAX_PANELS]
@@ -182,9 +184,9 @@ def draw_before(axes: Axes, before: Before | None, held: Mapping[str, float] | N
 
 
 def places_before(before: Before | None) -> Complexes:
-    """Every place that it draws."""
-    found = [*_lines(before), sketch_places(before.study)] if before is not None else []
-    return np.concatenate([np.empty(0, dtype=complex), *found])
+    """All points of what is drawn of the study before."""
+    curves = [*_lines(before), sketch_places(before.study)] if before is not None else []
+    return np.concatenate([np.empty(0, dtype=complex), *curves])
 
 
 def sketch_places(study: Study) -> Complexes:

@@ -28,13 +28,13 @@ _VELOCITY: dict[str, Any] = {"color": style.BLUE, "linestyle": "-"}
 _FORCE: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (3, 1.2))}
 
 
-def ellipses_figure(study: Study, region: Region, found: Ellipses | None) -> Figure | None:
+def ellipses_figure(study: Study, region: Region, ellipses: Ellipses | None) -> Figure | None:
     """Velocity ellipses, J u for drive rates u of unit size, and force ellipses, J^-T u for efforts u [Yoshikawa 1985].
 
     None where the Jacobian is not that of a point.
     """
     section, units = study.workspace, study.units
-    if found is None or section is None or not len(found.places):
+    if ellipses is None or section is None or not len(ellipses.places):
         return None
     title = f"where point {section.point} is fast (velocity ellipse) and where strong (force ellipse)"
     page = sheet(study, region.places(), [""], title, bar=False, below=_ROOM)
@@ -42,7 +42,7 @@ def ellipses_figure(study: Study, region: Region, found: Ellipses | None) -> Fig
     fill(axes, region.local)
     page.ends([region])
     with np.errstate(divide="ignore", over="ignore"):
-        u, sizes, _ = np.linalg.svd(found.matrices)
+        u, sizes, _ = np.linalg.svd(ellipses.matrices)
         inverse = 1 / sizes
     directions = u[:, 0, :] + 1j * u[:, 1, :]
     mechanism = study.mechanism
@@ -56,10 +56,10 @@ def ellipses_figure(study: Study, region: Region, found: Ellipses | None) -> Fig
         ("velocity", sizes, _VELOCITY, velocity, f"rates (root of squares {_one(rate)}{arcs})"),
         ("force", inverse, _FORCE, units.label("force"), f"efforts (root of squares {_one(effort)})"),
     ):
-        on_axes, stands_for, fits = _scale(half.max(axis=1), found.spacing)
+        on_axes, stands_for, fits = _scale(half.max(axis=1), ellipses.spacing)
         words = f"{quantity(on_axes, length).rstrip()} long: {quantity(stands_for, unit)}"
         handles.append(Line2D([], [], linewidth=1.4, label=f"{name} by unit drive {cause}: half axis {words}", **look))
-        for place, axis, pair in zip(found.places, directions, half * on_axes / stands_for, strict=True):
+        for place, axis, pair in zip(ellipses.places, directions, half * on_axes / stands_for, strict=True):
             largest = float(pair.max())
             small = largest > fits
             share = fits / largest if small else 1.0
@@ -90,5 +90,5 @@ def _scale(half: Floats, spacing: float) -> tuple[float, float, float]:
     usual = float(np.quantile(half[np.isfinite(half)], _USUAL))
     lengths = [round_down(fits / part) for part in (1.0, 2.2, 5.0)]
     # For each length the next round value above, so that no ellipse that should fit is larger.
-    found = [(length, 1 / round_down(fits / (length * usual))) for length in lengths]
-    return (*max(found, key=lambda each: each[0] / each[1]), fits)
+    scales = [(length, 1 / round_down(fits / (length * usual))) for length in lengths]
+    return (*max(scales, key=lambda each: each[0] / each[1]), fits)

@@ -23,20 +23,20 @@ from mechdesign.study import Study
 
 # Columns of the table that are no indices, beside the held coordinates.
 _NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
-# An index whose largest values are a thin tail is cut off above this share of the area, which the bar shows.
+# The colours of an index with a thin tail end at the value below which this share of the area lies.
 _SHOWN_AREA = 0.96
 # Points on paper between the name of a level and lines of other levels, and other names.
 CLEAR_OF_LINES = 5.0
 CLEAR_OF_NAMES = 18.0
 
 
-def map_figures(study: Study, found: Sequence[Region]) -> Gallery:
+def map_figures(study: Study, regions: Sequence[Region]) -> Gallery:
     """One map an index of the table of local indices; of many regions a few, spread evenly.
 
     There is none of an index that is infinite everywhere.
     """
-    shown = some(found)
-    names = [name for name in index_columns(found[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
+    shown = some(regions)
+    names = [name for name in index_columns(regions[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
     maps = Gallery()
     for name in names:
         maps.add(name, _index_map, study, shown, name)
@@ -48,19 +48,19 @@ def index_columns(region: Region) -> list[str]:
     return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
 
 
-def _index_map(study: Study, found: Sequence[Region], column: str) -> Figure:
-    norm = index_norm(found, column)
-    told = found[0].local.column(column)
-    places = np.concatenate([region.places() for region in found])
+def _index_map(study: Study, regions: Sequence[Region], column: str) -> Figure:
+    norm = index_norm(regions, column)
+    index = regions[0].local.column(column)
+    places = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
     page = sheet(
-        study, places, [region.title for region in found], f"{name} at point {point}: {told.meaning}", bar=True
+        study, places, [region.title for region in regions], f"{name} at point {point}: {index.meaning}", bar=True
     )
-    for axes, region in zip(page.axes, found, strict=True):
-        contours(axes, list(grids(region.local, column)), norm, labels=len(found) == 1)
-    page.ends(found)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, told.unit), ticks=norm.boundaries)
+    for axes, region in zip(page.axes, regions, strict=True):
+        contours(axes, list(grids(region.local, column)), norm, labels=len(regions) == 1)
+    page.ends(regions)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, index.unit), ticks=norm.boundaries)
     return page.figure
 
 
@@ -68,7 +68,7 @@ def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, *, labels:
     """Filled contours over the patches of a region, each level named once, where its line is longest."""
     drawn = []
     low, high = norm.boundaries[[0, -1]]
-    # Beyond the last level is where an index grows without bounds, on singularities.
+    # Beyond the last level the index grows without bound, at singularities.
     over = 2 * high - low
     for x, y, z in patches:
         shown = np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low)
@@ -93,7 +93,7 @@ def label_levels(axes: Axes, drawn: Sequence[QuadContourSet], norm: BoundaryNorm
         at, along = np.array(places).T
         others = np.concatenate([*every[:k], *every[k + 1 :], blocked])
         room = np.minimum(_nearest(at, others) / CLEAR_OF_LINES, _nearest(at, taken) / CLEAR_OF_NAMES)
-        # Where there is room, upright names read best.
+        # Upright names read best where there is room.
         best = int(np.argmax(np.minimum(room, 2.0) + np.abs(along.real) / np.abs(along)))
         if room[best] < 1:
             continue
@@ -119,9 +119,9 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
     return np.asarray(np.abs(places[:, None] - others[None, :]).min(axis=1))
 
 
-def index_norm(found: Sequence[Region], column: str) -> BoundaryNorm:
+def index_norm(regions: Sequence[Region], column: str) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
-    patches = [patch for region in found for patch in grids(region.local, column)]
+    patches = [patch for region in regions for patch in grids(region.local, column)]
     values = np.concatenate([z.ravel() for _, _, z in patches])
     areas = np.concatenate([node_areas(x, y).ravel() for x, y, _ in patches])
     finite = np.isfinite(values)

@@ -8,7 +8,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
@@ -18,14 +18,14 @@ from mechdesign.report.figures.workspace.regions import ROOM, coloured, pieces, 
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
-# The largest speed ratios may belong to dead centres, where they grow without bounds: this share has its own colours.
+# Speed ratios grow without bound at dead centres: colours end at this quantile.
 _SHOWN_RATIOS = 0.97
 
 
-def path_figures(study: Study, result: Result) -> dict[str, Figure]:
+def path_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
     """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
     path = result.tables["path"]
-    return {"path": _path(study, path, known(result.drawn)), "speed_ratio": _speed(study, path)}
+    return {"path": _path(study, path, before), "speed_ratio": _speed(study, path)}
 
 
 def _ends(ratio: Floats) -> tuple[float, bool]:

@@ -13,7 +13,7 @@ from matplotlib.path import Path
 
 from mechdesign.analyses.workspace.tables import curves
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.before import Before, known
+from mechdesign.report.before import Before
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
@@ -33,7 +33,7 @@ from mechdesign.study import Study
 from mechdesign.study.schema.workspace import Over
 
 
-def range_figures(study: Study, result: Result) -> dict[str, Figure]:
+def range_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
     """``workspace``: the region and what ends it, with the sketch; ``range``: which value decides there."""
     section = study.workspace
     assert section is not None
@@ -49,20 +49,20 @@ def range_figures(study: Study, result: Result) -> dict[str, Figure]:
     title = f"point {section.point} {'at every' if over.all else 'at some'} {ends}"
     tables = [table for _, table in shown]
     return {
-        "workspace": _region(study, shown, titles, title, known(result.drawn)),
+        "workspace": _region(study, shown, titles, title, before),
         "range": _deciding(study, tables, titles, name, style.axis_label(name, unit)),
     }
 
 
 def _region(
-    study: Study, found: Sequence[tuple[Mapping[str, float], Table]], titles: Sequence[str], title: str,
+    study: Study, shown: Sequence[tuple[Mapping[str, float], Table]], titles: Sequence[str], title: str,
     before: Before | None,
 ) -> Figure:  # fmt: skip
-    mechanism, tables = study.mechanism, [table for _, table in found]
+    mechanism, tables = study.mechanism, [table for _, table in shown]
     reached = np.concatenate([*map(places, tables), sketch_places(study), places_before(before)])
     page = sheet(study, reached, titles, title, bar=False, pad=ROOM)
     seen: set[str] = set()
-    for axes, (held, table) in zip(page.axes, found, strict=True):
+    for axes, (held, table) in zip(page.axes, shown, strict=True):
         draw_before(axes, before, held)
         axes.add_patch(PathPatch(_area(table), facecolor=PALE, linewidth=0, zorder=0.5))
         seen |= outline_of(axes, table)
@@ -104,7 +104,7 @@ def loops(pieces: Sequence[Complexes]) -> list[Complexes]:
     """
     left = [piece for piece in pieces if len(piece) > 1]
     near = 1e-6 * max((float(np.abs(piece - piece[0]).max()) for piece in left), default=1.0)
-    found = []
+    closed = []
     while left:
         loop = left.pop(0)
         while left:
@@ -114,5 +114,5 @@ def loops(pieces: Sequence[Complexes]) -> list[Complexes]:
                 break
             piece = left.pop(int(which))
             loop = np.concatenate([loop, piece[::-1] if end else piece])
-        found.append(np.append(loop, loop[0]))
-    return found
+        closed.append(np.append(loop, loop[0]))
+    return closed

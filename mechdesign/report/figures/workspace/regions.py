@@ -1,4 +1,4 @@
-"""Regions of a workspace as pictures need them, one a value of the held coordinates: fill, outline, singularities."""
+"""Regions of a workspace for pictures, one for each value of the held coordinates: fill, outline, singularities."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def regions(study: Study, result: Result) -> list[Region]:
     """The regions that are not empty, in the order of the table of indices."""
     indices = result.tables["indices"]
     held = [name for name in (study.workspace.at if study.workspace else ()) if name in result.tables["local"]]
-    found = []
+    built = []
     for row in range(len(indices)):
         values = {name: float(indices[name][row]) for name in held}
         local = result.tables["local"]
@@ -123,8 +123,8 @@ def regions(study: Study, result: Result) -> list[Region]:
             others = local.take(local["piece"] > 1), boundary.take(boundary["piece"] > 1)
             local, boundary = local.take(local["piece"] == 1), boundary.take(boundary["piece"] == 1)
         loci = lines.take(lines.where(**values)) if lines is not None and len(lines) else None
-        found.append(Region(title, values, row, local, boundary, loci, others))
-    return found
+        built.append(Region(title, values, row, local, boundary, loci, others))
+    return built
 
 
 def fate(kind: str, at: str) -> str:
@@ -138,7 +138,7 @@ def fate(kind: str, at: str) -> str:
 
 
 def outline(axes: Axes, region: Region) -> set[str]:
-    """Draw a region's boundary, coloured by what ends it, and faintly what is left out; returns what occurs."""
+    """Draw a region's boundary by what ends it, and faintly the pieces left out; returns the keys of `LOOKS` drawn."""
     seen = outline_of(axes, region.boundary)
     if region.others is not None:
         local, boundary = region.others
@@ -150,18 +150,18 @@ def outline(axes: Axes, region: Region) -> set[str]:
 
 
 def outline_of(axes: Axes, boundary: Table) -> set[str]:
-    """Draw the curves of a table, coloured by what ends the region there; returns what occurs."""
+    """Draw the curves of a boundary, coloured by what ends the region there; returns the keys of `LOOKS` drawn."""
     seen = set()
     pieces = list(curves(boundary))
     # White below keeps the gaps of dashes clean.
     for rows in pieces:
         axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=2.1, zorder=3.1)
     for rows in pieces:
-        found = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
-        color, dashes, width, _ = LOOKS[found]
+        end = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
+        color, dashes, width, _ = LOOKS[end]
         axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
                   solid_capstyle="round", zorder=3.15)  # fmt: skip
-        seen.add(found)
+        seen.add(end)
     return seen
 
 
@@ -206,9 +206,9 @@ def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: f
     return drawn
 
 
-def some(found: Sequence[Region]) -> list[Region]:
-    """Of many regions a few, spread evenly."""
-    return [found[k] for k in np.unique(np.linspace(0, len(found) - 1, min(len(found), MAX_REGIONS)).astype(int))]
+def some(regions: Sequence[Region]) -> list[Region]:
+    """At most `MAX_REGIONS` regions, evenly spread."""
+    return [regions[k] for k in np.unique(np.linspace(0, len(regions) - 1, min(len(regions), MAX_REGIONS)).astype(int))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,9 +219,9 @@ class Sheet:
     axes: tuple[Axes, ...]
     bar: Axes | None
 
-    def ends(self, found: Sequence[Region]) -> None:
+    def ends(self, regions: Sequence[Region]) -> None:
         """Draw what ends each region, a panel each, and its singularities, with a legend."""
-        panels = list(zip(self.axes, found, strict=True))
+        panels = list(zip(self.axes, regions, strict=True))
         self.legend(set().union(*(outline(*panel) | loci(*panel) for panel in panels)))
 
     def legend(self, seen: set[str]) -> None:
