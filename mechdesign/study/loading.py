@@ -33,9 +33,10 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.entries import check_variables, check_varied
+from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
-from mechdesign.study.schema.poses import KinematicsSection, PoseSection
+from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection

@@ -11,12 +11,12 @@ import mechdesign
 from mechdesign.analyses.optimize.goals import Goal
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.report.figures import style
-from mechdesign.report.figures.front import front_figure
-from mechdesign.report.figures.optimize import (
+from mechdesign.report.figures.optimize import figures
+from mechdesign.report.figures.optimize.front import front_figure
+from mechdesign.report.figures.optimize.scores import (
     ENVELOPE_STEPS,
     MAX_LINES,
     convergence,
-    figures,
     parallel_axes,
     score_curves,
 )

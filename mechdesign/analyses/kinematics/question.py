@@ -21,7 +21,7 @@ from mechdesign.mechanism.model import Quantity
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import ORDERS
-from mechdesign.study.schema.poses import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
 
 
 def characteristic_length(study: Study) -> float | None:

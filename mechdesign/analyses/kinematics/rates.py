@@ -16,7 +16,7 @@ from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.poses import KinematicsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 
 

@@ -12,9 +12,9 @@ from pydantic import BeforeValidator
 from mechdesign.cautions import ALL, KINDS
 from mechdesign.errors import StudyError, cut, suggestion
 from mechdesign.study.building.section import MechanismSection, UnitsSection
+from mechdesign.study.schema.kinematics import KinematicsSection
 from mechdesign.study.schema.matrix import MatrixSection
 from mechdesign.study.schema.optimize import OptimizeSection, Requirement
-from mechdesign.study.schema.poses import KinematicsSection
 from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.schema.sensitivities import SensitivitiesSection
 from mechdesign.study.schema.stiffness import StiffnessSection

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from mechdesign.analyses.optimize.judge import Designs
 from mechdesign.report.figures import style
-from mechdesign.report.figures.designs import head, label, listed, value_text
+from mechdesign.report.figures.optimize.designs import head, label, listed, value_text
 from mechdesign.report.figures.panels import fitting
 from mechdesign.results import Table
 

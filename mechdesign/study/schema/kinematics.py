@@ -1,0 +1,114 @@
+"""What a study asks of a motion beside its poses: outputs, Jacobian, loads, instant centres, mechanical advantage."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Self
+
+from pydantic import Field, model_validator
+
+from mechdesign.errors import counted
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.study.building.section import TwoLinks
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import failure
+
+HELP_PAGE = "reference/study/kinematics"
+
+
+class Load(fields.Model):
+    """A force at a point, a moment on a link, or both."""
+
+    at: fields.PointName | None = None
+    """Point that the force acts at. Example: T"""
+    force: tuple[fields.Force, fields.Force] | None = None
+    """Force [fx, fy] along the world's axes. Example: [0, -20]"""
+    link: fields.LinkName | None = None
+    """Link that the moment acts on. Example: boom"""
+    moment: fields.Moment | None = None
+    """Moment, counter-clockwise positive. Example: 3000"""
+
+    @model_validator(mode="after")
+    def _whole(self) -> Load:
+        if (self.at is None) != (self.force is None) or (self.moment is not None and self.link is None):
+            raise failure("a load is {at: point, force: [fx, fy]} or {link: name, moment: m}")
+        if self.force is None and self.moment is None:
+            raise failure("a load needs a force or a moment")
+        return self
+
+
+class KinematicsSection(MotionSection):
+    """Poses of the mechanism, its rates, and what is reported of it."""
+
+    command: ClassVar[str] = "kinematics"
+    jacobian: fields.CoordinateNames | None = None
+    """Outputs that are the rows of the Jacobian, as many as the drives; a point counts twice. Left out: ``outputs``, if
+    they are as many. Example: [C]
+    """
+    loads: tuple[Load, ...] = ()
+    """Forces and moments that act on the mechanism; the efforts of the drives (torque of a motor,
+    force of a cylinder) that balance them are reported. The same in all poses. Example:
+    [{at: T, force: [0, -20]}, {link: boom, moment: 3}]
+    """
+    characteristic_length: fields.PositiveLength | None = None
+    """Length as which a radian counts where the Jacobian mixes lengths and angles. Left out: that of workspace; without
+    one inverse_condition is nan there. Example: 0.1
+    """
+    instant_centres: tuple[TwoLinks, ...] = ()
+    """Pairs of links whose instant centre of velocity is found in every pose; of a telescopic leg the body at its begin
+    counts. With more than one drive it depends on their rates. Example: [[rod, ground], [crank, rocker]]
+    """
+    mechanical_advantage: dict[fields.CoordinateName, fields.CoordinateName] = Field(default_factory=dict)
+    """Outputs, each with its input: the force (of an angle the moment) that the output gives over that put in, without
+    friction; other drives are held. Example: {T.y: grip}
+    """
+
+    def checked(self, checker: Checker) -> Self:
+        """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
+        self._check_centres(checker)
+        self._check_advantage(checker)
+        checker.outputs(self.outputs, ("kinematics", "outputs"))
+        checker.outputs(self.jacobian, ("kinematics", "jacobian"))
+        rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
+        if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
+            what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
+            checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
+        for index, load in enumerate(self.loads):
+            path: KeyPath = ("kinematics", "loads", index)
+            if load.at is not None:
+                checker.known(load.at, checker.mechanism.owners, "point", (*path, "at"))
+            if load.link is not None:
+                checker.known(load.link, checker.mechanism.moving, "moving link", (*path, "link"))
+        return super().checked(checker)
+
+    def _check_centres(self, checker: Checker) -> None:
+        links, seen = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
+        for index, pair in enumerate(self.instant_centres):
+            path: KeyPath = ("kinematics", "instant_centres", index)
+            for k, name in enumerate(pair):
+                checker.known(name, links, "link", (*path, k))
+            if pair[0] == pair[1]:
+                checker.report(path, f"{pair[0]!r} has an instant centre with another link, not with itself")
+            elif frozenset(pair) in seen:
+                checker.report(path, f"{' and '.join(pair)} are listed twice")
+            seen.add(frozenset(pair))
+        drives = len(checker.mechanism.drives)
+        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
+            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+            checker.report(("kinematics", "instant_centres"), message, at_key=True)
+
+    def _check_advantage(self, checker: Checker) -> None:
+        drives = checker.mechanism.drives
+        for output, given in self.mechanical_advantage.items():
+            path: KeyPath = ("kinematics", "mechanical_advantage", output)
+            quantities = checker.coordinate(output, path, at_key=True), checker.coordinate(given, path)
+            if output == given or (output in drives and given in drives):
+                checker.report(path, f"{output!r} is not moved by {given!r}: give an output, and its input")
+            elif "none" in quantities:
+                name = output if quantities[0] == "none" else given
+                checker.report(path, f"{name!r} is neither a length nor an angle: no force or moment acts along it")
+            elif given not in drives and len(drives) > 1:
+                message = f"with {len(drives)} drives the input is one of them, {', '.join(drives)}; others are held"
+                checker.report(path, message)
