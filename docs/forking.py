@@ -27,7 +27,7 @@ _IMPORTED = (
     "mechdesign.cli.batch",
     "mechdesign.report.page.section",
     *(command.module for command in QUESTIONS.values()),
-    *(f"mechdesign.report.figures.{name}" for name in QUESTIONS),
+    *(command.figures for command in QUESTIONS.values()),
 )
 _LOOK = 1.0  # seconds between two looks for processes that have ended
 # Imports little: it is started for each call.

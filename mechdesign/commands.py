@@ -16,13 +16,25 @@ class Command:
     name: str
     question: str
     answer: str
-    room: str = ""  # empty: that of the analysis of its name
+    room: str = ""  # package of its function, columns and pictures; empty: that of the question of its name
     section: str = ""  # of the study; empty: that of its name
 
     @property
     def module(self) -> str:
         """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
-        return f"mechdesign.{self.room or f'analyses.{self.name}.analysis'}"
+        return f"mechdesign.{self.room}.{self.name}" if self.room else f"mechdesign.questions.{self.name}.analysis"
+
+    @property
+    def columns(self) -> str:
+        """Where its columns and the numbers at the top of its report are declared."""
+        return f"mechdesign.{self.room or f'questions.{self.name}'}.columns"
+
+    @property
+    def figures(self) -> str:
+        """Where the function `figures` gathers its pictures."""
+        return (
+            f"mechdesign.{self.room}.figures.{self.name}" if self.room else f"mechdesign.questions.{self.name}.figures"
+        )
 
 
 # Each has a section of its name in the study file.
@@ -48,14 +60,14 @@ SWEEP = Command(
     "sweep",
     "Which cases meet what is required?",
     "Whole studies as a design of experiments: a row a case, with every requirement and chosen results.",
-    room="experiments.sweep",
+    room="experiments",
     section="matrix",
 )
 SENSITIVITIES = Command(
     "sensitivities",
     "What does each number change?",
     "Derivatives of chosen results with respect to numbers of the study, with error estimates.",
-    room="experiments.sensitivities",
+    room="experiments",
 )
 # Of their cases the questions above are asked.
 QUESTIONS = COMMANDS | {SWEEP.name: SWEEP, SENSITIVITIES.name: SENSITIVITIES}

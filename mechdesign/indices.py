@@ -7,7 +7,7 @@ from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, NamedTuple
 
-FOLDER = "mechdesign.analyses.workspace.indices"
+FOLDER = "mechdesign.questions.workspace.indices"
 # Those that are evaluated where a study names none.
 USUAL = ("inverse_condition", "resistivity", "manipulability", "sigma_min", "sigma_max")
 
@@ -52,7 +52,7 @@ INDEX_NAMES = _Names()
 
 
 def index(name: str) -> Any:
-    """The `mechdesign.analyses.workspace.index.Index` of a name."""
+    """The `mechdesign.questions.workspace.index.Index` of a name."""
     return import_module(f"{FOLDER}.{name}").INDEX
 
 

@@ -116,7 +116,7 @@ class Chosen:
 
 @runtime_checkable
 class Span(Protocol):
-    """Values from one to another, such as `mechdesign.study.schema.optimize.Span`."""
+    """Values from one to another, such as `mechdesign.questions.optimize.schema.Span`."""
 
     def interval(self, unit: str) -> Interval:
         """The values in a unit of a table; raises ValueError if it is another kind of quantity."""

@@ -36,7 +36,6 @@ from mechdesign.files import check_marked, owned
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
-from mechdesign.report.writer import FIGURES
 from mechdesign.study import Study
 from mechdesign.study.loading import Source
 from mechdesign.work import interrupts, shards
@@ -258,7 +257,7 @@ def _import(tasks: Sequence[Task], options: Options) -> None:
     for command in {command for task in tasks for command, _ in task.questions}:
         import_module(QUESTIONS[command].module)
         if not options.no_plots:
-            import_module(f"{FIGURES}.{command}")
+            import_module(QUESTIONS[command].figures)
 
 
 def _study(tasks: Sequence[Task], several: bool, index: int, hear: Tell) -> End:

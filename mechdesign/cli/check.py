@@ -17,10 +17,10 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
+from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.requirements import foresee, on_warnings
 from mechdesign.report.writer import write_sketch
 from mechdesign.study import Study
-from mechdesign.study.schema.reliability import in_words
 from mechdesign.work.threads import one_thread
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import mechdesign
-from mechdesign.analyses.look import LONG
 from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
@@ -24,6 +23,7 @@ from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
 from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
+from mechdesign.questions.look import LONG
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.before import Before
 from mechdesign.report.cases import best_of

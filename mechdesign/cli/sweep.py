@@ -14,9 +14,9 @@ from mechdesign.cli.execution import Outcome, ask
 from mechdesign.cli.options import Options
 from mechdesign.cli.summary import junit, mark
 from mechdesign.errors import Interrupted, Problem, StudyError
+from mechdesign.experiments.schema.matrix import RANGE
 from mechdesign.files import check_marked
 from mechdesign.report.writer import write_file
-from mechdesign.study.schema.matrix import RANGE
 from mechdesign.study.text.document import in_yaml, read
 
 

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.together import Group
 from mechdesign.cautions import fails
 from mechdesign.errors import explain
 from mechdesign.experiments.wanted import Wanted, judged
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.optimize.schema import Requirement
+from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
-from mechdesign.study.schema.optimize import Requirement
 
 # Exit code of a case that misses a requirement, or has a warning that the study forbids.
 NOT_MET = 1

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechdesign.analyses.kinematics import analysis as kinematics
-from mechdesign.analyses.look import ask
-from mechdesign.analyses.optimize.stacked import grouped, shared
-from mechdesign.analyses.stiffness import analysis as stiffness
-from mechdesign.analyses.together import Answers, Group
 from mechdesign.errors import MechdesignError
+from mechdesign.questions.kinematics import analysis as kinematics
+from mechdesign.questions.look import ask
+from mechdesign.questions.optimize.stacked import grouped, shared
+from mechdesign.questions.stiffness import analysis as stiffness
+from mechdesign.questions.together import Answers, Group
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.poses import Poses

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechdesign.analyses.look import look
-from mechdesign.analyses.together import Group
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import AssemblyError, Problem, StudyError
 from mechdesign.experiments import batches, compiled
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.wanted import Wanted
 from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.look import look
+from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
+from mechdesign.experiments.schema.matrix import GRID, Values
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import Study
-from mechdesign.study.schema.matrix import GRID, Values
 from mechdesign.study.text.document import in_yaml
 from mechdesign.study.text.units import QUANTITY
 from mechdesign.study.variants import Changes, faults

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.analyses.together import Group
 from mechdesign.experiments.columns import SWEEP
+from mechdesign.experiments.schema.matrix import Best
 from mechdesign.experiments.wanted import Numbers, Wanted
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.numerics.fronts import front
+from mechdesign.questions.together import Group
 from mechdesign.report.cases import FRONT, RANK
 from mechdesign.results import Column
-from mechdesign.study.schema.matrix import Best
 from mechdesign.terms import path_of, terms_of
 
 # Differences up to this part of the largest number count as none, the precision of tables.

@@ -14,6 +14,7 @@ from mechdesign.commands import SENSITIVITIES
 from mechdesign.errors import Problem, StudyError, counted
 from mechdesign.experiments import columns
 from mechdesign.experiments.cases import answers, foresee, seeded
+from mechdesign.experiments.schema.sensitivities import Changed
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted, wanted_in
 from mechdesign.numerics.arrays import Floats
@@ -21,7 +22,6 @@ from mechdesign.numerics.differences import STEPS, slope
 from mechdesign.progress import NULL, Progress
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
-from mechdesign.study.schema.sensitivities import Changed
 from mechdesign.study.schema.study_file import entry
 from mechdesign.study.text.document import dotted, value_at
 from mechdesign.study.text.fields import Context, read_number, shown

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechdesign.analyses.optimize.goals import bounds_of
-from mechdesign.analyses.together import Group
+from mechdesign.experiments.schema.matrix import Named
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.optimize.goals import bounds_of
+from mechdesign.questions.optimize.schema import Requirement
+from mechdesign.questions.together import Group
 from mechdesign.rows import Chosen, UnknownColumnError
-from mechdesign.study.schema.matrix import Named
-from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.text.document import KeyPath
 from mechdesign.terms import Sum, path_of, terms_of
 from mechdesign.terms import command_of as command_named

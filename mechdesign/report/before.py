@@ -49,7 +49,7 @@ class Before(NamedTuple):
 
 def _runs_over(result: Result) -> str:
     """Names of the coordinates that are given along a motion; empty where there is none."""
-    from mechdesign.analyses.kinematics.drawn import DrawnMotion
+    from mechdesign.questions.kinematics.drawn import DrawnMotion
 
     poses = DrawnMotion.of(result).shown.poses
     return ", ".join(sorted(poses.values)) if poses.motion else ""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from mechdesign.analyses.columns import tables_of
 from mechdesign.commands import COMMANDS, SENSITIVITIES, SWEEP
 from mechdesign.indices import INDEX_NAMES
+from mechdesign.questions.columns import tables_of
 
 MECHANISM = "mechanism"
 ANIMATION = "motion.gif"

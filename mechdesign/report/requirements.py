@@ -11,10 +11,10 @@ import numpy as np
 from mechdesign.cautions import ALL, Caution, fails
 from mechdesign.commands import SWEEP
 from mechdesign.errors import AssemblyError, Problem, StudyError, counted, few_comparisons
+from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.results import POSES_ONLY, Drawn, Result, Table
 from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Requirement
 from mechdesign.study.text.units import written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
 from mechdesign.terms import command_of as command_named
@@ -117,13 +117,13 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     StudyError
         Every such mistake in one go, with its place.
     """
-    from mechdesign.analyses.look import look
+    from mechdesign.questions.look import look
 
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
     if goals and study.optimize is not None:
-        from mechdesign.analyses.optimize.evaluation import Evaluator
-        from mechdesign.analyses.optimize.variables import check_choices
+        from mechdesign.questions.optimize.evaluation import Evaluator
+        from mechdesign.questions.optimize.variables import check_choices
 
         try:
             check_choices(study)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cautions import Caution
+from mechdesign.commands import QUESTIONS
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import Transaction, check_marked, check_writable, flowing, replace
 from mechdesign.progress import NULL, Progress
@@ -33,7 +34,6 @@ HELP_PAGE = "howto/report"
 
 DIMENSIONS = "dimensions"  # of `check`
 CREATOR = "mechdesign"  # mark of drawings that no manifest lists
-FIGURES = "mechdesign.report.figures"
 _GIGABYTE = 1e9  # bytes
 _UNDRAWN = Caution("undrawn", "the run ended before its pictures were written")
 # Ending of the names of pictures as HTML.
@@ -197,7 +197,7 @@ def figures(study: Study, result: Result, before: Before | None = None) -> Galle
     gallery = Gallery()
     shown = (study, result.seen) if before is None else (study, result.seen, before)
     # Preparations that all pictures of a command share may fail, too.
-    gallery.add(f"of {result.command}", import_module(f"{FIGURES}.{result.command}").figures, *shown)
+    gallery.add(f"of {result.command}", import_module(QUESTIONS[result.command].figures).figures, *shown)
     return gallery
 
 
@@ -232,8 +232,8 @@ def pictures(
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
         if asked.animate:
-            from mechdesign.analyses.kinematics.drawn import DrawnMotion
-            from mechdesign.report.figures.kinematics.animation import animation
+            from mechdesign.questions.kinematics.drawn import DrawnMotion
+            from mechdesign.questions.kinematics.figures.animation import animation
 
             drawings[ANIMATION] = lambda: {ANIMATION: animation(DrawnMotion.of(result).shown)}
         drawn, failed = render(drawings, jobs)

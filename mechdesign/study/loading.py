@@ -20,10 +20,17 @@ from pydantic_core import PydanticCustomError
 from mechdesign.cautions import ALL, Caution
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechanismError, Problem, StudyError, few_comparisons, printable
+from mechdesign.experiments.schema.matrix import MatrixSection
+from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
 from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
+from mechdesign.questions.kinematics.schema import KinematicsSection
+from mechdesign.questions.optimize.schema import OptimizeSection, Requirement, check_result
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
+from mechdesign.questions.stiffness.schema import StiffnessSection
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study import expansion
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.description import build
@@ -33,16 +40,9 @@ from mechdesign.study.poses import Poses
 from mechdesign.study.schema import doubts, targets
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.entries import check_variables, check_varied
-from mechdesign.study.schema.kinematics import KinematicsSection
-from mechdesign.study.schema.matrix import MatrixSection
-from mechdesign.study.schema.optimize import OptimizeSection, Requirement, check_result
 from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.schema.reliability import ReliabilitySection
-from mechdesign.study.schema.sensitivities import SensitivitiesSection
-from mechdesign.study.schema.stiffness import StiffnessSection
 from mechdesign.study.schema.study_file import StudyFile, override
 from mechdesign.study.schema.targets import Target
-from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text.document import MAX_BYTES, Document, KeyPath, in_yaml, plain, read
 from mechdesign.study.text.fields import LOST, NAME, Context, read_number, shown
 from mechdesign.study.text.inputs import Folder, files

@@ -21,11 +21,11 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.kinematics.analysis import answers, kinematics
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.poses import study_poses
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
+from mechdesign.questions.kinematics.analysis import answers, kinematics
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.poses import study_poses
 from mechdesign.report.tables import csv_blocks
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs

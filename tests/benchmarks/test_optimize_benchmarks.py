@@ -13,8 +13,8 @@ import pytest
 from helpers.memory import peak_of
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # A coupler point is to follow a rounded triangle, with a point every five degrees of the crank.

@@ -15,8 +15,8 @@ import pytest
 from helpers.memory import peak_of
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 ARM_SAMPLES = 2_000_000

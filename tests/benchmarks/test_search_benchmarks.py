@@ -13,9 +13,9 @@ from helpers.syntheses import PROBLEMS
 from scipy.optimize import differential_evolution
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
 from mechdesign.numerics.fronts import hypervolume
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
 INDICES = ("GII", "GRI", "SUI")

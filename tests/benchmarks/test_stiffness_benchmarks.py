@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
 from mechdesign.experiments.batches import answers
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs
 

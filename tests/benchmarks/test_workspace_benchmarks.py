@@ -15,11 +15,11 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.rays import BATCH, Designs
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.local import Local
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.local import Local
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH, Designs
 from mechdesign.results import Result
 
 STUDY = Path(__file__).parents[2] / "configs" / "two_rrr.yaml"

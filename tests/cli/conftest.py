@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
+from mechdesign.commands import QUESTIONS
 from mechdesign.results import Column, Result, Table
 
 SLIDER = """\
@@ -60,9 +61,9 @@ def analysis(monkeypatch):
     import_module("mechdesign.cli.check")
 
     def install(function, command="kinematics"):
-        module = ModuleType(f"mechdesign.analyses.{command}.analysis")
+        module = ModuleType(f"mechdesign.questions.{command}.analysis")
         setattr(module, command, function)
-        figures = import_module(f"mechdesign.report.figures.{command}")
+        figures = import_module(QUESTIONS[command].figures)
         monkeypatch.setitem(sys.modules, module.__name__, module)
         monkeypatch.setattr(figures, "figures", lambda study, result: {})
 

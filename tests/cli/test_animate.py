@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 
 from .conftest import SLIDER
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.work.journal import NAME, Journal, digest
 
 STUDY = """\

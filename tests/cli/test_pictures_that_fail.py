@@ -21,15 +21,15 @@ def failing(*arguments, **options):
 @pytest.mark.parametrize(
     ("module", "function", "lost", "name"),
     [
-        ("figures.kinematics", "curves_figure", "motion.png", "motion"),
-        ("figures.kinematics", "paths_figure", "paths.png", "paths"),
-        ("figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
-        ("figures.kinematics.animation", "animation", "motion.gif", "motion.gif"),
-        ("figures.kinematics", "figures", "motion.png paths.png", "of kinematics"),
+        ("questions.kinematics.figures", "curves_figure", "motion.png", "motion"),
+        ("questions.kinematics.figures", "paths_figure", "paths.png", "paths"),
+        ("report.figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
+        ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
+        ("questions.kinematics.figures", "figures", "motion.png paths.png", "of kinematics"),
     ],
 )
 def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, name):
-    monkeypatch.setattr(importlib.import_module(f"mechdesign.report.{module}"), function, failing)
+    monkeypatch.setattr(importlib.import_module(f"mechdesign.{module}"), function, failing)
     done = invoke("kinematics", STUDY, "--animate")
     assert done.exit_code == 0, done.output
     (told,) = [line for line in done.stderr.splitlines() if "could not be drawn" in line]
@@ -71,7 +71,7 @@ def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
 
 @pytest.mark.nightly
 def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, monkeypatch):
-    from mechdesign.report.figures import kinematics
+    from mechdesign.questions.kinematics import figures as kinematics
 
     def interrupt(*arguments):
         raise KeyboardInterrupt

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.errors import AssemblyError, Interrupted
+from mechdesign.questions.kinematics.analysis import kinematics
 
 from .conftest import SLIDER, answer
 

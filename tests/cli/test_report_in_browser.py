@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.page.page import Answered, report
 from mechdesign.report.page.section import section
 from mechdesign.study import load

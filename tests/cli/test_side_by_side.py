@@ -132,7 +132,7 @@ def kinematics(study, *, seed, jobs, progress):
         raise Interrupted(replace(result, interrupted="interrupted: some poses")) from None
     return result
 
-module = ModuleType("mechdesign.analyses.kinematics.analysis")
+module = ModuleType("mechdesign.questions.kinematics.analysis")
 module.kinematics = kinematics
 sys.modules[module.__name__] = module
 

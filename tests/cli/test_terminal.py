@@ -38,7 +38,7 @@ def kinematics(study, *, seed, jobs, progress):
     columns = [Column(f"point_{{k}}.x", np.arange(100) / 7, "mm") for k in range(20)]
     return Result("kinematics", {{"motion": Table("motion", tuple(columns))}})
 
-module = ModuleType("mechdesign.analyses.kinematics.analysis")
+module = ModuleType("mechdesign.questions.kinematics.analysis")
 module.kinematics = kinematics
 sys.modules[module.__name__] = module
 sys.argv = ["mechdesign", "kinematics", "slider.yaml", "--no-plots", *sys.argv[1:]]

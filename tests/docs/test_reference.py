@@ -158,7 +158,7 @@ def test_every_table_and_column_of_answers_is_made_by_its_declaration():
     """What the reference does not declare would have no entry."""
     made = [
         f"{path.name}:{call.lineno}"
-        for folder in ("analyses", "experiments")
+        for folder in ("questions", "region", "experiments")
         for path in (*(ROOT / "mechdesign" / folder).rglob("*.py"), ROOT / "mechdesign/cli/summary.py")
         for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in ("Table", "Column")

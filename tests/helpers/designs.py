@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mechdesign.analyses.poses import alike, study_poses
 from mechdesign.errors import AssemblyError
+from mechdesign.questions.poses import alike, study_poses
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs

@@ -19,8 +19,8 @@ import numpy as np
 from helpers.beam_model import Frame
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.model import Fixed, Link, Prismatic
+from mechdesign.questions.stiffness.schema import Profile
 from mechdesign.study import Study
-from mechdesign.study.schema.stiffness import Profile
 
 GROUND = "ground"
 

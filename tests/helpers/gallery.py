@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.results import Result
 from mechdesign.study import Study, load
 

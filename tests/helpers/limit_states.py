@@ -10,10 +10,10 @@ from math import comb, factorial
 import numpy as np
 from scipy.special import gammaincc, ndtr, ndtri
 
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem, failed
-from mechdesign.analyses.reliability.laws import Measured
-from mechdesign.analyses.reliability.methods import quasi_monte_carlo as quasi
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.engine.problem import Estimate, Problem, failed
+from mechdesign.questions.reliability.laws import Measured
+from mechdesign.questions.reliability.methods import quasi_monte_carlo as quasi
 
 
 @dataclass(frozen=True)

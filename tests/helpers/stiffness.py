@@ -6,8 +6,8 @@ import numpy as np
 
 import mechdesign
 from helpers.studies import study_of
-from mechdesign.analyses.stiffness.body import ask
-from mechdesign.analyses.stiffness.legs import Leg
+from mechdesign.questions.stiffness.body import ask
+from mechdesign.questions.stiffness.legs import Leg
 from mechdesign.results import Result
 
 METRES = "units: {length: m, angle: deg, time: s, force: N}\n"

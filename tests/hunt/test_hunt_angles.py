@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.optimize.stacked import tables
-from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.reliability.analysis import reliability
-from mechdesign.analyses.workspace.analysis import workspace
 from mechdesign.errors import AssemblyError
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.stacked import tables
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.reliability.analysis import reliability
+from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.study.designs import Designs
 
 Floats = np.ndarray

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.together import Group
 from mechdesign.errors import MechdesignError
 from mechdesign.experiments.cases import answers
 from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.together import Group
 from mechdesign.results import Result
 
 Seeds = Callable[[int], Iterator[int]]

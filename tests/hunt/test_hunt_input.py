@@ -23,10 +23,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mechdesign.analyses.optimize import variables
 from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
+from mechdesign.questions.optimize import variables
 from mechdesign.study import load, poses, template, templates
 from mechdesign.study.text.document import read
 

@@ -9,7 +9,7 @@ import pytest
 from helpers.linkages import FourBar, cut, swept
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 
 Seeds = Callable[[int], Iterator[int]]
 # Own looks at a motion (a hundredth of a degree apart or so), and beside each place where it ends.

@@ -11,9 +11,9 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.region.rays import BATCH, SINGLE
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH, SINGLE
 from mechdesign.results import Result
 
 Complex = np.ndarray

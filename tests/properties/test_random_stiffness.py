@@ -19,12 +19,12 @@ from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 import mechdesign
-from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.analysis import answers, stiffness
-from mechdesign.analyses.stiffness.body import ask, hold
-from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
+from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.stiffness.analysis import answers, stiffness
+from mechdesign.questions.stiffness.body import ask, hold
+from mechdesign.questions.stiffness.force_method import load, twists_of
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 

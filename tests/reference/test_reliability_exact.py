@@ -13,8 +13,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.reliability.engine.problem import CONFIDENCE
-from mechdesign.analyses.reliability.methods.auto import PILOT
+from mechdesign.questions.reliability.engine.problem import CONFIDENCE
+from mechdesign.questions.reliability.methods.auto import PILOT
 from mechdesign.results import Result, Table
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.region.rays import BATCH, SINGLE
-from mechdesign.analyses.region.rules import Rule
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH, SINGLE
+from mechdesign.region.rules import Rule
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 

@@ -13,7 +13,7 @@ import pytest
 from helpers.beam_model import Frame
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
+from mechdesign.questions.poses import study_poses
 from mechdesign.study import Study
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -9,8 +9,8 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace import ranged
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.questions.workspace import ranged
 
 FIVE_BAR = """
 units: {length: m}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
 
 FOUR_BAR = """
 mechanism:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.optimize.analysis import optimize
-from mechdesign.analyses.reliability.analysis import reliability
-from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.analysis import optimize
+from mechdesign.questions.reliability.analysis import reliability
+from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.study.loading import load
 
 # A slider to the left of its crank: the rod points at 180 deg.

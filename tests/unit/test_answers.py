@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import answers, kinematics
-from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import AssemblyError
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.kinematics.analysis import answers, kinematics
+from mechdesign.questions.poses import study_poses
 from mechdesign.results import Column, Result
 from mechdesign.statistics import Asked
 from mechdesign.study import Study

@@ -7,9 +7,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH
 from mechdesign.study.designs import variant
 
 # A platform on three legs, each a crank and a rod; its angle is asked for as it is, or by a measure.

@@ -12,13 +12,13 @@ from helpers.studies import study_of
 from scipy.optimize import brentq
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.contained import Shape, fitting_scale
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.contained import Shape, fitting_scale
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH
 
 ARM = """
 mechanism:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 
 FOUR_BAR = """
 mechanism:

@@ -7,8 +7,8 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.report.requirements import Verdict
 from mechdesign.results import Result
 

@@ -11,9 +11,9 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.workspace.local import Local
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.workspace.local import Local
 from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -348,8 +348,8 @@ def test_what_cannot_be_a_load(text: str, override: str, message: str) -> None:
 @pytest.mark.nightly
 def test_a_map_over_the_workspace_counts_the_deflection() -> None:
     """The indices of the workspace say what the question itself says at its nodes."""
-    from mechdesign.analyses.workspace.index import prepare
-    from mechdesign.analyses.workspace.question import questions
+    from mechdesign.questions.workspace.index import prepare
+    from mechdesign.questions.workspace.question import questions
 
     text = (
         FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "")

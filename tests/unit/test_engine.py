@@ -8,11 +8,11 @@ from helpers import limit_states
 from helpers.limit_states import Case, quasi_monte_carlo
 from scipy.special import ndtr
 
-from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, Problem, reached
-from mechdesign.analyses.reliability.methods.form import form
-from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
-from mechdesign.study.schema.reliability import Precision
+from mechdesign.questions.reliability.engine.design_points import find
+from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, Problem, reached
+from mechdesign.questions.reliability.methods.form import form
+from mechdesign.questions.reliability.methods.importance_sampling import importance_sampling
+from mechdesign.questions.reliability.schema.section import Precision
 
 CASES = {
     **{f"half_space_{d}_{beta:g}": limit_states.linear(d, beta) for d in (1, 2, 30, 100) for beta in (2.0, 4.0, 7.0)},
@@ -179,7 +179,7 @@ def test_a_limit_out_of_reach_of_a_bounded_variable_is_never_broken() -> None:
 @pytest.mark.slow
 def test_pins_in_contact() -> None:
     """Two pins on their rims: the x offset of both beyond a limit, against the integral over the one's direction."""
-    from mechdesign.analyses.reliability.pin_laws import PIN_LAWS
+    from mechdesign.questions.reliability.pin_laws import PIN_LAWS
 
     limit = 1.99
 

@@ -7,8 +7,8 @@ import pytest
 from helpers import limit_states
 from helpers.limit_states import Case, quasi_monte_carlo
 
-from mechdesign.analyses.reliability.engine.design_points import find
-from mechdesign.analyses.reliability.engine.problem import (
+from mechdesign.questions.reliability.engine.design_points import find
+from mechdesign.questions.reliability.engine.problem import (
     CONFIDENCE,
     WIDTH,
     Estimate,
@@ -17,9 +17,9 @@ from mechdesign.analyses.reliability.engine.problem import (
     failed,
     weighted,
 )
-from mechdesign.analyses.reliability.methods.auto import climb, rungs
-from mechdesign.analyses.reliability.methods.importance_sampling import importance_sampling
-from mechdesign.study.schema.reliability import Precision
+from mechdesign.questions.reliability.methods.auto import climb, rungs
+from mechdesign.questions.reliability.methods.importance_sampling import importance_sampling
+from mechdesign.questions.reliability.schema.section import Precision
 
 SEEDS = 80
 CASES = {

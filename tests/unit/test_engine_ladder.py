@@ -7,9 +7,9 @@ import pytest
 from helpers import limit_states
 from helpers.limit_states import Case
 
-from mechdesign.analyses.reliability.engine.problem import WIDTH, Estimate, binomial, failed, reached
-from mechdesign.analyses.reliability.methods.auto import FEW, PILOT, climb, disagree, rungs
-from mechdesign.study.schema.reliability import Precision
+from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, binomial, failed, reached
+from mechdesign.questions.reliability.methods.auto import FEW, PILOT, climb, disagree, rungs
+from mechdesign.questions.reliability.schema.section import Precision
 
 Said = tuple[Estimate, str, dict[str, Estimate]]
 

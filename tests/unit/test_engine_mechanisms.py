@@ -8,8 +8,8 @@ from helpers.studies import study_of
 from scipy import optimize, stats
 
 import mechdesign
-from mechdesign.analyses.reliability.engine.problem import Estimate
-from mechdesign.analyses.reliability.methods.auto import disagree
+from mechdesign.questions.reliability.engine.problem import Estimate
+from mechdesign.questions.reliability.methods.auto import disagree
 from mechdesign.results import Result
 
 PLATFORM = """

@@ -10,10 +10,10 @@ from helpers.studies import study_of
 from scipy.optimize import minimize_scalar
 
 import mechdesign
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize import stacked
+from mechdesign.questions.poses import study_poses
 from mechdesign.results import Table
 from mechdesign.study.designs import Designs
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.mechanism.four_bars import FourBar, describe_loops, four_bars
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.results import Result
 
 

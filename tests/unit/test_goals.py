@@ -10,12 +10,12 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import Goal, goal, goals_of, unit_of
 from mechdesign.errors import MechdesignError, StudyError
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import Goal, goal, goals_of, unit_of
+from mechdesign.questions.optimize.schema import Condition
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
-from mechdesign.study.schema.optimize import Condition
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 Designs = Mapping[str, np.ndarray]
@@ -356,7 +356,7 @@ def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() ->
     ],
 )
 def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: str, message: str) -> None:
-    from mechdesign.analyses.optimize.goals import bounds_of
+    from mechdesign.questions.optimize.goals import bounds_of
 
     study = study_of(SLIDE + f"optimize: {{variables: {{r: {{from: 0, to: 1, number: 2}}}}, {goals}}}")
     section = study.optimize
@@ -384,7 +384,7 @@ def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None
 
 @pytest.mark.slow
 def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
-    from mechdesign.analyses import poses
+    from mechdesign.questions import poses
 
     study = varied("gallery/four_bar.yaml", ["crank.length", "coupler.C.x"])
     goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
@@ -412,7 +412,7 @@ optimize: {method: search, variables: {n: {from: 2, to: 9}, r: {from: 1, to: 9}}
 
 
 def test_conditions_with_rows() -> None:
-    from mechdesign.analyses.optimize.goals import bounds_of
+    from mechdesign.questions.optimize.goals import bounds_of
 
     condition = Condition.model_validate(
         {"result": "kinematics.extremes.max", "where": {"output": "P.x"}, "at_most": 3}

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import mechdesign
+from mechdesign.commands import COMMANDS
 
 ROOT = Path(mechdesign.__file__).parent
 # Folders and files from the bottom to the top; each may import what stands in its own line and above.
@@ -18,22 +19,27 @@ ORDER = (
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
     ("mechdesign.study.building",),
-    ("mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths"),
+    (
+        "mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths",
+        *(f"mechdesign.questions.{name}.schema" for name in COMMANDS), "mechdesign.experiments.schema",
+    ),
     ("mechdesign.study",),
     ("mechdesign.curve",),
-    ("mechdesign.analyses", "mechdesign.analyses.region"),
-    ("mechdesign.analyses.kinematics",),
-    ("mechdesign.analyses.stiffness",),
-    ("mechdesign.analyses.reliability",),
-    ("mechdesign.analyses.workspace",),
-    ("mechdesign.analyses.optimize",),
+    ("mechdesign.questions", "mechdesign.region"),
+    ("mechdesign.questions.kinematics",),
+    ("mechdesign.questions.stiffness",),
+    ("mechdesign.questions.reliability",),
+    ("mechdesign.questions.workspace",),
+    ("mechdesign.questions.optimize",),
+    ("mechdesign.report.figures",),
+    tuple(f"mechdesign.questions.{name}.figures" for name in COMMANDS),
     ("mechdesign.report",),
     ("mechdesign.experiments",),
     ("mechdesign.api",),
     ("mechdesign.reference",),
     ("mechdesign.cli",),
     ("mechdesign.__init__", "mechdesign.__main__"),
-)
+)  # fmt: skip
 RANKS = {room: rank for rank, rooms in enumerate(ORDER) for room in rooms}
 
 

@@ -13,9 +13,9 @@ from helpers.memory import peak_of
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses import poses
-from mechdesign.analyses.kinematics import passage, remarks
 from mechdesign.errors import OutputError
+from mechdesign.questions import poses
+from mechdesign.questions.kinematics import passage, remarks
 from mechdesign.report.requirements import requirements
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import LongTable, Result

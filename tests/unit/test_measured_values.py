@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.reliability.study_sources import find_sources
 from mechdesign.errors import StudyError
+from mechdesign.questions.reliability.study_sources import find_sources
 
 VALUES = np.round(100.02 + 0.05 * np.random.default_rng(5).standard_normal(30), 3)
 STUDY = """

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.optimize.analysis import optimize
-from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.reliability.analysis import reliability
-from mechdesign.analyses.stiffness.analysis import stiffness
-from mechdesign.analyses.workspace.analysis import workspace
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.analysis import optimize
+from mechdesign.questions.reliability.analysis import reliability
+from mechdesign.questions.stiffness.analysis import stiffness
+from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH
 from mechdesign.report.requirements import requirements
 
 ARM = """

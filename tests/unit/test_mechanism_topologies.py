@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Reason
+from mechdesign.questions.kinematics.analysis import kinematics
 
 INVERTED = """
 mechanism:

@@ -6,10 +6,10 @@ from helpers.studies import study_of
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.questions.kinematics.figures import curves_figure, figures
+from mechdesign.questions.kinematics.figures.animation import in_order
+from mechdesign.questions.kinematics.figures.transmission import transmission_figure
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics import curves_figure, figures
-from mechdesign.report.figures.kinematics.animation import in_order
-from mechdesign.report.figures.kinematics.transmission import transmission_figure
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import Sweep, ranks
 

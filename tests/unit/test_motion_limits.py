@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.results import Table
 
 

@@ -10,7 +10,7 @@ from helpers.gallery import FOLDER, result_of, study_named
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace.analysis import workspace
+from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS
 from mechdesign.study import load

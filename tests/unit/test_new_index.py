@@ -7,9 +7,9 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.workspace import indices
 from mechdesign.errors import StudyError
-from mechdesign.report.figures.workspace import figures
+from mechdesign.questions.workspace import indices
+from mechdesign.questions.workspace.figures import figures
 from mechdesign.report.tables import to_csv
 from mechdesign.study import schema
 
@@ -18,7 +18,7 @@ FILE = '''
 
 import numpy as np
 
-from mechdesign.analyses.workspace.index import Index, of_jacobian
+from mechdesign.questions.workspace.index import Index, of_jacobian
 
 INDEX = Index(
     "distance from the origin", of_jacobian(lambda local: np.abs(local.configuration.point("P"))),

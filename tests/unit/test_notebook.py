@@ -188,7 +188,7 @@ def test_a_picture_that_fails_is_told_and_costs_no_other(monkeypatch: pytest.Mon
     def fail(*given):
         raise ValueError("no ink")
 
-    monkeypatch.setattr("mechdesign.report.figures.kinematics.curves_figure", fail)
+    monkeypatch.setattr("mechdesign.questions.kinematics.figures.curves_figure", fail)
     result = mechdesign.kinematics(mechdesign.load(DATA))
     with pytest.warns(UserWarning, match=r"picture motion could not be drawn: .*no ink"):
         assert result.figures == ("paths", "poses", "transmission", "mechanism")
@@ -280,7 +280,7 @@ def test_what_an_interrupted_question_found_is_an_answer(monkeypatch: pytest.Mon
     def interrupt(study, **options):
         raise Interrupted(part)
 
-    monkeypatch.setattr("mechdesign.analyses.kinematics.analysis.kinematics", interrupt)
+    monkeypatch.setattr("mechdesign.questions.kinematics.analysis.kinematics", interrupt)
     with pytest.raises(Interrupted) as caught:
         mechdesign.kinematics(study, seed=3)
     found = caught.value.result

@@ -9,10 +9,10 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.optimize.judge import Designs
-from mechdesign.analyses.optimize.variables import grid
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.judge import Designs
+from mechdesign.questions.optimize.variables import grid
 from mechdesign.study.designs import variant
 
 CONFIGS = Path(__file__).parents[2] / "configs"

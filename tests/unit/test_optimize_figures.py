@@ -8,18 +8,18 @@ from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
 import mechdesign
-from mechdesign.analyses.optimize.goals import Goal
-from mechdesign.analyses.optimize.judge import Designs
-from mechdesign.report.figures import style
-from mechdesign.report.figures.optimize import figures
-from mechdesign.report.figures.optimize.front import front_figure
-from mechdesign.report.figures.optimize.scores import (
+from mechdesign.questions.optimize.figures import figures
+from mechdesign.questions.optimize.figures.front import front_figure
+from mechdesign.questions.optimize.figures.scores import (
     ENVELOPE_STEPS,
     MAX_LINES,
     convergence,
     parallel_axes,
     score_curves,
 )
+from mechdesign.questions.optimize.goals import Goal
+from mechdesign.questions.optimize.judge import Designs
+from mechdesign.report.figures import style
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 

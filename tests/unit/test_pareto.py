@@ -9,10 +9,10 @@ from helpers.studies import study_of
 from helpers.syntheses import tray
 
 import mechdesign
-from mechdesign.analyses.optimize.explorer import Explorer, Known
-from mechdesign.analyses.optimize.pareto import evolve_front, front, knee
-from mechdesign.analyses.optimize.search import sample
 from mechdesign.numerics.fronts import crowding
+from mechdesign.questions.optimize.explorer import Explorer, Known
+from mechdesign.questions.optimize.pareto import evolve_front, front, knee
+from mechdesign.questions.optimize.search import sample
 
 # x = r1 cos 30 + r2 cos 60 is small and y = r1 sin 30 + r2 sin 60 large: first r2 grows, then r1.
 ARM = """\

@@ -8,9 +8,9 @@ from helpers.stiffness import FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses import poses
-from mechdesign.analyses.kinematics.special_poses import MOST
 from mechdesign.mechanism.plan import Plan
+from mechdesign.questions import poses
+from mechdesign.questions.kinematics.special_poses import MOST
 from mechdesign.report import writer
 from mechdesign.report.manifest import Extras
 

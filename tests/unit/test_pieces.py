@@ -10,13 +10,13 @@ from helpers.studies import study_of
 from scipy import ndimage
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.region.curves import workspace_nodes
-from mechdesign.analyses.region.rays import SINGLE
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.curves import workspace_nodes
+from mechdesign.region.rays import SINGLE
 from mechdesign.results import Result
 
 FIVE_BAR = """

@@ -307,10 +307,10 @@ def test_what_cannot_be_meant_is_refused(changes: list[str], message: str) -> No
 @pytest.mark.nightly
 def test_the_point_of_a_workspace_may_be_an_end() -> None:
     """The map says of every node what the question says there."""
-    from mechdesign.analyses.poses import study_poses
-    from mechdesign.analyses.workspace.index import prepare
-    from mechdesign.analyses.workspace.local import Local
-    from mechdesign.analyses.workspace.question import questions
+    from mechdesign.questions.poses import study_poses
+    from mechdesign.questions.workspace.index import prepare
+    from mechdesign.questions.workspace.local import Local
+    from mechdesign.questions.workspace.question import questions
 
     text = (
         FIVE_BAR.replace("  poses: [{P.x: 0.05, P.y: 0.45}]\n", "  bearings: {P: 5e3}\n")

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.special import ndtr, owens_t
 
-from mechdesign.analyses.reliability.engine.problem import Estimate, binomial
-from mechdesign.analyses.reliability.first_order import correlation
-from mechdesign.analyses.reliability.probability import (
+from mechdesign.numerics.statistics import rectangle_failure
+from mechdesign.questions.reliability.engine.problem import Estimate, binomial
+from mechdesign.questions.reliability.first_order import correlation
+from mechdesign.questions.reliability.probability import (
     disc_failure,
     disc_failures,
     failure_probability,
 )
-from mechdesign.analyses.reliability.question import Band, Disc
-from mechdesign.numerics.statistics import rectangle_failure
+from mechdesign.questions.reliability.question import Band, Disc
 
 
 def quadrant(h: float, k: float, rho: float) -> float:

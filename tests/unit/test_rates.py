@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 
-from mechdesign.analyses.kinematics.analysis import kinematics
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.report.requirements import foresee
 from mechdesign.results import Table
 from mechdesign.study import Study

@@ -3,12 +3,12 @@
 import pytest
 from pydantic import ValidationError
 
-from mechdesign.analyses.region import regions
-from mechdesign.analyses.reliability import task
-from mechdesign.analyses.workspace import quadrature, question
 from mechdesign.indices import INDEX_NAMES
+from mechdesign.questions.reliability import task
+from mechdesign.questions.workspace import quadrature, question
 from mechdesign.reference import below, entries, find, near, place
 from mechdesign.reference.keys import Key, keys
+from mechdesign.region import regions
 from mechdesign.study import schema
 from mechdesign.study.text.document import read
 from mechdesign.study.text.fields import Context

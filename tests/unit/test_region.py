@@ -10,10 +10,10 @@ from helpers.circles import common_area
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import find_panels
-from mechdesign.analyses.region.rays import BATCH, SINGLE, Designs, Effort, trace
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.panels import find_panels
+from mechdesign.region.rays import BATCH, SINGLE, Designs, Effort, trace
 
 ARM = """
 units: {length: dimensionless}

@@ -11,8 +11,8 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.analyses.reliability import cycle
 from mechdesign.errors import Interrupted
+from mechdesign.questions.reliability import cycle
 from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"

@@ -11,16 +11,16 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.reliability.engine.design_points import DesignPoints
-from mechdesign.analyses.reliability.engine.problem import Estimate, Problem
-from mechdesign.analyses.reliability.methods import normal
-from mechdesign.analyses.reliability.task import MethodResult, Task
 from mechdesign.errors import StudyError
+from mechdesign.questions.reliability.engine.design_points import DesignPoints
+from mechdesign.questions.reliability.engine.problem import Estimate, Problem
+from mechdesign.questions.reliability.figures import figures
+from mechdesign.questions.reliability.methods import normal
+from mechdesign.questions.reliability.schema.methods import METHODS, Method
+from mechdesign.questions.reliability.schema.section import Precision
+from mechdesign.questions.reliability.task import MethodResult, Task
 from mechdesign.report.figures import style
-from mechdesign.report.figures.reliability import figures
 from mechdesign.report.tables import to_csv
-from mechdesign.study.schema.methods import METHODS, Method
-from mechdesign.study.schema.reliability import Precision
 from mechdesign.study.schema.study_file import schema
 
 LEVER = """

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.optimize import stacked
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.poses import study_poses
+from mechdesign.questions.optimize import stacked
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.poses import study_poses
 from mechdesign.study.designs import Designs
 
 TABLES = ("moments", "reliability", "capability", "contributions")

@@ -12,16 +12,16 @@ from matplotlib.patches import StepPatch
 from matplotlib.path import Path as Outline
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.reliability.figures import figures
+from mechdesign.questions.reliability.figures.bars import allocation_figure, contributions_figure
+from mechdesign.questions.reliability.figures.densities import SHARES, smoothed
+from mechdesign.questions.reliability.figures.looks import look
+from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import number, plane
-from mechdesign.report.figures.reliability import figures
-from mechdesign.report.figures.reliability.bars import allocation_figure, contributions_figure
-from mechdesign.report.figures.reliability.densities import SHARES, smoothed
-from mechdesign.report.figures.reliability.looks import look
 from mechdesign.results import Column, Table
-from mechdesign.study.schema.methods import METHODS
 
 SLIDER = """
 units: {length: mm}

@@ -7,11 +7,11 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region import curves
 from mechdesign.errors import Interrupted, StudyError
+from mechdesign.questions.reliability.schema.methods import METHODS
+from mechdesign.region import curves
 from mechdesign.study import Study
 from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.methods import METHODS
 
 SLIDER_CRANK = """
 mechanism:

@@ -10,7 +10,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import StudyError
-from mechdesign.study.schema.reliability import in_words
+from mechdesign.questions.reliability.schema.section import in_words
 
 SLIDER_CRANK = """
 mechanism:

@@ -10,8 +10,8 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.analyses.reliability.methods.second_order import Quadratic, cumulants
-from mechdesign.analyses.reliability.study_sources import find_sources
+from mechdesign.questions.reliability.methods.second_order import Quadratic, cumulants
+from mechdesign.questions.reliability.study_sources import find_sources
 from mechdesign.results import Result
 
 LEVER = """

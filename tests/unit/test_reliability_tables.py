@@ -9,7 +9,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.reliability.engine.problem import binomial
+from mechdesign.questions.reliability.engine.problem import binomial
 from mechdesign.results import Result
 
 CONFIGS = Path(__file__).parents[2] / "configs"

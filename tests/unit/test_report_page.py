@@ -8,16 +8,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from mechdesign.analyses.columns import GIVEN, VALID
-from mechdesign.analyses.kinematics.columns import MOTION
-from mechdesign.analyses.reliability.columns import RELIABILITY
-from mechdesign.analyses.stiffness.columns import STIFFNESS
+from mechdesign.questions.columns import GIVEN, VALID
+from mechdesign.questions.kinematics.columns import MOTION
+from mechdesign.questions.optimize.schema import Requirement
+from mechdesign.questions.reliability.columns import RELIABILITY
+from mechdesign.questions.stiffness.columns import STIFFNESS
 from mechdesign.report.figures import style
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
 from mechdesign.report.requirements import judge
 from mechdesign.results import Column, Result, Table
-from mechdesign.study.schema.optimize import Requirement
 
 X = np.linspace(0, 10, 400)
 

@@ -10,9 +10,9 @@ from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 
 import mechdesign
+from mechdesign.experiments.figures.sweep.planes import REDUCTIONS, Gates, Plane
+from mechdesign.experiments.figures.sweep.quantities import Axis, sample
 from mechdesign.numerics.arrays import Floats
-from mechdesign.report.figures.sweep.planes import REDUCTIONS, Gates, Plane
-from mechdesign.report.figures.sweep.quantities import Axis, sample
 from mechdesign.results import Column, Table
 from tests.unit.test_cases import SLIDER_CRANK
 
@@ -146,8 +146,8 @@ def test_of_many_cases_a_sample_is_drawn_with_the_best_and_the_front(monkeypatch
         assert np.bincount(part, minlength=10).min() > 40
     assert sample(table, count)[0].tolist() == [*range(count)]
 
-    monkeypatch.setattr("mechdesign.report.figures.sweep.maps.MOST_OVER_MAP", 20)
-    monkeypatch.setattr("mechdesign.report.figures.sweep.effects.MOST_DRAWN", 20)
+    monkeypatch.setattr("mechdesign.experiments.figures.sweep.maps.MOST_OVER_MAP", 20)
+    monkeypatch.setattr("mechdesign.experiments.figures.sweep.effects.MOST_DRAWN", 20)
     answer = answer_of({R: "30:46:2", L: "90:130:4"})
     for name, words in (("response", "dots: a sample of 20 of them"), ("scatter", "an even sample of 20 of 99 cases")):
         figure = answer.figure(name)

@@ -7,8 +7,9 @@ import pytest
 from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
-from mechdesign.analyses.reliability.copula import Correlation
-from mechdesign.analyses.reliability.laws import (
+from mechdesign.errors import StudyError
+from mechdesign.questions.reliability.copula import Correlation
+from mechdesign.questions.reliability.laws import (
     Beta,
     Lognormal,
     Marginal,
@@ -19,10 +20,9 @@ from mechdesign.analyses.reliability.laws import (
     Uniform,
     marginal,
 )
-from mechdesign.analyses.reliability.pin_laws import PIN_LAWS
-from mechdesign.analyses.reliability.simulation import generator
-from mechdesign.errors import StudyError
-from mechdesign.study.schema.variation import DISTRIBUTIONS, Dimension
+from mechdesign.questions.reliability.pin_laws import PIN_LAWS
+from mechdesign.questions.reliability.schema.variation import DISTRIBUTIONS, Dimension
+from mechdesign.questions.reliability.simulation import generator
 
 SAMPLES = 200_000
 LAWS: dict[str, Marginal] = {

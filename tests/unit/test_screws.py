@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mechdesign.analyses.stiffness.compliance import Held, by_wrenches
-from mechdesign.analyses.stiffness.force_method import Twists, load
-from mechdesign.analyses.stiffness.network import Network, NetworkEdge
-from mechdesign.analyses.stiffness.screws import (
+from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.stiffness.compliance import Held, by_wrenches
+from mechdesign.questions.stiffness.force_method import Twists, load
+from mechdesign.questions.stiffness.network import Network, NetworkEdge
+from mechdesign.questions.stiffness.screws import (
     LegScrews,
     constraint_compliance,
     equivalent_springs,
@@ -20,7 +21,6 @@ from mechdesign.analyses.stiffness.screws import (
     reciprocal_wrenches,
     slide_twist,
 )
-from mechdesign.mechanism.graph import GROUND
 
 LENGTH = 1.0
 

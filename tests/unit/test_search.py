@@ -11,14 +11,14 @@ from helpers.syntheses import OPEN, held_height, timed_path, tray
 from typer.testing import CliRunner
 
 import mechdesign
-from mechdesign.analyses.optimize.analysis import _doubts
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.explorer import Explorer, Known, Part, Spent
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.optimize.search import Ending, search
-from mechdesign.analyses.optimize.variables import from_cube
 from mechdesign.cli.app import app
 from mechdesign.errors import AssemblyError, StudyError
+from mechdesign.questions.optimize.analysis import _doubts
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.explorer import Explorer, Known, Part, Spent
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.search import Ending, search
+from mechdesign.questions.optimize.variables import from_cube
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 

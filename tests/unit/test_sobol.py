@@ -10,7 +10,7 @@ from helpers.studies import study_of
 from scipy.special import ndtr
 
 import mechdesign
-from mechdesign.analyses.reliability.sobol import SobolIndices, combine, sample
+from mechdesign.questions.reliability.sobol import SobolIndices, combine, sample
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 A, B = 7.0, 0.1

@@ -9,9 +9,9 @@ import pytest
 from helpers.studies import IN_LINE, study_of
 
 import mechdesign
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import Goal, goals_of
 from mechdesign.errors import StudyError
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import Goal, goals_of
 from mechdesign.report.requirements import Verdict
 from mechdesign.statistics import STATISTICS, Interval
 

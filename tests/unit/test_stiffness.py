@@ -112,7 +112,7 @@ def test_result_does_not_depend_on_jobs_or_chunks(monkeypatch: pytest.MonkeyPatc
         "poses: [{P.x: 0.05, P.y: 0.45}]", "sweep: {P.x: {from: -0.1, to: 0.1, number: 40}, P.y: 0.4}"
     )
     whole = ask_stiffness(text).tables["stiffness"]
-    monkeypatch.setattr("mechdesign.analyses.stiffness.analysis.CHUNK", 7)
+    monkeypatch.setattr("mechdesign.questions.stiffness.analysis.CHUNK", 7)
     parts = mechdesign.stiffness(study_of(text), jobs=2).tables["stiffness"]
     for name in whole.names:
         assert whole[name].tobytes() == parts[name].tobytes()

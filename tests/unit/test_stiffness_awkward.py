@@ -10,10 +10,10 @@ from helpers.stiffness import ARM, AXIAL, BENDING, FIVE_BAR, METRES, ask_stiffne
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.body import ask
-from mechdesign.analyses.stiffness.force_method import load, twists_of
 from mechdesign.errors import StudyError
+from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.stiffness.body import ask
+from mechdesign.questions.stiffness.force_method import load, twists_of
 from mechdesign.results import Result
 
 BEAM = "sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}"

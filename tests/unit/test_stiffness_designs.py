@@ -12,10 +12,10 @@ from helpers.designs import assert_as_alone
 from helpers.stiffness import METRES, matrix
 from helpers.studies import study_of
 
-from mechdesign.analyses.optimize.evaluation import Evaluator
-from mechdesign.analyses.optimize.goals import goal
-from mechdesign.analyses.stiffness.analysis import answers, stiffness
 from mechdesign.errors import AssemblyError
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.stiffness.analysis import answers, stiffness
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs
 

@@ -11,7 +11,7 @@ from helpers.stiffness import ARM, BENT, FIVE_BAR, METRES, SLIDER, SLOTTED, ask_
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses, study_poses
+from mechdesign.questions.poses import solve_poses, study_poses
 
 SECTIONS = {
     "rectangle": "{E: 200 GPa, width: 0.02, height: 0.04}",

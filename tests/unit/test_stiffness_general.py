@@ -12,9 +12,9 @@ from helpers.stiffness import ARM, AXIAL, BENDING, BENT, FIVE_BAR, METRES, SLIDE
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.body import ask
-from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.stiffness.body import ask
+from mechdesign.questions.stiffness.force_method import load, twists_of
 
 PRESS = (
     METRES

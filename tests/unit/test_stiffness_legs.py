@@ -21,7 +21,7 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.stiffness.elements import Beam, Guide, Hinge, corners_of
+from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge, corners_of
 
 LINKS = study_of(SLIDER).mechanism.description.links
 CRANK, ROD = LINKS["crank"], LINKS["rod"]

@@ -11,9 +11,9 @@ from helpers.stiffness import ask_stiffness, matrix
 from helpers.studies import study_of
 from numpy.testing import assert_allclose
 
-from mechdesign.analyses.poses import solve_poses, study_poses
-from mechdesign.analyses.stiffness.body import ask
-from mechdesign.analyses.stiffness.force_method import load, twists_of
+from mechdesign.questions.poses import solve_poses, study_poses
+from mechdesign.questions.stiffness.body import ask
+from mechdesign.questions.stiffness.force_method import load, twists_of
 
 YOUNG, SHEAR, AREA, INERTIA = 2e5, 8e4, 20 * 40.0, 20 * 40.0**3 / 12
 EI, EA, GA = YOUNG * INERTIA, YOUNG * AREA, 5 / 6 * SHEAR * AREA

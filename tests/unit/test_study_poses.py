@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
+from mechdesign.questions.poses import study_poses
 
 CRANK = """
 mechanism:

@@ -7,8 +7,8 @@ import jsonschema
 import pytest
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
 from mechdesign.errors import StudyError
+from mechdesign.questions.poses import study_poses
 from mechdesign.study import schema, template, template_path, templates
 from mechdesign.study.text.document import read
 

@@ -9,10 +9,10 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.kinematics.analysis import kinematics
-from mechdesign.analyses.kinematics.targets import nearest
-from mechdesign.analyses.optimize.analysis import optimize
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.kinematics.targets import nearest
+from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.results import Table
 
 FOUR_BAR = """\

@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 
 import mechdesign
-from mechdesign.analyses.reliability.laws import fit_law
-from mechdesign.analyses.reliability.study_sources import find_sources
 from mechdesign.errors import StudyError
+from mechdesign.questions.reliability.laws import fit_law
+from mechdesign.questions.reliability.schema.iso_tolerances import (
+    ToleranceClassError,
+    angle_deviations,
+    deviations,
+    fit_deviations,
+)
+from mechdesign.questions.reliability.schema.section import in_words
+from mechdesign.questions.reliability.study_sources import find_sources
 from mechdesign.study.designs import variant
-from mechdesign.study.schema.iso_tolerances import ToleranceClassError, angle_deviations, deviations, fit_deviations
-from mechdesign.study.schema.reliability import in_words
 
 # Limit deviations in micrometres as handbooks print them [ISO 286-2:2010].
 PUBLISHED = {

@@ -9,12 +9,12 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.region.panels import find_panels
-from mechdesign.analyses.region.rays import BATCH, Designs, trace
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.numerics.roots import bracketed_roots
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.panels import find_panels
+from mechdesign.region.rays import BATCH, Designs, trace
 
 ARM = """
 units: {length: dimensionless}

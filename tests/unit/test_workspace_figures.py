@@ -7,12 +7,12 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign.questions.workspace.figures import figures
+from mechdesign.questions.workspace.figures.boundary import inscribed_figure
+from mechdesign.questions.workspace.figures.index_maps import index_columns
+from mechdesign.questions.workspace.figures.ranged import loops
+from mechdesign.questions.workspace.figures.regions import fate, regions
 from mechdesign.report.figures import style
-from mechdesign.report.figures.workspace import figures
-from mechdesign.report.figures.workspace.boundary import inscribed_figure
-from mechdesign.report.figures.workspace.index_maps import index_columns
-from mechdesign.report.figures.workspace.ranged import loops
-from mechdesign.report.figures.workspace.regions import fate, regions
 from mechdesign.results import Column, Result, Table
 
 FIVE_BAR = """

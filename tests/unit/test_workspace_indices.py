@@ -10,14 +10,14 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.analyses.poses import study_poses
-from mechdesign.analyses.region.rays import BATCH
-from mechdesign.analyses.workspace.answer import answer
-from mechdesign.analyses.workspace.index import prepare
-from mechdesign.analyses.workspace.local import Local
-from mechdesign.analyses.workspace.question import questions
 from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL
+from mechdesign.questions.poses import study_poses
+from mechdesign.questions.workspace.answer import answer
+from mechdesign.questions.workspace.index import prepare
+from mechdesign.questions.workspace.local import Local
+from mechdesign.questions.workspace.question import questions
+from mechdesign.region.rays import BATCH
 from mechdesign.rows import choose
 from mechdesign.study import Study
 

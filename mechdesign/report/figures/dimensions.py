@@ -14,6 +14,8 @@ from matplotlib.textpath import text_to_path
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
+from mechdesign.questions.stiffness.schema import Profile
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import framed
@@ -21,8 +23,6 @@ from mechdesign.report.figures.labels import covered, paper, place_labels
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import link_colors, link_labels, point_labels
 from mechdesign.study import Study
-from mechdesign.study.schema.stiffness import Profile
-from mechdesign.study.schema.variation import LOADS, Dimension
 
 _HEIGHT = 4.6  # inches
 _TITLE = 0.42

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.kinematics.drawn import DrawnMotion
-from mechdesign.analyses.poses import Shown, solve_rows, solve_shown
 from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.poses import Shown, solve_rows, solve_shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
@@ -80,8 +80,8 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     table = result.tables.get("reliability")
     if result.command != "reliability" or table is None:
         return None
-    from mechdesign.analyses.reliability.tables import DrawnErrors
-    from mechdesign.report.figures.reliability.looks import best_probability, followed_in_words
+    from mechdesign.questions.reliability.figures.looks import best_probability, followed_in_words
+    from mechdesign.questions.reliability.tables import DrawnErrors
 
     drawn = DrawnErrors.of(result)
     poses, rows = drawn.poses, table.where(scope="pose", method=best_probability(table))
@@ -172,7 +172,7 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.analyses.stiffness.elements import beam_line, corners_of
+    from mechdesign.questions.stiffness.elements import beam_line, corners_of
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]

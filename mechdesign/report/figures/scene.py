@@ -11,13 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from mechdesign.analyses.poses import Shown, pose_in_words, radians
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Fixed, Link, Slot
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.poses import Shown, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
 from mechdesign.study import Study
 

@@ -9,12 +9,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.analyses.columns import DRIVE, GIVEN
-from mechdesign.analyses.kinematics.columns import EXTREMES, MOTION
-from mechdesign.analyses.optimize.columns import OPTIMUM
-from mechdesign.analyses.reliability.columns import CAPABILITY, MOMENTS, RELIABILITY
-from mechdesign.analyses.stiffness.columns import DEFLECTIONS, STIFFNESS
-from mechdesign.analyses.workspace.columns import HELD, INDICES
+from mechdesign.questions.columns import DRIVE, GIVEN
+from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
+from mechdesign.questions.optimize.columns import OPTIMUM
+from mechdesign.questions.reliability.columns import CAPABILITY, MOMENTS, RELIABILITY
+from mechdesign.questions.stiffness.columns import DEFLECTIONS, STIFFNESS
+from mechdesign.questions.workspace.columns import HELD, INDICES
 from mechdesign.report.cases import best_of
 from mechdesign.report.figures.style import printed, raised
 from mechdesign.results import Column, Result, Table, TableKind

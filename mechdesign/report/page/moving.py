@@ -10,19 +10,19 @@ import numpy as np
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from mechdesign.analyses.kinematics.drawn import DrawnMotion
-from mechdesign.analyses.kinematics.rates import drive_rates
-from mechdesign.analyses.optimize.analysis import DrawnDesigns
-from mechdesign.analyses.outputs import expand_outputs
-from mechdesign.analyses.poses import Shown, SolvedPoses
 from mechdesign.mechanism import Reason
 from mechdesign.mechanism.derivatives import STALLED, regularity
 from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.curves import curves_figure
+from mechdesign.questions.kinematics.figures.paths import path_looks
+from mechdesign.questions.kinematics.rates import drive_rates
+from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.questions.outputs import expand_outputs
+from mechdesign.questions.poses import Shown, SolvedPoses
 from mechdesign.report.before import Before
 from mechdesign.report.figures import style
-from mechdesign.report.figures.kinematics.curves import curves_figure
-from mechdesign.report.figures.kinematics.paths import path_looks
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.linkage import Sheet, Sketcher

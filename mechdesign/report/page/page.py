@@ -20,6 +20,8 @@ from PIL import Image
 from mechdesign.commands import QUESTIONS, SWEEP
 from mechdesign.errors import counted, explain
 from mechdesign.mechanism.describe import describe, drives_in_words, links_in_words
+from mechdesign.questions.optimize.schema import Requirement
+from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import fit
@@ -31,8 +33,6 @@ from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR, harmless
 from mechdesign.report.requirements import Verdict, judged_by, named
 from mechdesign.study import Study
-from mechdesign.study.schema.optimize import Requirement
-from mechdesign.study.schema.reliability import in_words
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import path_of
 

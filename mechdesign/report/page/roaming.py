@@ -14,15 +14,15 @@ from matplotlib.colors import BoundaryNorm, to_hex
 from matplotlib.figure import Figure
 from PIL import Image
 
-from mechdesign.analyses.poses import in_study_units
-from mechdesign.analyses.workspace.tables import curves
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Ints, evenly
+from mechdesign.questions.poses import in_study_units
+from mechdesign.questions.workspace.figures.boundary import solved_inside
+from mechdesign.questions.workspace.figures.index_maps import contours, index_columns, index_norm
+from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
+from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
-from mechdesign.report.figures.workspace.boundary import solved_inside
-from mechdesign.report.figures.workspace.index_maps import contours, index_columns, index_norm
-from mechdesign.report.figures.workspace.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
 from mechdesign.report.page.linkage import Sheet, Sketcher, add, dashed
 from mechdesign.report.page.tracks import Moving, Numbers, places
 from mechdesign.results import Column, Result, Table

@@ -9,9 +9,9 @@ from typing import Any
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Link
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.poses import PoseSection
-from mechdesign.study.schema.reliability import ReliabilitySection
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 

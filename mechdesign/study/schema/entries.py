@@ -6,9 +6,9 @@ from collections.abc import Collection
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError, suggestion
+from mechdesign.experiments.schema.matrix import MatrixSection
+from mechdesign.questions.optimize.schema import OptimizeSection
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.matrix import MatrixSection
-from mechdesign.study.schema.optimize import OptimizeSection
 from mechdesign.study.schema.study_file import entry, kinds_of
 from mechdesign.study.schema.variable import Variable
 from mechdesign.study.text.document import KeyPath

@@ -11,14 +11,14 @@ from pydantic import BeforeValidator
 
 from mechdesign.cautions import ALL, KINDS
 from mechdesign.errors import StudyError, cut, suggestion
+from mechdesign.experiments.schema.matrix import MatrixSection
+from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
+from mechdesign.questions.kinematics.schema import KinematicsSection
+from mechdesign.questions.optimize.schema import OptimizeSection, Requirement
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
+from mechdesign.questions.stiffness.schema import StiffnessSection
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study.building.section import MechanismSection, UnitsSection
-from mechdesign.study.schema.kinematics import KinematicsSection
-from mechdesign.study.schema.matrix import MatrixSection
-from mechdesign.study.schema.optimize import OptimizeSection, Requirement
-from mechdesign.study.schema.reliability import ReliabilitySection
-from mechdesign.study.schema.sensitivities import SensitivitiesSection
-from mechdesign.study.schema.stiffness import StiffnessSection
-from mechdesign.study.schema.workspace import WorkspaceSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
 from mechdesign.study.text.forms import Generator, name_forms

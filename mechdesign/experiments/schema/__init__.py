@@ -1,0 +1,1 @@
+"""What a study says of its cases and of its sensitivities, and the checks of it."""

@@ -1,0 +1,26 @@
+"""Kinds of columns that tables of several questions have, and units of their numbers."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from mechdesign.commands import QUESTIONS
+from mechdesign.results import ColumnKind, TableKind
+from mechdesign.study import Units
+
+DRIVE = ColumnKind("<drive>", "drive", "length or angle")
+GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
+VALID = ColumnKind("valid", "1 where the pose is assembled and within its limits")
+
+
+def tables_of(command: str) -> list[TableKind]:
+    """The tables of a question, as the `columns` of its folder declare them."""
+    declared = vars(import_module(QUESTIONS[command].columns))
+    return [table for table in declared.values() if isinstance(table, TableKind)]
+
+
+def power_of_length(units: Units, power: int) -> str:
+    """The study's unit of length to a power."""
+    name = "" if units.length == "dimensionless" else units.length
+    text = name if abs(power) == 1 else f"{name}^{abs(power)}"
+    return "" if power == 0 or not name else text if power > 0 else f"1/{text}"

@@ -1,0 +1,368 @@
+"""Columns of a motion as functions along its curve: what they are between the poses."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from mechdesign.curve.ends import End, Ends
+from mechdesign.curve.functions import Functions
+from mechdesign.curve.motion import Curve
+from mechdesign.curve.parts import within
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.coordinates import angles_of
+from mechdesign.mechanism.four_bars import FourBar
+from mechdesign.mechanism.margins import SINGULARITY, Cause
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.columns import GIVEN
+from mechdesign.questions.kinematics import targets
+from mechdesign.questions.kinematics.columns import OVER
+from mechdesign.questions.kinematics.motion import Motion, rates_of_advantage
+from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.kinematics.rates import unitless
+from mechdesign.questions.poses import SolvedPoses
+from mechdesign.results import POSES_ONLY, Column, TableKind
+from mechdesign.statistics import Asked, Part
+from mechdesign.study import Study
+
+# Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
+# they cannot move what the poses give in every direction; and how fast the motion passes its places.
+FORWARD, INVERSE, _PACE = "forward singularity", "inverse singularity", "pace"
+# In front of the name of a function with poles: the same without them, of which the means are asked.
+_MEAN_OF = "mean of "
+# Places this near to a pose (in rows) or to zero (as a part of the range of what is swept) are at it; so near to a pose
+# a zero that is only touched may be at it.
+AT_ROW, AT_GIVEN_PLACE = 1e-9, 1e-12
+NEAR_ROW = 1e-5
+# A gap shorter than this part of the motion is rounding.
+GAP = 1e-11
+
+
+class Along:
+    """Functions along the motions of a question.
+
+    Parameters
+    ----------
+    names, also : collection of str
+        Columns that are followed: those of the table of extremes where the first is left out, and others.
+    asked : collection of Asked
+        Columns that are followed over the motion or parts of it, whether their means are asked, and which extremes.
+    loops : sequence of FourBar
+        Four-bars and slider-cranks of which sines and cosines of transmission angles are followed, and with `toggles`
+        of the angles between coupler and input.
+    """
+
+    def __init__(
+        self, question: MotionQuestion, curve: Curve, names: Collection[str] | None = None,
+        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), asked: Collection[Asked] = (),
+        toggles: bool = False, passages: bool = False,
+    ) -> None:  # fmt: skip
+        self.question, self.curve = question, curve
+        self._loops, self._toggles = loops, toggles
+        mechanism, sizes = question.study.mechanism, question.sizes
+        columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
+        columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
+        columns |= {static.name: 0.0 for static in question.statics}
+        self._asked, self._within = asked, dict[Part, Along]()
+        whole = [each for each in asked if not each.part]
+        shown = {*((*columns, *question.rates) if names is None else names), *also}
+        judged = dict.fromkeys([*also, *(each.column for each in whole)])
+        wanted = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
+        self._others = [name for name in wanted if name not in columns]
+        columns = {name: size for name, size in columns.items() if name in wanted}
+        columns |= dict.fromkeys(self._others, 0.0) | {
+            name: sizes.get(quantity, 0.0) * question.tempo**order
+            for name, (quantity, order) in question.orders.items()
+            if name in wanted
+        }
+        self.columns = tuple(columns)
+        ends = {name: {each.end for each in whole if each.column == name} for name in columns if name not in shown}
+        drives = set(mechanism.drives)
+        self._groups = []
+        if passages and set(question.poses.names) != drives:
+            structure = mechanism.forward.structure
+            self._groups = [k for k, group in enumerate(structure.groups) if group.form != "place"]
+        self._errors = any(name.endswith("_error") for name in columns)
+        self._advantages = {
+            f"{output}_advantage": (output, given)
+            for output, given in question.section.mechanical_advantage.items()
+            if f"{output}_advantage" in columns
+        }
+        self._chains: dict[str, tuple[int, ...]] = {}
+        divisors = self._divisors()
+        # Of the question only what the columns need is computed.
+        self._lean = question.lean({*columns, *(name for each in asked for name in each.columns)})
+        angles = {angle.name for angle in curve.angles}
+        self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
+        below = {name for powers in divisors.values() for name, _ in powers}
+        integrals = {each.column for each in whole if each.integral}
+        functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
+        functions |= {_PACE: 0.0} if self._errors or integrals else {}
+        functions |= {f"rate of {name}": 0.0 for name in self._advantages}
+        functions |= {f"group {k}": 1.0 for k in self._groups}
+        arms = (0, 3) if toggles else (3,)
+        lines = [f"{name} {k} {end}" for k in range(len(loops)) for end in arms for name in ("sine", "cosine")]
+        functions |= dict.fromkeys(lines, 1.0)
+        zeros = [*lines, *(f"group {k}" for k in self._groups), *(name for name in self._others if name in judged)]
+        # Means are of the quotient itself where a function has poles.
+        self._means = {name: f"{_MEAN_OF}{name}" if name in divisors else name for name in columns if name in integrals}
+        functions |= {f"{_MEAN_OF}{name}": 0.0 for name in self._means if name in divisors}
+        means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
+        self._names = list(functions)
+        self._follow = partial(
+            Functions, curve, self._names, self._evaluated, list(functions.values()), divisors,
+            extremes=[*columns, *lines], means=means, zeros=zeros,
+            ends={name: next(iter(asked_for)) for name, asked_for in ends.items() if len(asked_for) == 1},
+        )  # fmt: skip
+
+    @cached_property
+    def ends(self) -> Ends:
+        """Where the motions end."""
+        return Ends(self.curve)
+
+    @cached_property
+    def functions(self) -> Functions:
+        """The functions, followed where they matter."""
+        return self._follow()
+
+    def _divisors(self) -> dict[str, list[tuple[str, int]]]:
+        """What functions with poles are divided by, and how often."""
+        question = self.question
+        rates = INVERSE if question.of_given else FORWARD
+        divisors = {static.name: [(FORWARD, 1)] for static in question.statics}
+        divisors |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
+        for name in self._others:
+            output, _, order = name.rpartition("_")
+            if order in (powers := {"velocity": 1, "acceleration": 3}):
+                divisors[name] = [(rates if question.of_given else self._chain(output), powers[order])]
+        divisors |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
+        return {name: divisor for name, divisor in divisors.items() if name in self.columns}
+
+    def _chain(self, output: str) -> str:
+        """The product of the conditionings of the groups that an output follows from, by name: its rates end there."""
+        mechanism = self.question.study.mechanism
+        structure = mechanism.forward.structure
+        behind = sorted(structure.behind(mechanism.coordinate(output), mechanism.graph))
+        groups = tuple(k for k in behind if structure.groups[k].form != "place")
+        name = " ".join([FORWARD, *(str(k) for k in groups)])
+        self._chains[name] = groups
+        return name
+
+    @quiet
+    def _evaluated(self, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        poses, configuration = self.curve.solve(line, s, judged=False, turning=self._turning)
+        motion = Motion(replace(self._lean, poses=poses), reason=configuration.reason.copy())
+        linear = motion.fill(SolvedPoses(np.arange(len(s)), self.question.poses.groups[0].names, configuration))
+        arrays: dict[str, Value] = dict(motion.arrays)
+        whole = self.question.poses
+        if _PACE in self._names:
+            arrays[_PACE] = whole.pace(line, s)
+        if self._errors:
+            rows = line * whole.line
+            for error in targets.errors(self.question.study, whole, motion.arrays, rows, between=True):
+                arrays[error.name] = error.values
+        signed = linear.conditionings
+        arrays[FORWARD] = forward = np.prod(np.broadcast_arrays(np.ones(len(s)), *signed.values()), axis=0)
+        arrays |= {f"group {k}": signed[k] for k in self._groups}
+        for chain, groups in self._chains.items():
+            arrays[chain] = np.prod(np.broadcast_arrays(np.ones(len(s)), *(signed[k] for k in groups)), axis=0)
+        if INVERSE in self._names:
+            # Determinant of the derivatives of what the poses give by the drives.
+            mechanism = self.question.study.mechanism
+            outputs = [mechanism.coordinate(name) for name in whole.groups[0].names]
+            matrix = unitless(mechanism, linear, outputs)[1]
+            arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
+        for name, (output, given) in self._advantages.items():
+            arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, given)[0] * forward
+        for k, loop in enumerate(self._loops):
+            for end in (0, 3) if self._toggles else (3,):
+                arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)
+        arrays |= {name: column for name, column in poses.values.items() if name not in arrays}
+        self._known = arrays.keys()
+        table = np.empty((len(self._names), len(s)))
+        for row, name in zip(table, self._names, strict=True):
+            row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
+        return table, motion.arrays["conditioning"]
+
+    @cached_property
+    def present(self) -> Floats:
+        """Part of each motion on which the mechanism assembles within its limits, shape (lines,)."""
+        pieces, end = self.curve.pieces, self.curve.poses.end
+        lengths = np.bincount(pieces.line, pieces.end - pieces.begin, self.curve.lines)
+        gaps = np.zeros(self.curve.lines, dtype=np.intp)
+        ends = np.flatnonzero(np.append(~pieces.joined_to_next, True)[: len(pieces.line)])
+        # Between the pieces of a motion that is whole nothing lies but rounding.
+        for k in ends.tolist():
+            begin = pieces.begin[k + 1] if k + 1 < len(pieces.line) and pieces.line[k + 1] == pieces.line[k] else end
+            gaps[pieces.line[k]] += begin - pieces.end[k] > GAP * end
+        first = np.flatnonzero(np.append(True, pieces.line[1:] != pieces.line[:-1])[: len(pieces.line)])
+        gaps[pieces.line[first]] += pieces.begin[first] > GAP * end
+        part = np.minimum(lengths / end, np.nextafter(1.0, 0.0))
+        return np.where(self.curve.spent, np.nan, np.where((gaps == 0) & (lengths > 0), 1.0, part))
+
+    @property
+    def whole(self) -> Flags:
+        """Motions without gaps, shape (lines,)."""
+        return np.asarray(self.present == 1.0)
+
+    def snapped(self, s: Floats) -> Floats:
+        """Places along the motion; those at a pose exactly there."""
+        return np.where(np.abs(s - np.round(s)) <= AT_ROW, np.round(s), s)
+
+    def shown(self, line: Ints, s: Floats) -> Floats:
+        """Places as tables have them: what is swept (study's unit), else in rows from 0; nan where there is none."""
+        swept, poses = self.question.poses.swept, self.question.poses
+        known = np.isfinite(s)
+        places = self.snapped(np.where(known, s, 0.0))
+        if swept is not None:
+            given = poses.groups[0].values[swept].reshape(-1, poses.line)
+            values = poses.along(line, places).values[swept]
+            near = AT_GIVEN_PLACE * np.ptp(given)
+            row = given[line, np.clip(np.round(places), 0, poses.line - 1).astype(np.intp)]
+            places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))
+        return np.where(known, places, np.nan)
+
+    def place_columns(self, table: TableKind, line: Ints, places: Floats) -> list[Column]:
+        """Places of motions as columns of a table: what is swept, or the row and all coordinates that move."""
+        study, poses = self.question.study, self.question.poses
+        if poses.swept is not None:
+            return table.columns(of_swept(study, poses.swept, ""), **{"<swept>": self.shown(line, places)})
+        values, label, quantity = poses.along(line, places).values, study.units.label, study.mechanism.quantity
+        given = [GIVEN.column(values[name], label(quantity(name)), coordinate=name) for name in poses.moving]
+        return table.columns({}, row=places) + given
+
+    def at(self, line: Ints, s: Floats) -> dict[str, Floats]:
+        """Every function at places of lines."""
+        return dict(zip(self._names, self.functions.at(line, s), strict=True))
+
+    def worst(self, name: str, sign: int, *, absolute: bool = False, still: float = 0.0) -> tuple[Floats, Floats]:
+        """Largest value of a function times a sign over each motion, or of its absolute values times the sign; places.
+
+        The value is that of the function, absolute where that is judged; nan where it has none. Of values within
+        `still` the first along the motion counts.
+        """
+        if absolute and sign < 0:
+            values, places = self.least([name], still)
+            return values[0], places[0]
+        peaks = self.functions.extremes([name], np.full((1, self.curve.lines), still))
+        (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
+        if not absolute:
+            return (high, high_at) if sign > 0 else (low, low_at)
+        larger = high >= -low
+        return np.where(larger, high, -low), np.where(larger, high_at, low_at)
+
+    def least(self, names: Sequence[str], still: float) -> tuple[Floats, Floats]:
+        """Smallest absolute values of functions over each motion, and their places; shape (names, lines).
+
+        They are zero where the function has both signs, or comes within `still` of zero and turns back.
+        """
+        shape = len(names), self.curve.lines
+        peaks = self.functions.extremes(names, np.full(shape, still))
+        (low, high), (low_at, high_at) = peaks.value, peaks.place
+        zeros = self.functions.zeros(names, still)
+        first = np.full(shape, np.nan)
+        order = np.argsort(-zeros.place, kind="stable")
+        first[zeros.function[order], zeros.line[order]] = zeros.place[order]
+        value, place = np.where(low > 0, low, -high), np.where(low > 0, low_at, high_at)
+        zero = np.isfinite(first)
+        # It jumps over zero at a corner or a gap: the square has no sign.
+        jumps = ~zero & (low <= 0) & (high >= 0)
+        for k in np.flatnonzero(jumps.any(axis=1)).tolist():
+            own = partial(self._squared, names[k])
+            squared = Functions(self.curve, [names[k]], own, [0.0], extremes=[names[k]])
+            smallest = squared.extremes(names[k : k + 1], np.full((1, shape[1]), still**2))
+            value[k] = np.where(jumps[k], np.sqrt(np.maximum(smallest.value[0, 0], 0.0)), value[k])
+            place[k] = np.where(jumps[k], smallest.place[0, 0], place[k])
+        # A zero that is only touched is known to the root of rounding: at a pose beside it that is one, it is there.
+        lanes, lines = np.nonzero(zero & (np.abs(first - np.round(first)) <= NEAR_ROW))
+        if len(lanes):
+            rows = np.array([self._names.index(name) for name in names])[lanes]
+            at_row = self.functions.at(lines, np.round(first[lanes, lines]))[rows, np.arange(len(lanes))]
+            good = np.abs(at_row) <= still
+            first[lanes[good], lines[good]] = np.round(first[lanes[good], lines[good]])
+        return np.where(zero, 0.0, value), np.where(zero, first, place)
+
+    def _squared(self, name: str, line: Ints, s: Floats) -> tuple[Floats, Floats]:
+        table, conditioning = self._evaluated(line, s)
+        return table[[self._names.index(name)]] ** 2, conditioning
+
+    def mean(self, name: str, power: int = 1, *, absolute: bool = False) -> Floats:
+        """Mean of a power of a column, or of its absolute value, over each motion, by the way along it."""
+        return self.functions.means(self._means.get(name, name), power, _PACE, absolute=absolute)
+
+    def poled(self, name: str) -> bool:
+        """Whether a column whose means are asked may go to infinity."""
+        return self._means[name] != name
+
+    def knows(self, names: Collection[str]) -> bool:
+        """Whether some columns have values along the motions."""
+        pieces = self.curve.pieces
+        if not len(pieces.line):
+            return False
+        self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
+        return self._known >= {*names}
+
+    def part(self, part: Part) -> Along:
+        """The same over the part of the motion in which columns lie in intervals, whose ends are found on the curve."""
+        if part not in self._within:
+            places = Along(self.question, self.curve, (), also=[name for name, _ in part])
+            rows = [places._names.index(name) for name, _ in part]
+
+            def values(line: Ints, s: Floats) -> tuple[Floats, Floats]:
+                table, conditioning = places._evaluated(line, s)
+                return table[rows], conditioning
+
+            curve = within(self.curve, [interval for _, interval in part], values)
+            asked = [each._replace(part=()) for each in self._asked if each.part == part]
+            self._within[part] = Along(self.question, curve, (), asked=asked)
+        return self._within[part]
+
+    def at_ends(self, ends: Sequence[End], names: Sequence[str]) -> Floats:
+        """Functions at ends of the motions, shape (names, ends); nan at infinity."""
+        line, x = (np.array([getattr(end, name) for end in ends], dtype=np.intp) for name in ("line", "x"))
+        values = self.functions.at_ends(names, line, np.array([end.place for end in ends]), x)
+        values[:, [end.endless for end in ends]] = np.nan
+        return values
+
+    def passages(self) -> list[tuple[int, float, Cause]]:
+        """Where motions pass a forward singularity, at which the drives hold the mechanism no longer: line, place."""
+        structure, graph = self.question.study.mechanism.forward.structure, self.question.study.mechanism.graph
+        zeros = self.functions.zeros([f"group {k}" for k in self._groups], AT_SINGULARITY)
+        passages = []
+        joints = [" ".join(graph.joined(structure.groups[k].edges)) for k in self._groups]
+        for number, line, place in zip(zeros.function.tolist(), zeros.line.tolist(), zeros.place.tolist(), strict=True):
+            joint = joints[number]
+            passages.append((line, place, Cause(SINGULARITY, joint, joint, self._groups[number], "passed")))
+        return sorted(passages, key=lambda passage: passage[:2])
+
+
+def along_of(
+    question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
+    also: Collection[str] = (), asked: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
+) -> Along | None:  # fmt: skip
+    """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
+    curve = question.curve
+    if curve is None or curve.spent.all():
+        return None
+    return Along(question, curve, names, loops, also=also, asked=asked, toggles=toggles, passages=passages)
+
+
+def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:
+    """For the meaning of a table of numbers of some functions over a motion: which of them are of the poses only."""
+    if along is None or along.curve.spent.any() or along.functions.unresolved.any():
+        return {OVER: POSES_ONLY}
+    poses = [name for name in names if name not in along.functions.names]
+    return {OVER: "over the motion" + (f"; of {', '.join(poses)} {POSES_ONLY}" if poses else "")}
+
+
+def of_swept(study: Study, swept: str | None, otherwise: str) -> dict[str, str]:
+    """For columns that hold what is swept: its name and unit; where nothing is, what they hold otherwise."""
+    unit = "" if swept is None else study.units.label(study.mechanism.quantity(swept))
+    return {"swept": swept or otherwise, "as what is swept": unit}
+
+
+# A group is singular where its conditioning is below this and turns back or ends.
+AT_SINGULARITY = 1e-9

@@ -1,0 +1,84 @@
+"""Columns along motions as `mechdesign.statistics.Course` has them: of all designs together, and of one of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.kinematics.along import Along
+from mechdesign.statistics import Asked
+
+
+def course_of(along: Along, asked: Asked) -> Followed | None:
+    """A column over motions or a part of them that was asked for; None where it is not known between the poses."""
+    if not along.knows(asked.columns):
+        return None
+    along = along.part(asked.part) if asked.part else along
+    return Followed(along, asked.column) if asked.column in along.columns else None
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A column over motions of all designs or of one, or the same part of each; see `mechdesign.statistics.Course`.
+
+    `largest` has, by sign, the largest values of all designs times the sign, once they are asked for.
+    """
+
+    along: Along
+    name: str
+    design: int | None = None
+    largest: dict[int, Floats] = field(default_factory=dict)
+
+    @property
+    def _designs(self) -> slice:
+        return slice(None) if self.design is None else slice(self.design, self.design + 1)
+
+    @property
+    def followed(self) -> Flags:
+        """Which motions are followed between their poses, shape (designs,)."""
+        return ~self.along.curve.spent[self._designs]
+
+    def worst(self, sign: int, *, absolute: bool = False) -> tuple[Floats, Floats]:
+        """The largest value times the sign, and its place in rows, shape (designs,)."""
+        value, place = self.along.worst(self.name, sign, absolute=absolute)
+        return value[self._designs], place[self._designs]
+
+    def at(self, parts: Floats) -> Floats:
+        """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
+        curve = self.along.curve
+        lines = np.arange(curve.lines)[self._designs]
+        line, s = np.repeat(lines, len(parts)), np.tile(parts * curve.poses.end, len(lines))
+        return self.along.functions.interpolated(self.name, line, s).reshape(-1, len(parts))
+
+    def shown(self, place: float) -> str:
+        """A place of the motion of the first design in words."""
+        poses = self.along.question.poses
+        given = poses.along(np.array([self.design or 0]), np.array([place])).values
+        moving = [poses.swept] if poses.swept is not None else given
+        return ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
+
+    def end(self, sign: int) -> Floats:
+        """The largest value, or with the sign -1 the smallest."""
+        if sign not in self.largest:
+            self.largest[sign] = self.along.worst(self.name, sign)[0]
+        return self.largest[sign][self._designs]
+
+    def mean(self, power: int) -> Floats:
+        """Mean of a power of the values; with a pole in it one of an even power is infinite, and another is nan."""
+        return self._mean(np.inf if power % 2 == 0 else np.nan, power)
+
+    def size(self) -> Floats:
+        """Mean of the absolute values."""
+        return self._mean(np.inf, 1, absolute=True)
+
+    def of(self, design: int) -> Followed | None:
+        """The column over the motion of one of the designs; None where it is not followed."""
+        return replace(self, design=(self.design or 0) + design) if self.followed[design] else None
+
+    def _mean(self, at_pole: float, power: int, *, absolute: bool = False) -> Floats:
+        mean = self.along.mean(self.name, power, absolute=absolute)[self._designs]
+        if not self.along.poled(self.name):
+            return mean
+        return np.where(np.isinf(self.end(1)) | np.isinf(self.end(-1)), at_pole, mean)

@@ -1,0 +1,132 @@
+"""What a motion comes to: extremes of outputs, errors and efforts, the times between them, means of errors."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.columns import EXTREMES, TARGETS
+from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.results import Table
+
+# A range below this part of a function's size is rounding.
+STILL = 1e-12
+
+
+def extremes(motion: Motion, along: Along | None, names: Collection[str] | None = None) -> Table:
+    """Smallest and largest value of outputs, errors, efforts and rates over the motion, and the ratio of times between.
+
+    Along a motion they are those of all of it, from limit to limit, between its poses too; elsewhere those of the valid
+    poses. Efforts and mechanical advantages are infinite at their poles. `time_ratio` is the longer over the shorter
+    part of a full turn of the swept angle between the two extremes, for a drive of constant speed; nan elsewhere.
+    `min_at` is what is swept, or the place in rows where nothing or more than one coordinate is.
+
+    Those of `names` are wanted, or all.
+    """
+    question = motion.question
+    study, poses, mechanism = question.study, question.poses, question.study.mechanism
+    sizes, label = question.sizes, study.units.label
+    turn = sizes["angle"]
+    # By name what rounding is judged by, and the unit.
+    curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
+    curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
+    curves |= {static.name: (0.0, static.unit) for static in question.statics}
+    for name, (quantity, order) in question.orders.items():
+        curves[name] = sizes.get(quantity, 0.0) * question.tempo**order, question.rates[name]
+    if names is not None:
+        curves = {name: curve for name, curve in curves.items() if name in names}
+    arrays = motion.arrays | {error.name: error.values for error in motion.errors}
+    units = [unit for _, unit in curves.values()]
+    swept = poses.swept
+    at = poses.values[swept] if swept is not None else poses.numbers
+    # By curve and design; of both ends the value and its place.
+    table = np.array([arrays[name] for name in curves]).reshape(len(curves), poses.designs, -1)
+    places = at.reshape(poses.designs, -1)
+    counted = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
+    row = np.stack([np.where(counted, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
+    low, high = (np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row)
+    finite = np.where(counted & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
+    size = np.array([each for each, _ in curves.values()])[:, None]
+    still = STILL * np.maximum(finite, size)
+    with np.errstate(invalid="ignore"):
+        moving = high - low > still
+    # A curve that stands still has both extremes at its first pose.
+    row = np.where(moving, row, counted.argmax(axis=2))
+    values = np.stack([np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row])
+    ends = np.stack([values, places[np.arange(poses.designs), row]], axis=1)
+    ends = np.where(counted.any(axis=2), ends, np.nan)
+    if along is not None:
+        mine = [k for k, name in enumerate(curves) if name in along.columns]
+        _between(along, [list(curves)[k] for k in mine], mine, ends, still, moving)
+    (low, low_at), (high, high_at) = ends
+    timed = np.zeros(poses.designs, dtype=bool)
+    if along is not None and swept is not None and mechanism.quantity(swept) == "angle":
+        timed = (np.ptp(places, axis=1) >= turn * (1 - 1e-9)) & along.whole
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
+        ratio = np.maximum(part, turn - part) / np.minimum(part, turn - part)
+        span = high - low
+    ratio[~np.isfinite(ratio)] = np.nan
+    return EXTREMES.table(EXTREMES.columns(
+        of_swept(study, swept, "place in rows (from 0)"), output=np.tile(np.array(list(curves)), poses.designs),
+        min=low.T.ravel(), min_at=low_at.T.ravel(), max=high.T.ravel(), max_at=high_at.T.ravel(),
+        range=span.T.ravel(), time_ratio=ratio.T.ravel(), unit=np.tile(np.array(units, dtype=str), poses.designs),
+    ), **over(along, list(curves)))  # fmt: skip
+
+
+def _between(
+    along: Along, names: Sequence[str], rows: Sequence[int], ends: Floats, still: Floats, moving: Flags
+) -> None:
+    """Put the extremes of motions between their poses into `ends`, shape (2, 2, curves, designs): value and place.
+
+    `moving`, shape (curves, designs), says which curves do not stand still.
+    """
+    line = np.broadcast_to(np.arange(ends.shape[3]), (len(names), ends.shape[3]))
+    peaks = along.functions.extremes(names, still[rows])
+    with np.errstate(invalid="ignore"):
+        moves = peaks.value[1] - peaks.value[0] > still[rows]
+    moving[rows] |= moves
+    places = along.shown(np.tile(line.ravel(), 2), peaks.place.ravel()).reshape(peaks.place.shape)
+    valid = np.isfinite(peaks.place) & moves
+    for part, new in enumerate((peaks.value, places)):
+        ends[:, part, rows] = np.where(valid, new, ends[:, part, rows])
+
+
+def targets_table(motion: Motion, along: Along | None) -> Table:
+    """Mean and largest errors of each design over the motion, or over the valid poses that have a target.
+
+    `along` is the motion between the poses, None of listed poses and grids.
+    """
+    study, poses, errors, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
+    shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
+    at = poses.values[swept] if swept is not None else poses.numbers
+    numbers = np.full((4, poses.designs, len(errors)), np.nan)
+    for k, error in enumerate(errors):
+        counted = (valid & np.isfinite(error.values)).reshape(shape)
+        some = counted.any(axis=1)
+        values = np.where(counted, error.values.reshape(shape), 0.0)[some]
+        worst = np.where(counted[some], np.abs(values), -1.0).argmax(axis=1)
+        lane, (count, total, squares) = np.arange(len(worst)), motion.sums[:, some, k]
+        numbers[:, some, k] = (
+            np.sqrt(squares / count),
+            total / count,
+            np.abs(values[lane, worst]),
+            at.reshape(shape)[some][lane, worst],
+        )
+        if along is not None and error.name in along.columns:
+            still = STILL * motion.question.sizes.get(error.quantity, 1.0)
+            value, place = along.worst(error.name, 1, absolute=True, still=still)
+            between = np.stack([
+                np.sqrt(along.mean(error.name, 2)), along.mean(error.name), value,
+                along.shown(np.arange(len(place)), place),
+            ])  # fmt: skip
+            numbers[:, :, k] = np.where(along.curve.spent, numbers[:, :, k], between)
+    rms, mean, largest, where = numbers.reshape(4, -1)
+    words = of_swept(study, swept, "row (from 0)")
+    units = np.tile(np.array([study.units.label(error.quantity) for error in errors], dtype=str), poses.designs)
+    outputs = np.tile(np.array([error.output for error in errors], dtype=str), poses.designs)
+    columns = TARGETS.columns(words, output=outputs, rms=rms, mean=mean, max_abs=largest, at=where, unit=units)
+    return TARGETS.table(columns, **over(along, [error.name for error in errors]))

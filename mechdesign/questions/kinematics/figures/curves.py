@@ -1,0 +1,256 @@
+"""Outputs over a sweep or along a path as curves, a panel a kind of number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.report.before import Before
+from mechdesign.report.figures import style
+from mechdesign.report.figures.overlay import DASHES, name_both
+from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
+from mechdesign.report.figures.scene import ranks
+from mechdesign.results import Column, Table
+from mechdesign.study import Poses, Study, Units
+
+MAX_CURVES = 7  # in one panel; more cannot be told apart
+MAX_PANELS = 12
+_MAX_TALL_PANELS = 7  # more panels are lower
+_COLORS = (*style.PALETTE[:6], style.INK)  # yellow is lost on white
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_MARKS = 8  # along a curve, about
+_LIMIT_COLORS = (style.VERMILION, style.PURPLE, style.BLUE, style.INK)
+_SHADE = "#EFEFEF"  # of poses that are not valid
+# Kinds of panels in their order; a name has the same colour in all of its own.
+_ORDERS = ("velocity", "acceleration", "error", "effort")
+_RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
+_OF_ONE_COLOR = ("position", "velocity", "acceleration", "error")
+_STILL = 1e-9  # part of its size by which a column changes that does not change
+_HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
+_TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
+_PEAK_RATIO = 6  # of the whole range to that of the other poses
+_LEGEND_LETTERS = 26  # of the longest name in a legend
+# Inches.
+_LEFT = 1.0
+_LEGEND_ROW = 0.19
+
+
+class _Curve(NamedTuple):
+    """A column, what it is of, and what kind of number it holds."""
+
+    column: Column
+    of: str
+    order: str
+
+    @property
+    def color_key(self) -> tuple[str, str]:
+        """What curves of one colour share."""
+        return self.of, "" if self.order in _OF_ONE_COLOR else self.order
+
+    @property
+    def label(self) -> str:
+        """Its name in a legend."""
+        name = self.of
+        return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
+
+
+class _Panel(NamedTuple):
+    """Curves of one kind and unit, and how many more there would be."""
+
+    curves: list[_Curve]
+    left_out: int
+
+    @property
+    def columns(self) -> int:
+        """Columns of its legend where that stands above it."""
+        return fitting([curve.label for curve in self.curves], style.width() - _LEFT - 0.3)
+
+    @property
+    def rows(self) -> int:
+        """Rows of that legend."""
+        return -(-len(self.curves) // self.columns) + bool(self.left_out)
+
+
+def curves_figure(
+    study: Study, tables: Mapping[str, Table], poses: Poses, before: Before | None = None
+) -> Figure | None:
+    """Every output over the swept coordinate, or along the path; None where nothing changes."""
+    table = tables["motion"]
+    if not moving_names(poses):
+        return None
+    over = abscissa(study, poses)
+    swept, x = over.name, over.values
+    panels = _panels(study, table, swept, x)
+    if not panels:
+        return None
+    limits, marks = tables.get("limits"), []
+    if limits is not None and swept in limits:
+        marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
+    invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
+    # A narrow page has no room for legends beside its panels: they stand above them.
+    above = style.narrow()
+    room = 0.1 + _LEGEND_ROW * max(panel.rows for panel in panels)
+    longest = max(len(curve.label) for panel in panels for curve in panel.curves)
+    figure, axes = style.page(
+        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=_LEFT,
+        right=0.15 if above else 0.6 + 0.08 * longest, top=(0.4 if marks else 0.15) + room * above, bottom=0.5,
+        down=room if above else 0.2, sharex=True,
+    )  # fmt: skip
+    colors: dict[tuple[str, str], str] = {}
+    for axis, panel in zip(axes, panels, strict=True):
+        for begin, end in invalid:
+            axis.axvspan(begin, end, color=_SHADE, linewidth=0, zorder=0)
+        _draw(axis, panel, x, study.units, colors)
+        if before is not None:
+            _draw_before(axis, panel, before, colors)
+    _draw_limits(figure, axes, marks, bool(invalid))
+    axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
+    axes[-1].margins(x=0.02)
+    axes[-1].set_xlabel(over.label)
+    tick_abscissa(axes[-1], over)
+    clear_of_ticks(figure, axes)
+    name_both(figure, before)
+    return figure
+
+
+def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
+    """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
+    section, mechanism, units = study.kinematics, study.mechanism, study.units
+    asked = section is not None and section.outputs
+    sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): mechanism.size}
+    # The condition of a single number is 1, that of each pose is for its table.
+    left_out = {"conditioning"} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
+    groups: dict[tuple[str, str], list[_Curve]] = {}
+    for column in table.columns:
+        if column.values.dtype.kind != "f" or column.name in left_out or not np.isfinite(column.values).any():
+            continue
+        if column.name.endswith("_advantage"):
+            continue  # has a picture with the transmission angles
+        order = next((order for order in _ORDERS if column.name.endswith(f"_{order}")), "position")
+        of = column.name.removesuffix(f"_{order}")
+        if column.name in _RANKS:
+            order = of = column.name
+        position = table.column(of) if of in table else None
+        values = column.values if position is None else position.values
+        if order in ("position", "velocity", "acceleration") and swept and _still(values - x, float(np.ptp(x))):
+            continue  # the sweep over itself
+        # Of what stands still only the position is drawn, and only where it is an output.
+        always = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
+        if not always and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
+            continue
+        groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
+    rank = ranks(study)
+    panels = []
+    for curves in sorted(groups.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
+        if len(curves) > MAX_CURVES:
+            curves.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
+        panels.append(_Panel(curves[:MAX_CURVES], max(len(curves) - MAX_CURVES, 0)))
+    return panels
+
+
+def _still(values: Floats, size: float) -> bool:
+    known = values[np.isfinite(values)]
+    return not len(known) or float(np.ptp(known)) <= _STILL * max(float(np.abs(known).max()), size)
+
+
+def _coincide(one: Floats, other: Floats) -> bool:
+    known = np.isfinite(one) & np.isfinite(other)
+    span = max(float(np.ptp(one[known])), float(np.ptp(other[known]))) if known.any() else 0.0
+    return bool(np.all(np.abs(one[known] - other[known]) <= _HIDDEN * span))
+
+
+def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
+    """Ranges of x that are not valid, up to the limit of motion where one lies beside them."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], invalid, [False]]).astype(int)))
+    ranges = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        ends = []
+        for inner, outer in ((first, max(first - 1, 0)), (last, min(last + 1, len(x) - 1))):
+            low, high = sorted((x[inner], x[outer]))
+            between = limits[(limits >= low) & (limits <= high)] if len(limits) else limits
+            ends.append(float(between[0]) if len(between) else float(x[inner] + x[outer]) / 2)
+        ranges.append((ends[0], ends[1]))
+    return ranges
+
+
+def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
+    """Draw the curves of a panel, and note the colour of each."""
+    shown: list[Floats] = []
+    for curve in panel.curves:
+        values = curve.column.values
+        color = colors.setdefault(curve.color_key, _COLORS[len(shown)])
+        hidden = any(_coincide(values, other) for other in shown)
+        # In grey the markers tell what the colours tell.
+        which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
+        marker = _MARKERS[which] if len(panel.curves) > 1 else ""
+        axis.plot(x, values, color=color, linestyle=(0, (3, 3)) if hidden else "-", label=curve.label,
+                  marker=marker, markersize=4, markevery=(which * every // len(_COLORS), every))  # fmt: skip
+        shown.append(values)
+    first = panel.curves[0]
+    title = first.order.replace("_", " ")
+    if title == "position":
+        kinds = {units.label("angle"): "angle", units.label("length"): "position"}
+        title = kinds.get(first.column.unit, "value")
+    title = title.replace("inverse ", "inverse\n")
+    axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
+    axis.ticklabel_format(axis="y", scilimits=(-4, 4))
+    known = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if _still(known, 1.0):
+        # What stands still is drawn straight, not by its rounding.
+        middle = float(known.mean())
+        axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
+    elif first.order != "position":
+        low, high = np.percentile(known, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
+        if np.ptp(known) > _PEAK_RATIO * (high - low) > 0:
+            # Near a dead centre rates grow without bound: what they are elsewhere stays legible.
+            axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
+    if len(panel.curves) > 1 or first.of != first.order:
+        place: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+        if style.narrow():
+            place = {"loc": "lower left", "bbox_to_anchor": (-0.02, 0.97), "ncols": panel.columns, "borderaxespad": 0}
+        more = f"and {panel.left_out} more" if panel.left_out else None
+        axis.legend(title=more, title_fontsize=9, alignment="left", **place)
+
+
+def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
+    """The curves of the study before, dashed, each in the colour of its name."""
+    table, x = before.result.tables["motion"], abscissa(before.study, DrawnMotion.of(before.result).shown.poses).values
+    low, high = axis.get_ylim()
+    for curve in panel.curves:
+        if curve.column.name in table:
+            values = table[curve.column.name]
+            axis.plot(x, values, color=colors[curve.color_key], linestyle=DASHES, linewidth=1.1, zorder=1.9)
+            if curve.order == "position" and np.isfinite(values).any():
+                low, high = min(low, float(np.nanmin(values))), max(high, float(np.nanmax(values)))
+    # Near a dead centre rates grow without bound: their axis stays that of the study now.
+    if (low, high) != axis.get_ylim():
+        margin = 0.04 * (high - low)
+        axis.set_ylim(low - margin, high + margin)
+
+
+def _draw_limits(figure: Figure, axes: Sequence[Axes], marks: list[tuple[float, str]], shaded: bool) -> None:
+    kinds = list(dict.fromkeys(kind for _, kind in marks))
+    looks: dict[str, dict[str, Any]] = {
+        kind: {"color": _LIMIT_COLORS[k % len(_LIMIT_COLORS)], "linestyle": (0, (6, 2 + k))}
+        for k, kind in enumerate(kinds)
+    }
+    for axis in axes:
+        for value, kind in marks:
+            axis.axvline(value, linewidth=1.1, zorder=1.5, **looks[kind])
+    handles: list[Line2D | Patch] = [Line2D([], [], linewidth=1.1, label=kind, **looks[kind]) for kind in kinds]
+    if shaded:
+        handles.append(Patch(color=_SHADE, label="not valid"))
+    if handles:
+        height = figure.get_figheight()
+        figure.legend(
+            handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.0,
+            bbox_to_anchor=(axes[0].get_position().x0, 1 - 0.34 / height),
+        )  # fmt: skip

@@ -1,0 +1,137 @@
+"""Where a motion ends, where it passes a singularity, and where two assemblies meet: also between its poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.curve.ends import Change, End
+from mechdesign.mechanism.margins import Cause
+from mechdesign.numerics.arrays import Flags
+from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.columns import LIMITS
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.results import Table
+
+# Places that a warning names.
+MOST_NAMED = 4
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A place along the motion of a design, in rows, at which it ends or passes a singularity; `end` of one that ends.
+
+    `line` is the number of the motion.
+    """
+
+    line: int
+    place: float
+    cause: Cause
+    end: End | None = None
+
+
+def limits_of(along: Along) -> list[Limit]:
+    """Limits and singularities of motions, one after the other, in the order of their places."""
+    limits = [Limit(end.line, end.place, end.cause, end) for end in along.ends.ends]
+    limits += [Limit(line, place, cause) for line, place, cause in along.passages()]
+    places = along.snapped(np.array([limit.place for limit in limits])).tolist()
+    limits = [replace(limit, place=place) for limit, place in zip(limits, places, strict=True)]
+    return sorted(limits, key=lambda limit: (limit.line, limit.place))
+
+
+def limits_table(limits: Sequence[Limit], along: Along) -> Table:
+    """The places at which the motions end or pass a singularity, and the outputs there.
+
+    `kind` and `joint` are those of `mechdesign.mechanism.margins.Cause`.
+    """
+    study, outputs, swept = along.question.study, along.question.outputs, along.question.poses.swept
+    line, place = np.array([limit.line for limit in limits], dtype=np.intp), np.array([limit.place for limit in limits])
+    columns = [
+        *along.place_columns(LIMITS, line, place),
+        *LIMITS.columns({}, kind=np.array([limit.cause.kind for limit in limits], dtype=str),
+                        joint=np.array([limit.cause.joint for limit in limits], dtype=str)),
+    ]  # fmt: skip
+    named = {column.name for column in columns}
+    shown = [output for output in outputs if output.name != swept and output.name not in named]
+    values, names = np.empty((len(shown), len(limits))), [output.name for output in shown]
+    passing = np.array([limit.end is None for limit in limits], dtype=bool)
+    if passing.any():
+        there = along.at(line[passing], place[passing])
+        values[:, passing] = [there[name] for name in names]
+    if not passing.all():
+        values[:, ~passing] = along.at_ends([limit.end for limit in limits if limit.end is not None], names)
+    for output, column in zip(shown, values, strict=True):
+        columns.append(LIMITS["<output>"].column(column, study.units.label(output.quantity), output=output.name))
+    return LIMITS.table(columns)
+
+
+def place_in_words(along: Along, line: int, place: float) -> str:
+    """``theta = 30 deg``, or the row and the coordinates of a path."""
+    study, poses, lines, s = along.question.study, along.question.poses, np.array([line]), np.array([place])
+    if poses.swept is not None:
+        unit = study.units.label(study.mechanism.quantity(poses.swept))
+        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {unit}".rstrip()
+    return f"row {place:.6g} ({pose_in_words(study, poses.along(lines, s), 0)})"
+
+
+def hidden(limits: Sequence[Limit], along: Along, valid: Flags) -> list[Caution]:
+    """A warning where a motion ends between neighbouring poses that are both valid: the motion table hides it."""
+    places = [
+        place_in_words(along, limit.line, limit.place)
+        for limit in limits
+        if limit.end is not None
+        and limit.place % 1 > 0
+        and valid[int(limit.place)]
+        and valid[(int(limit.place) + 1) % len(valid)]
+    ]
+    if not places:
+        return []
+    words = f"the motion ends between poses that are both valid, at {_first(places)}: see the limits"
+    return [Caution("unassembled", words, "limits", pose=places[0])]
+
+
+def passed(limits: Sequence[Limit], along: Along) -> list[Caution]:
+    """A warning where a motion passes a forward singularity."""
+    places = [place_in_words(along, limit.line, limit.place) for limit in limits if limit.end is None]
+    if not places:
+        return []
+    return [Caution(
+        "singular",
+        f"the motion passes a singularity at {_first(places)}: the drives hold nothing there, and a made mechanism may "
+        "go on in another assembly; see the limits",
+        "limits", pose=places[0],
+    )]  # fmt: skip
+
+
+def _first(places: Sequence[str]) -> str:
+    """The first of some places, and how many more there are."""
+    more = f" and {len(places) - MOST_NAMED} more" if len(places) > MOST_NAMED else ""
+    return "; ".join(places[:MOST_NAMED]) + more
+
+
+def change_points(changes: Sequence[Change], along: Along) -> list[Caution]:
+    """A warning for each place of a motion at which two assemblies meet, where the study keeps joints on their sides.
+
+    `changes` are those of the motion.
+    """
+    if along.question.study.mechanism.description.branch == "follow":
+        return []
+    places: dict[str, dict[str, None]] = {}
+    for line, s, cause in changes:
+        place = float(along.snapped(np.array([s]))[0])
+        # What is swept is known to the root of rounding only, where a smooth function is smallest.
+        words = place_in_words(along, line, round(place, 6))
+        places.setdefault(words, {})[cause.joint] = None
+    return [
+        Caution(
+            "singular",
+            f"change point at {place} (joints {'; '.join(joints)}): two assemblies meet there, and branch 'side' keeps "
+            "each joint on its side of the line, where a made mechanism may cross it; "
+            "'branch: follow' goes through smoothly",
+            pose=place,
+        )
+        for place, joints in places.items()
+    ]

@@ -1,0 +1,308 @@
+"""One motion of a mechanism: every pose of its kinematics solved, and the columns that say how it moves.
+
+At a change point that the motion follows, values are interpolated from poses on both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism import Reason
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
+from mechdesign.mechanism.outputs import Rates, first, second
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.progress import NULL, Progress
+from mechdesign.questions.columns import DRIVE, VALID, power_of_length
+from mechdesign.questions.kinematics.columns import MOTION
+from mechdesign.questions.kinematics.question import MotionQuestion, characteristic_length
+from mechdesign.questions.kinematics.rates import drive_rates
+from mechdesign.questions.kinematics.targets import Error, errors, totals
+from mechdesign.questions.poses import SolvedPoses, in_study_units, pose_columns, radians, solve_poses
+from mechdesign.results import Column
+from mechdesign.study.poses import PoseGroup, Poses
+
+# Poses with a conditioning below this have lost digits.
+NEAR_SINGULAR = 1e-3
+# Step of the interpolation at change points (radians, or parts of the mechanism's size): its error is about 1e-12, that
+# of accelerations this near to a change point about 1e-10.
+CHANGE_POINT_STEP = 1e-2
+STENCIL = CHANGE_POINT_STEP * np.array([-3, -2, -1, 1, 2, 3])
+STENCIL_WEIGHTS = np.array([1, -6, 15, 15, -6, 1]) / 20
+# An output that moves less than this part of its input (lengths in sizes of the mechanism) stands still: at a toggle.
+STANDS_STILL = 1e-12
+
+
+@dataclass
+class Motion:
+    """The solved poses of one assembly; `arrays` holds every column but those of the poses, nan where it has no value.
+
+    `reason` is that of `mechdesign.mechanism.Reason`, `errors` those of the targets and `sums` their `totals`; `smooth`
+    are poses at a change point whose values are those of the motion that goes through it.
+    """
+
+    question: MotionQuestion
+    arrays: dict[str, Floats] = field(default_factory=dict)
+    reason: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    errors: list[Error] = field(default_factory=list)
+    sums: Floats = field(default_factory=lambda: np.zeros(()))
+    smooth: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    @property
+    def valid(self) -> Flags:
+        """Whether each pose is assembled and within its limits."""
+        return np.equal(self.reason, 0)
+
+    def put(self, name: str, rows: Ints, values: object) -> None:
+        """Set some rows of a column."""
+        if name not in self.arrays:
+            self.arrays[name] = np.full(self.question.poses.count, np.nan)
+        self.arrays[name][rows] = np.broadcast_to(np.asarray(values, dtype=float), rows.shape)
+
+    def fill(self, solved: SolvedPoses) -> Linearization:
+        """Take up poses that give the same coordinates; returns their loop equations."""
+        study, rows, configuration = self.question.study, solved.rows, solved.configuration
+        given = self.question.poses.values
+        self.reason[rows] = configuration.reason
+        for coordinate in self.question.watched:
+            if coordinate.name in solved.given:
+                # As the study gives it, not there and back through radians; also where the pose fails.
+                self.put(coordinate.name, rows, given[coordinate.name][rows])
+            else:
+                self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
+        linear = study.mechanism.linearize(configuration)
+        assembled = configuration.valid | np.equal(configuration.reason, int(Reason.LIMIT))
+        conditioning = np.where(assembled, regularity(linear), np.nan)
+        self.put("conditioning", rows, conditioning)
+        regular = conditioning >= STALLED
+        section = self.question.section
+        velocity = None
+        if section.rates or section.accelerations or section.speed:
+            velocity = self._rates(linear, solved, regular)
+        if section.instant_centres:
+            # Of one drive alone every speed gives the same centres.
+            self._centres(linear, rows, linear.velocity([1.0]) if len(study.mechanism.drives) == 1 else velocity)
+        if self.question.square or section.loads or section.mechanical_advantage:
+            self._statics(linear, rows, regular)
+        return linear
+
+    def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
+        assert velocity is not None
+        for centre in self.question.centres:
+            place, motion = centre.at(self.question.study.mechanism, linear.configuration, velocity)
+            known = np.isfinite(self.arrays["conditioning"][rows]) & (self.arrays["conditioning"][rows] >= STALLED)
+            self.put(f"{centre.name}.x", rows, np.where(known, place.real, np.nan))
+            self.put(f"{centre.name}.y", rows, np.where(known, place.imag, np.nan))
+            self.put(f"{centre.name}.motion", rows, np.where(known, motion, 0))
+
+    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Rates:
+        drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
+        velocity = linear.velocity(drives.velocities)
+        acceleration = linear.acceleration(velocity, drives.accelerations)
+        configuration = linear.configuration
+        coordinates = {
+            o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]
+        }
+        for output in coordinates.values():
+            for order, value in (
+                ("velocity", first(configuration, output, velocity)),
+                ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
+            ):
+                value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
+                self.put(f"{output.name}_{order}", solved.rows, value)
+        return velocity
+
+    def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
+        study, listed, drives = self.question.study, self.question.listed, self.question.drives
+
+        def put(name: str, values: Value) -> None:
+            self.put(name, rows, np.where(regular, values, np.nan))
+
+        if self.question.square:
+            length = characteristic_length(study)
+            arc = self.question.poses.of(np.nan if length is None else length, rows) if mixes(listed, drives) else None
+            jacobian = Jacobian.of(linear, listed, arc)
+            for output, line in zip(listed, jacobian.entries, strict=True):
+                for drive, value in zip(drives, line, strict=True):
+                    put(entry(output, drive), value)
+            put("det_J", jacobian.determinant)
+            put("inverse_condition", jacobian.inverse_condition)
+        for name, values in statics(self.question, linear, rows).items():
+            put(name, values)
+
+    def complete(self, poses: Poses, rows: Ints) -> None:
+        """What is known only when all poses are there: change points, and errors; `rows` are their rows of `poses`."""
+        _through_change_points(self)
+        self.errors = list(errors(self.question.study, poses, self.arrays, rows))
+        self.sums = totals(self.errors, poses.designs, self.valid)
+
+    def columns(self) -> list[Column]:
+        """The columns of the motion table, `valid` last."""
+        question, arrays, label = self.question, self.arrays, self.question.study.units.label
+        rates = question.rates
+        shown = {output.name: output for output in question.outputs}
+        drives = {drive.name: drive for drive in question.drives}
+        columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
+        for name, output in ((drives if question.of_given else {}) | shown).items():
+            if name not in drives:
+                columns.append(MOTION["<output>"].column(arrays[name], label(output.quantity), output=name))
+            for order in ("velocity", "acceleration"):
+                rate = f"{name}_{order}"
+                if rate in rates:
+                    columns.append(MOTION[f"<output>_{order}"].column(arrays[rate], rates[rate], output=name))
+            point, _, axis = name.rpartition(".")
+            columns += [self._error(e) for e in self.errors if e.output == name or (axis == "y" and e.output == point)]
+        rows = ", ".join(output.name for output in question.listed)
+        lengths = [sum(c.quantity == "length" for c in side) for side in (question.listed, question.drives)]
+        area = power_of_length(question.study.units, lengths[0] - lengths[1])
+        words = {"outputs": rows, "as its outputs over the drives, multiplied": area}
+        names = ("det_J", "inverse_condition", "conditioning")
+        columns += MOTION.columns(words, **{name: arrays[name] for name in names if name in arrays})
+        columns += [MOTION[s.kind].column(arrays[s.name], s.unit, **s.words) for s in question.statics]
+        return [*columns, VALID.column(self.valid)]
+
+    def pose_columns(self) -> list[Column]:
+        """The drives, and the coordinates that the study gives."""
+        question, units = self.question, self.question.study.units
+        columns = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
+        named = {column.name for column in columns}
+        for column in pose_columns(question.study, question.poses):
+            if column.name not in named:
+                columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
+        return columns
+
+    def _error(self, error: Error) -> Column:
+        study = self.question.study
+        far = error.output in study.mechanism.points
+        kind = MOTION["<point>_error" if far else "<output>_error"]
+        words = {"point": error.output, "output": error.output}
+        return kind.column(error.values, study.units.label(error.quantity), **words)
+
+
+def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict[str, Value]:
+    """Efforts of the drives by virtual work, and mechanical advantages, by their columns; unknown where it stalls.
+
+    `rows` are the poses of `linear`.
+    """
+    mechanism, drives = question.study.mechanism, question.drives
+    section = question.poses.section(question.section, rows)
+    work: dict[str, Value] = {}
+    for load in section.loads:
+        if load.at is not None and load.force is not None:
+            for axis, force in zip("xy", load.force, strict=True):
+                work[f"{load.at}.{axis}"] = work.get(f"{load.at}.{axis}", 0.0) + force
+        if load.link is not None and load.moment is not None:
+            work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
+    columns: dict[str, Value] = {}
+    if work:
+        moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
+        for k, drive in enumerate(drives):
+            columns[f"{drive.name}_effort"] = -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
+    for name, given in section.mechanical_advantage.items():
+        columns[f"{name}_advantage"] = _advantage(question, linear, name, given)
+    return columns
+
+
+@quiet
+def rates_of_advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> tuple[Value, Value]:
+    """Rates of an output and of the input of its mechanical advantage, by a drive that moves the input."""
+    mechanism, drives = question.study.mechanism, [drive.name for drive in question.drives]
+    rows = Jacobian.of(linear, [mechanism.coordinate(name) for name in (output, given)]).entries
+    k = drives.index(given) if given in drives else 0
+    return rows[0][k], rows[1][k]
+
+
+@quiet
+def _advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> Value:
+    """Force of an output over that at its input: by virtual work the input's rate over the output's."""
+    mechanism = question.study.mechanism
+    given_out, put_in = rates_of_advantage(question, linear, output, given)
+    sizes = [mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in (output, given)]
+    still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
+    return np.where(still & (put_in != 0), np.inf, put_in / given_out)
+
+
+def entry(output: Coordinate, drive: Coordinate) -> str:
+    """Name of an entry of the Jacobian: ``C.x_by_theta``."""
+    return f"{output.name}_by_{drive.name}"
+
+
+def move(
+    question: MotionQuestion,
+    progress: Progress = NULL,
+    jobs: int | None = 1,
+    *,
+    also: Callable[[SolvedPoses], object] | None = None,
+) -> Motion:
+    """Solve every pose; one that fails is nan, with its reason. `also` is called with the solved poses of each chunk.
+
+    Raises
+    ------
+    MechanismError
+        If a pose's coordinates do not determine the mechanism.
+    """
+    study, poses = question.study, question.poses
+    motion = Motion(question, reason=np.zeros(poses.count, dtype=np.int8))
+    for solved in solve_poses(study, poses, question.watched, jobs, question.curve):
+        motion.fill(solved)
+        if also is not None:
+            also(solved)
+        progress.update(len(solved.rows))
+    motion.complete(poses, np.arange(poses.count))
+    return motion
+
+
+def pieces(question: MotionQuestion, jobs: int | None = 1) -> Iterator[tuple[SolvedPoses, Motion]]:
+    """The motion of poses of one kind in pieces, with their solved poses; what is held is a few pieces."""
+    study, poses = question.study, question.poses
+    for solved in solve_poses(study, poses, question.watched, jobs, question.curve):
+        rows = solved.rows
+        some = poses.take(slice(int(rows[0]), int(rows[-1]) + 1))
+        motion = Motion(replace(question, poses=some), reason=np.zeros(len(rows), dtype=np.int8))
+        motion.fill(replace(solved, rows=np.arange(len(rows))))
+        motion.complete(poses, rows)
+        yield solved, motion
+
+
+def _through_change_points(motion: Motion) -> None:
+    """Set the columns of a motion at its change points, where the study follows them; note which in `smooth`.
+
+    Where two assemblies meet, the equations of the velocities have no one solution, and those of the positions half of
+    the digits; but the motion that is followed is smooth there. With S_k = f(k h) + f(-k h) from both sides
+
+        f(0) = (15 S_1 - 6 S_2 + S_3) / 20  + O(h^6).
+    """
+    question = motion.question
+    study, group = question.study, question.poses.groups[0]
+    plan = study.mechanism.plan(group.names)
+    motion.smooth = np.zeros(question.poses.count, dtype=bool)
+    if plan.change_points is None or len(question.poses.groups) > 1:
+        return
+    rows = np.flatnonzero(motion.valid & (motion.arrays["conditioning"] < NEAR_SINGULAR))
+    if not len(rows):
+        return
+    (name,) = group.names
+    coordinate = plan.structure.given[0]
+    scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
+    steps = in_study_units(study, coordinate, scale * STENCIL)
+    values = (group.values[name][rows][:, None] + steps).ravel()
+    beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
+    around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
+    each = np.repeat(rows, len(STENCIL))
+    for solved in solve_poses(study, beside):
+        near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
+                for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
+        configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
+        around.fill(replace(solved, configuration=configuration))
+    good = around.valid.reshape(-1, len(STENCIL)).all(axis=1)
+    for column, array in motion.arrays.items():
+        if column in (name, "conditioning"):
+            continue
+        table = around.arrays[column].reshape(-1, len(STENCIL))
+        array[rows[good]] = (table @ STENCIL_WEIGHTS)[good]
+    motion.smooth[rows[good]] = True

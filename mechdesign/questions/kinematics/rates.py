@@ -1,0 +1,119 @@
+"""Rates of a motion: of the drives, or of the coordinates that the poses give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import Value, picked
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
+from mechdesign.mechanism.outputs import second
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.kinematics.schema import KinematicsSection
+from mechdesign.questions.poses import SolvedPoses, radians
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+
+@dataclass(frozen=True, eq=False)
+class DriveRates:
+    """Velocities and accelerations of the drives, or of as many coordinates (radians and lengths); nan where none."""
+
+    velocities: Sequence[Value]
+    accelerations: Sequence[Value]
+
+    def take(self, index: Ints | int) -> DriveRates:
+        """Those of some poses, or of one; numbers are the same at all."""
+        return DriveRates(*(
+            [picked(value, index) for value in values]
+            for values in (self.velocities, self.accelerations)
+        ))  # fmt: skip
+
+
+def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:
+    """Whether a section's rates are those of the coordinates that the poses give rather than of the drives."""
+    return section.speed is not None or not {*section.rates, *section.accelerations} <= set(study.mechanism.drives)
+
+
+def drive_rates(
+    study: Study, section: KinematicsSection | ReliabilitySection, poses: Poses, solved: SolvedPoses,
+    linear: Linearization,
+) -> DriveRates:  # fmt: skip
+    """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
+
+    At a speed v along the path of a point, of length s, a coordinate c that the path gives has the velocity c'(s) v
+    and the acceleration c''(s) v^2.
+
+    `linear` is the mechanism at the solved poses.
+    """
+    section = poses.section(section, solved.rows)
+    inverse = of_given(study, section)
+    names = solved.given if inverse else study.mechanism.drives
+    coordinates = [study.mechanism.coordinate(name) for name in names]
+    if section.speed is None:
+        rates = constant_rates(study, section, names)
+    else:
+        nowhere = np.full(poses.count, np.nan)
+        rates = DriveRates(*(
+            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * section.speed**order) for c in coordinates]
+            for order, known in ((1, poses.slopes), (2, poses.bends))
+        ))  # fmt: skip
+    return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
+
+
+def constant_rates(study: Study, section: KinematicsSection | ReliabilitySection, names: Sequence[str]) -> DriveRates:
+    """Rates of some coordinates, as a section gives them in numbers."""
+    coordinates = [study.mechanism.coordinate(name) for name in names]
+    return DriveRates(*(
+        [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
+        for known in (section.rates, section.accelerations)
+    ))  # fmt: skip
+
+
+def inverse_rates(
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], rates: DriveRates
+) -> DriveRates:
+    """Drive rates that give as many coordinates their velocities v and accelerations a, at a flat batch.
+
+    With J the derivatives of the coordinates by the drives q, J q' = v and J q'' = a - b, where b is what the
+    coordinates accelerate by while q'' = 0. Where J is singular there are none.
+    """
+    matrix, good = _inverted(mechanism, linear, given)
+    speeds = _solve(matrix, good, rates.velocities)
+    velocity = linear.velocity(speeds)
+    coasting = linear.acceleration(velocity, [0.0] * len(given))
+    own = [second(linear.configuration, coordinate, velocity, velocity, coasting) for coordinate in given]
+    return DriveRates(speeds, _solve(matrix, good, [a - b for a, b in zip(rates.accelerations, own, strict=True)]))
+
+
+def _inverted(mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]) -> tuple[Floats, Flags]:
+    """J of the given coordinates, and where it is regular.
+
+    It is so by its determinant over the lengths of its rows (at least 1), all without units.
+    """
+    matrix, pure = unitless(mechanism, linear, given)
+    lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
+
+
+def unitless(
+    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Jacobian of some coordinates by the drives, and the same with lengths in sizes of the mechanism."""
+    matrix, size = Jacobian.of(linear, given).matrix, mechanism.size
+    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
+    columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
+    return matrix, matrix * rows[:, None] * columns
+
+
+def _solve(matrix: Floats, good: Flags, right: Sequence[Value]) -> list[Floats]:
+    safe = np.where(good[..., None, None], matrix, np.eye(matrix.shape[-1]))
+    sides = np.stack([np.broadcast_to(np.asarray(side, dtype=float), good.shape) for side in right], axis=-1)
+    solution = np.linalg.solve(safe, sides[..., None])[..., 0]
+    return [np.where(good, solution[..., k], np.nan) for k in range(len(right))]

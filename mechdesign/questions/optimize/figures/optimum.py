@@ -1,0 +1,233 @@
+"""A design that an optimisation chose: its mechanism, what was wanted of it, what it reaches, and the error."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mechdesign.mechanism import Mechanism
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.paths import draw_paths, paths_figure
+from mechdesign.questions.poses import Shown
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
+from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
+from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, legend_below, tick_abscissa
+from mechdesign.report.figures.scene import Sweep
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+
+# Inches.
+_HEIGHT = 5.0
+_TITLE = 0.42
+_TITLE_LINE = 0.18
+_PANEL = 1.25
+_PANEL_GAP = 0.42
+_BELOW = 0.55
+_LEGEND = 0.35
+_BESIDE = 0.12
+_MAX_BESIDE = 4.0
+_SMALL_SYMBOLS = 0.7
+_LETTERS_AN_INCH = 13.5
+_CURVE_POSES = 240  # of the motion between listed poses
+# Of more poses the values are joined by a line.
+_MAX_DOTS = 15
+# Looks of wanted and reached places, for few places and for many.
+_LOOKS: dict[tuple[str, bool], dict[str, Any]] = {
+    ("wanted", True): {"linestyle": "none", "marker": "x", "markersize": 6, "markeredgewidth": 1.5, "zorder": 4.6},
+    ("reached", True): {"linestyle": "none", "marker": "o", "markersize": 2.6, "zorder": 4.5},
+    ("wanted", False): {"linestyle": (0, (5, 2)), "linewidth": 3.0, "zorder": 3.7, "snap": False},
+    ("reached", False): {"linewidth": 0.9, "zorder": 3.8, "snap": False},
+}
+
+
+class Reached(NamedTuple):
+    """An output with a target over the poses: what it is, and by how much it misses."""
+
+    output: str
+    unit: str
+    values: Floats | None
+    error: Floats
+
+    @property
+    def worst(self) -> float:
+        """The largest error."""
+        return float(np.nanmax(np.abs(self.error)))
+
+
+def reached(table: Table) -> list[Reached]:
+    """Outputs with targets in a table of motion; the distance from a path only if there is no other error."""
+    outputs = []
+    for column in table.columns:
+        output = column.name.removesuffix("_error")
+        if output != column.name and np.isfinite(column.values).any():
+            known = output in table
+            outputs.append(Reached(output, column.unit, table[output] if known else None, column.values))
+    return [each for each in outputs if each.values is not None] or outputs
+
+
+def design_figure(study: Study, motion: Result, words: str) -> Figure:
+    """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
+    sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
+    shown = reached(table)
+    title = textwrap.fill(words, int((style.width() - LEFT) * _LETTERS_AN_INCH))
+    above = _TITLE + _TITLE_LINE * title.count("\n")
+    if sweep.poses.motion:
+        figure = paths_figure(sweep, above=above)
+    else:
+        worst = _worst(shown, sweep.valid)
+        title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
+        title = textwrap.fill(title.replace("\n", " "), int((style.width() - LEFT) * _LETTERS_AN_INCH))
+        above = _TITLE + _TITLE_LINE * title.count("\n")
+        figure = _posed(sweep, worst, _wanted(table, shown), above)
+    axes = figure.axes[0]
+    axes.set_title(title, loc="left", fontsize=10.5)
+    _draw_wanted(axes, table, shown)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none").set_zorder(6)
+    if shown:
+        _panels(figure, abscissa(study, sweep.poses), shown[: MAX_PANELS // 2])
+    return figure
+
+
+def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
+    """Designs side by side on one scale: each in its poses, under its words, with its motion where that was judged."""
+    sweeps = [Sweep.of(shown) for _, shown, _ in parts]
+    places = np.concatenate([sweep.extent for sweep in sweeps])
+    count = len(parts)
+    columns = 1 if style.narrow() else count
+    wide = column_width(columns, _BESIDE)
+    window = fit(places, wide, _MAX_BESIDE if columns > 1 else 8.0 / count, 0.25)
+    titles = [
+        style.folded(words.replace("\n", ", "), 8.5, window.width)
+        if style.narrow()
+        else "\n".join(textwrap.fill(line, int(window.width * _LETTERS_AN_INCH)) for line in words.splitlines())
+        for words, _, _ in parts
+    ]
+    above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
+    figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
+                           below=_BELOW + _LEGEND)  # fmt: skip
+    for axes, title, sweep, (_, _, motion) in zip(grid, titles, sweeps, parts, strict=True):
+        axes.set_title(title, loc="left", fontsize=8.5)
+        axes.locator_params(nbins=5)
+        if sweep.poses.motion:
+            draw_paths(axes, sweep, width=0.8)
+        if motion is not None:
+            table = motion.tables["motion"]
+            _draw_wanted(axes, table, reached(table))
+        draw_mechanism(
+            axes, sweep.mechanism, sweep.configuration, int(sweep.valid[0]), labels=False, drives=False,
+            travel=sweep.travel, size=_SMALL_SYMBOLS,
+        )  # fmt: skip
+    handles, labels = grid[0].get_legend_handles_labels()
+    legend_below(figure, handles, labels)
+    return figure
+
+
+def _worst(shown: Sequence[Reached], valid: Ints) -> int:
+    """The valid pose with the largest error relative to the worst of its output; the first pose without targets."""
+    if not shown:
+        return int(valid[0])
+    far = np.nanmax([np.abs(each.error) / (each.worst or 1.0) for each in shown], axis=0)
+    return int(valid[np.nanargmax(np.nan_to_num(far[valid], nan=-1.0))])
+
+
+def _wanted(table: Table, shown: Sequence[Reached]) -> dict[str, Complexes]:
+    """Places where points should be at the poses, by point: what they reach less the error."""
+    errors = {each.output: each.error for each in shown}
+    wanted: dict[str, Complexes] = {}
+    for point in dict.fromkeys(output.removesuffix(f".{axis}") for output in errors for axis in "xy"):
+        names = [f"{point}.{axis}" for axis in "xy"]
+        if all(name in table for name in names) and any(name in errors for name in names):
+            x, y = (table[name] - errors.get(name, 0.0) for name in names)
+            wanted[point] = x + 1j * y
+    return wanted
+
+
+def _draw_wanted(axes: Axes, table: Table, shown: Sequence[Reached]) -> None:
+    """Where points should be and where they are: crosses and dots at a few poses, lines along many."""
+    for point, wanted in _wanted(table, shown).items():
+        x, y = (table[f"{point}.{axis}"] for axis in "xy")
+        few = len(wanted) <= _MAX_DOTS
+        axes.plot(wanted.real, wanted.imag, color=style.VERMILION, label=f"{point} wanted", **_LOOKS["wanted", few])
+        axes.plot(x, y, color=style.INK, label=f"{point} reached", **_LOOKS["reached", few])
+
+
+def _posed(sweep: Sweep, index: int, wanted: dict[str, Complexes], above: float) -> Figure:
+    """The mechanism in one of its listed poses, pale in the others, and the curves of its points between them."""
+    between = _between(sweep)
+    curves = {point: between[point] for point in wanted if point in between}
+    places = np.concatenate([sweep.extent, *wanted.values(), *curves.values()])
+    figure, axes = framed(places, sweep.study.units.label("length"), height=_HEIGHT, above=above)
+    for other in sweep.valid:
+        if other != index:
+            draw_ghost(axes, sweep.mechanism, sweep.configuration, int(other))
+    for point, curve in curves.items():
+        axes.plot(curve.real, curve.imag, color=style.BLUE, linewidth=1.6, zorder=3.6, label=f"path of {point}")
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, index, travel=sweep.travel)
+    return figure
+
+
+def _between(sweep: Sweep) -> dict[str, Complexes]:
+    """Paths of the points while a single drive runs through its listed values; none if they miss the listed poses."""
+    mechanism: Mechanism = sweep.mechanism
+    if len(mechanism.drives) != 1 or len(sweep.valid) < 2:
+        return {}
+    drive = mechanism.coordinate(*mechanism.drives)
+    values = np.asarray(sweep.configuration.value(drive))[sweep.valid]
+    moved = mechanism.forward.solve([np.linspace(values.min(), values.max(), _CURVE_POSES)], limits=False)
+    at = mechanism.forward.solve([values], limits=False)
+    paths = {}
+    for point, path in sweep.places.items():
+        same = np.abs(np.asarray(at.point(point)) - path[sweep.valid]) <= 1e-6 * mechanism.size
+        if same.all():
+            paths[point] = np.where(moved.valid, moved.point(point), complex(np.nan, np.nan))
+    return paths
+
+
+def _missed(each: Reached) -> str:
+    """An output and its largest error."""
+    words = f"{each.output}: reached less wanted, at most {each.worst:.3g} {each.unit}".rstrip()
+    return style.folded(words, 9.5, style.width() - LEFT)
+
+
+def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
+    """Below the drawing: scalar outputs as wanted and reached, and the error of every output, over the poses."""
+    titles = {each.output: _missed(each) for each in shown}
+    gap = _PANEL_GAP + style.line(9.5) * max(title.count("\n") for title in titles.values())
+    rows = [(each, part) for each in shown for part in ("curve", "error")
+            if part == "error" or (each.values is not None and each.output[-2:] not in (".x", ".y"))]  # fmt: skip
+    room = len(rows) * (_PANEL + gap) + _BELOW
+    style.grow(figure, below=room)
+    height = figure.get_figheight()
+    left, wide = LEFT / style.width(), 1 - (LEFT + RIGHT) / style.width()
+    look: dict[str, Any] = {"marker": "o", "markersize": 4.0} if len(over.values) <= _MAX_DOTS else {}
+    for k, (each, part) in enumerate(rows):
+        low = _BELOW + (len(rows) - 1 - k) * (_PANEL + gap)
+        axes = figure.add_axes((left, low / height, wide, _PANEL / height))
+        if part == "curve" and each.values is not None:
+            axes.plot(over.values, each.values - each.error, color=style.VERMILION, linestyle=(0, (5, 2)),
+                      linewidth=2.4, label="wanted")  # fmt: skip
+            axes.plot(over.values, each.values, color=style.BLUE, linewidth=1.2, label="reached", **look)
+            axes.legend(loc="best", ncols=2)
+            axes.set_title(each.output, loc="left", fontsize=9.5)
+            axes.set_ylabel(style.axis_label("value", each.unit))
+        else:
+            axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
+            axes.plot(over.values, each.error, color=style.BLUE, **look)
+            axes.set_title(titles[each.output], loc="left", fontsize=9.5)
+            axes.set_ylabel(style.axis_label("error", each.unit))
+            axes.ticklabel_format(axis="y", scilimits=(-3, 4))
+        axes.locator_params(axis="y", nbins=5)
+        tick_abscissa(axes, over)
+        axes.margins(x=0.02)
+        if k == len(rows) - 1:
+            axes.set_xlabel(over.label)
+        else:
+            axes.tick_params(labelbottom=False)

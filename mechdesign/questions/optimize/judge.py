@@ -1,0 +1,327 @@
+"""Designs evaluated and judged, in the order of evaluation: values of goals and conditions, reasons of failure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import MechanismError
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.progress import Progress
+from mechdesign.questions.optimize.batch import Evaluated
+from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
+from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.explorer import ASSEMBLY, Known, Part
+from mechdesign.questions.optimize.goals import Goal, goals_of, unit_of
+from mechdesign.questions.optimize.variables import Batch, from_cube, shown
+from mechdesign.questions.optimize.variables import unit_of as variable_unit
+from mechdesign.questions.reliability.schema.limits import SUFFIXES
+from mechdesign.results import Column, ColumnKind
+from mechdesign.statistics import STATISTICS
+from mechdesign.study import Study
+from mechdesign.study.schema.checker import ORDERS
+from mechdesign.work.journal import Journal, digest
+
+# Designs evaluated together: enough for long arrays, few enough that all workers finish at about the same time.
+DESIGNS_AT_ONCE = 384
+# The same where a design costs much and a search evaluates few at once.
+SLOW_DESIGNS_AT_ONCE = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Designs:
+    """Evaluated designs, compared by the weighted sums of their normalised goals [S1, eqs. 27, 28].
+
+    Arrays are of shape (designs,).
+
+    Parameters
+    ----------
+    found : dict of Goal to ndarray
+        Values of the goals and of the bounded results; nan where a design has none.
+    errors : dict of Goal to ndarray
+        Estimated errors of goals that have any.
+    codes, words : ndarray of int, list of str
+        Why a design cannot be built: ``words[code]``, empty where it can.
+    shortfall : ndarray
+        How far the poses of a design are from assembling; nan where that is not known.
+    weights : ndarray, shape (rows, goals)
+    meanings : mapping
+        Unit and meaning of indices of the workspace, by column.
+    marks : tuple of str
+        What each optimum is, of a front.
+    chosen : ndarray of int
+        Rows of the first optima, of a front; the others are the best for their weights.
+    """
+
+    study: Study
+    variables: dict[str, Floats]
+    goals: tuple[Goal, ...]
+    conditions: tuple[Goal, ...]
+    found: dict[Goal, Floats]
+    errors: dict[Goal, Floats]
+    codes: NDArray[np.int32]
+    words: list[str]
+    shortfall: Floats
+    weights: Floats
+    meanings: Mapping[str, tuple[str, str]]
+    marks: tuple[str, ...] = ()
+    chosen: Ints = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def design(self, row: int) -> dict[str, float | str]:
+        """The variables of one design: numbers, and words of choices."""
+        return {name: self.shown(name)[row].item() for name in self.variables}
+
+    def shown(self, name: str) -> NDArray[Any]:
+        """A variable of every design: numbers, or words of choices."""
+        return shown(self.study, name, self.variables[name])
+
+    @cached_property
+    def failures(self) -> dict[str, Flags]:
+        """Infeasible designs by reason: why they cannot be built, else every condition that they miss."""
+        found = {word: self.codes == code for code, word in enumerate(self.words) if word}
+        built = self.codes == 0
+        return found | {
+            f"not {condition.name}": built & ~condition.met(self.found[condition]) for condition in self.conditions
+        }
+
+    @cached_property
+    def reasons(self) -> NDArray[np.object_]:
+        """The first reason of each design, empty where it is feasible."""
+        column = np.full(len(self), "", dtype=object)
+        for word, rows in reversed(self.failures.items()):
+            column[rows] = word
+        return column
+
+    @cached_property
+    def feasible(self) -> Flags:
+        """Which can be built and meet every condition."""
+        return np.asarray(self.reasons == "", dtype=bool)
+
+    def counted(self) -> list[tuple[str, int, int]]:
+        """Reasons of infeasible designs, the most frequent first: reason, number of designs, and the first design."""
+        found = [(word, int(rows.sum()), int(rows.argmax())) for word, rows in self.failures.items() if rows.any()]
+        return sorted(found, key=lambda reason: (-reason[1], reason[0]))
+
+    @cached_property
+    def values(self) -> Floats:
+        """Values of the goals, shape (designs, goals)."""
+        return np.stack([self.found[goal] for goal in self.goals], axis=1)
+
+    @cached_property
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Smallest and largest value of each goal over the feasible designs; an empty range where there are none."""
+        inside = self.values[self.feasible]
+        return inside.min(axis=0, initial=np.inf), inside.max(axis=0, initial=-np.inf)
+
+    @cached_property
+    def cpi(self) -> Floats:
+        """Sum of the normalised goals; nan where a design is not feasible."""
+        return self.score(np.ones(len(self.goals)))
+
+    @cached_property
+    def winners(self) -> Ints:
+        """Rows of a front's knee and ends, then of the best design (the first of equals) for each row of weights."""
+        scores = [np.where(self.feasible, self.score(row), -np.inf) for row in self.weights[len(self.chosen) :]]
+        return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
+
+    def merits(self, row: int) -> str:
+        """The optima that a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        places = np.flatnonzero(self.winners == row).tolist()
+        marks = [self.marks[place] for place in places if place < len(self.chosen)]
+        weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]
+        return ", ".join([*marks, *([f"best for {' '.join(f'({own})' for own in weights)}"] if weights else [])])
+
+    @property
+    def best(self) -> int:
+        """The optimum with the largest CPI; of a front its knee."""
+        winners = self.winners
+        return int(winners[0 if len(self.chosen) else np.argmax(self.cpi[winners])])
+
+    def score(self, row: Floats) -> Floats:
+        """Weighted sum of the normalised goals of every design; nan where it is not feasible."""
+        return np.where(self.feasible, self.score_of(self.values, row), np.nan)
+
+    def score_of(self, values: Floats, row: Floats) -> Floats:
+        """Weighted sums of other designs, of values in the shape (designs, goals), normalised by the same bounds.
+
+        Each goal counts as the fraction of its range over the feasible designs.
+        """
+        total = np.zeros(len(values))
+        for k in np.flatnonzero(row).tolist():
+            total += row[k] * self._normalised(values, k)
+        return total
+
+    def share(self, k: int) -> Floats:
+        """A goal of every design as a fraction of its range over the feasible ones; nan where it is not feasible."""
+        return np.where(self.feasible, self._normalised(self.values, k), np.nan)
+
+    def _normalised(self, values: Floats, k: int) -> Floats:
+        """A goal as a fraction of its range, 1 the best [S1, eq. 27]; 0 where there is none."""
+        low, high = (end[k] for end in self._ends)
+        if not high > low:
+            return np.zeros(len(values))
+        share = (values[:, k] - low) / (high - low)
+        return np.asarray(1 - share if self.goals[k].smallest else share)
+
+    def unit_of(self, name: str) -> str:
+        """Unit of a goal or a variable, where it is known."""
+        for goal in self.goals:
+            if goal.name == name:
+                return self._kind(goal)[1]
+        return variable_unit(self.study, name)
+
+    def unit_of_condition(self, condition: Goal) -> str:
+        """Unit of the result that a condition bounds; the scale of a shape has none."""
+        return "" if condition.outline is not None else self._kind(condition)[1]
+
+    def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
+        """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
+        for name in self.variables:
+            yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
+        for goal in self.goals:
+            # A goal that is itself a variable has its column already.
+            if goal.name not in self.variables:
+                kind, unit, meaning = self._kind(goal)
+                words = {"parameter": goal.name, "result": goal.name, "meaning of the result": meaning}
+                yield kind.column(self.found[goal][rows], unit, **words)
+        for goal, error in self.errors.items() if errors else ():
+            if goal in self.goals:
+                yield DESIGNS["<result>_error"].column(error[rows], self._kind(goal)[1], result=goal.name)
+        for condition in self.conditions:
+            if condition.outline is not None:
+                words = {"result": condition.column, "meaning of the result": self.meanings[condition.column][1]}
+                yield RESULT.column(self.found[condition][rows], **words)
+        yield CPI.column(self.cpi[rows])
+
+    def _kind(self, goal: Goal) -> tuple[ColumnKind, str, str]:
+        """Kind of a goal's column, its unit, and the meaning of a number of the workspace."""
+        if goal.expression is not None:
+            return EXPRESSION, unit_of(self.study, goal.column), ""
+        if goal.regional and goal.column in self.meanings:
+            return RESULT, *self.meanings[goal.column]
+        return WORST_ROW, self._coordinate_unit(goal), ""
+
+    def _coordinate_unit(self, judged: Goal) -> str:
+        """Unit of a coordinate, its rates and its error; none where a goal is something else."""
+        head, _, word = judged.column.partition(" ")[0].rpartition(".")
+        if word in STATISTICS and STATISTICS[word].pure:
+            return ""
+        column = (head if word in STATISTICS else judged.column).removeprefix("motion.")
+        order = next((order for order, suffix in enumerate(SUFFIXES) if suffix and column.endswith(suffix)), 0)
+        try:
+            quantity = self.study.mechanism.quantity(column.removesuffix(SUFFIXES[order]).removesuffix("_error"))
+        except MechanismError:
+            return ""
+        return self.study.units.label(ORDERS[quantity][order]) if quantity in ORDERS else ""
+
+
+class Judge:
+    """Evaluates designs in chunks and keeps the results; those that a journal holds are not computed again.
+
+    `compute` evaluates chunks in their order: ``map(evaluator, chunks)``, or workers that do so.
+    """
+
+    def __init__(
+        self, study: Study, evaluator: Evaluator, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]],
+        progress: Progress, journal: Journal | None,
+    ) -> None:  # fmt: skip
+        assert study.optimize is not None
+        self.study, self.progress, self.layout = study, progress, evaluator.layout
+        count = len(goals_of(study.optimize))
+        self.goals, self.conditions = evaluator.goals[:count], evaluator.goals[count:]
+        self._names = tuple(study.optimize.variables)
+        self._squares, self._compute, self._journal = evaluator.squares, compute, journal
+        self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
+        # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
+        self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
+        self._asked: list[Floats] = []
+        self._found: list[Floats] = []
+
+    def parts(self) -> list[Part]:
+        """The rows of a result that belong to each goal or condition; the margins of assembly come last."""
+        head, margins = self.layout.head, self.layout.margins
+        places = {goal: slice(at.start - head, at.stop - head) for goal, at in self.layout.rows.items()}
+        found = [
+            Part(column, goal.sign, goal.absolute, places[goal], goal.bound, goal in self._squares)
+            for column, goal in enumerate((*self.goals, *self.conditions))
+            if goal in places and (column < len(self.goals) or goal not in self._squares)
+        ]
+        if margins.start < margins.stop:
+            found.append(Part(ASSEMBLY, -1.0, False, slice(margins.start - head, margins.stop - head)))
+        return found
+
+    def known(self, u: Floats) -> Known:
+        """Evaluate points of the unit cube."""
+        designs, given, _ = from_cube(self.study, u)
+        found = np.full((len(u), self.layout.width), np.nan)
+        if given.any():
+            found[given] = self.evaluate({name: column[given] for name, column in designs.items()})
+        return self._known(u, found)
+
+    def _known(self, u: Floats, found: Floats) -> Known:
+        values = np.where(found[:, [self.layout.code]] > 0, np.nan, found[:, self.layout.values])
+        margins = [condition.margin(values[:, self.layout.column[condition]]) for condition in self.conditions]
+        return Known(
+            u, values[:, : len(self.goals)], np.stack(margins, axis=1) if margins else np.empty((len(u), 0)),
+            found[:, self.layout.head :], found[:, self.layout.shortfall],
+        )  # fmt: skip
+
+    def nearest(self) -> int | None:
+        """The infeasible design with the smallest violation; None where no violation is known."""
+        found = np.concatenate([np.empty((0, self.layout.head)), *self._found])
+        merit = self._known(np.empty((len(found), 0)), found).merit(np.zeros(len(self.goals)))
+        return int(merit.argmin()) if np.isfinite(merit).any() else None
+
+    def evaluate(self, designs: Batch) -> Floats:
+        """Results of designs, in rows of `layout`, evaluated chunk by chunk unless the journal has them."""
+        count, begun = len(designs[self._names[0]]), len(self._found)
+        chunks = [
+            {name: column[k : k + self._chunk] for name, column in designs.items()}
+            for k in range(0, count, self._chunk)
+        ]
+        keys = [digest([chunk[name] for name in self._names]) for chunk in chunks]
+        known: list[Floats] = []
+        while self._journal is not None and len(known) < len(keys):
+            rows = self._journal.recall(keys[len(known)])
+            if rows is None:
+                break
+            known.append(rows)
+        new = map(self._coded, self._compute(chunks[len(known) :]))
+        for chunk, key, rows in zip(chunks, keys, chain(known, new), strict=True):
+            self._asked.append(np.column_stack([chunk[name] for name in self._names]))
+            self._found.append(rows)
+            if self._journal is not None:
+                self._journal.add(key, rows, [*self._words])
+            self.progress.update(len(rows))
+        found = self._found[begun:]
+        # The rows behind the goals are returned, but not kept.
+        self._found[begun:] = [rows[:, : self.layout.head].copy() for rows in found]
+        return np.concatenate(found) if found else np.empty((0, self.layout.width))
+
+    def _coded(self, found: Evaluated) -> Floats:
+        codes = [self._words.setdefault(reason, len(self._words)) for reason in found.reasons]
+        found.table[:, self.layout.code] = codes
+        return found.table
+
+    def designs(self, weights: Floats, meanings: Mapping[str, tuple[str, str]]) -> Designs:
+        """Everything evaluated so far; see `Designs` of the arguments."""
+        head = self.layout.head
+        found = np.concatenate([np.empty((0, head)), *(rows[:, :head] for rows in self._found)])
+        asked = np.concatenate([np.empty((0, len(self._names))), *self._asked])
+        errors = zip(self.layout.column, found[:, self.layout.errors].T, strict=True)
+        return Designs(
+            self.study, dict(zip(self._names, asked.T, strict=True)), self.goals, self.conditions,
+            dict(zip(self.layout.column, found[:, self.layout.values].T, strict=True)),
+            {goal: column for goal, column in errors if not np.isnan(column).all()},
+            found[:, self.layout.code].astype(np.int32), [*self._words], found[:, self.layout.shortfall], weights,
+            meanings,
+        )  # fmt: skip

@@ -1,0 +1,183 @@
+"""Thousands of designs at once: tables with the same number of rows for each, and the poses' margins of assembly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.errors import MechdesignError
+from mechdesign.mechanism import Mechanism, Reason
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.four_bars import four_bars
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.courses import course_of
+from mechdesign.questions.kinematics.extremes import extremes, targets_table
+from mechdesign.questions.kinematics.loops import loops_table, measured
+from mechdesign.questions.kinematics.motion import move
+from mechdesign.questions.kinematics.question import motion_question
+from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
+from mechdesign.questions.poses import SolvedPoses, alike, study_poses
+from mechdesign.questions.reliability import analysis as reliability
+from mechdesign.questions.stiffness import analysis as stiffness
+from mechdesign.questions.stiffness.body import ask
+from mechdesign.results import Result, Scope
+from mechdesign.statistics import Asked
+from mechdesign.study import Study
+from mechdesign.study.designs import Designs
+from mechdesign.study.poses import Poses
+from mechdesign.study.variants import remeasured
+
+TABLES: Mapping[str, Collection[str]] = {
+    "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
+    # A design may have more springs than another.
+    "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
+    "reliability": ("moments", "reliability", "capability", "contributions"),
+}
+
+
+class Stack(NamedTuple):
+    """Tables of some designs.
+
+    Parameters
+    ----------
+    reason : int8 array, shape (designs, poses)
+        See `mechdesign.mechanism.Reason`.
+    whole : bool array, shape (designs,)
+        Whether the motion has no gap between the poses; True where poses are no motion.
+    along : Along, optional
+        The motions of the designs between their poses.
+    solved : list of SolvedPoses
+        The solved poses of a motion; else empty.
+    """
+
+    result: Result
+    reason: NDArray[np.int8]
+    whole: Flags
+    along: Along | None
+    solved: list[SolvedPoses]
+
+
+def complete(study: Study, command: str) -> bool:
+    """Whether `TABLES` has all costly tables of a command's answer: not where methods sample."""
+    return command != "reliability" or (
+        study.reliability is not None and set(study.reliability.methods) == {"analytic"}
+    )
+
+
+def shared(study: Study, command: str, names: Collection[str]) -> bool:
+    """Whether designs that differ in parameters or places share one mechanism and one set of sections.
+
+    They do not where a parameter decides the structure of the mechanism; each design is then a study of its own.
+    """
+    if remeasured(study, names):
+        return False
+    # The nodes of a workspace follow each design's own boundary, change points its own motion.
+    asked = [section for section in (getattr(study, command), study.kinematics) if section is not None]
+    return not any(section.at_nodes for section in asked) and not any(
+        study.mechanism.plan(group.names).change_points for group in study_poses(study, command).groups
+    )
+
+
+def grouped(
+    designs: Designs, command: str, rows: Ints, failed: Callable[[Ints, MechdesignError], None]
+) -> Iterator[tuple[Ints, Study, Poses]]:
+    """Designs in groups that share a study and have the same number of poses: rows, study and poses of each group.
+
+    `failed` is called with the designs whose numbers make no study or no poses.
+    """
+    if shared(designs.study, command, designs.changed):
+        for some in alike(designs, command, rows):
+            try:
+                yield some, designs.study, study_poses(designs.study, command, designs.take(some).numbers)
+            except MechdesignError as error:
+                failed(some, error)
+        return
+    for k in rows.tolist():
+        try:
+            study = designs.one(k)
+            yield np.array([k]), study, study_poses(study, command)
+        except MechdesignError as error:
+            failed(np.array([k]), error)
+
+
+def tables(
+    study: Study, command: str, wanted: Collection[str], poses: Poses, outputs: Collection[str] | None = None,
+    asked: Collection[Asked] = (),
+) -> Stack:  # fmt: skip
+    """Answers of a command for the poses of several designs.
+
+    Parameters
+    ----------
+    wanted : collection of str
+        Names of tables.
+    outputs : collection of str, optional
+        Of the extremes; all where left out.
+    asked : collection of Asked
+        Columns that are followed between the poses.
+    """
+    solved: list[SolvedPoses] = []
+    absent: Mapping[str, str] = {}
+    along = None
+    if command == "kinematics":
+        motion = move(motion_question(study, poses), also=solved.append)
+        question, absent = motion.question, motion.question.absent
+        loops = four_bars(study.mechanism) if "loops" in wanted else ()
+        errors = question.errors if "targets" in wanted else ()
+        along = along_of(question, outputs, loops, also=errors, asked=asked)
+        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}
+        if "extremes" in wanted:
+            found["extremes"] = extremes(motion, along, outputs)
+        if loops:
+            found["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
+        if motion.errors and "targets" in wanted:
+            found["targets"] = targets_table(motion, along)
+        reason = motion.reason
+    elif command == "reliability":
+        found, reason = reliability.first_order_tables(study, poses, wanted)
+    else:
+        body = ask(study)
+        held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
+        found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
+    whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
+    return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)
+
+
+def assembly_margins(study: Study, poses: Poses, solved: Iterable[SolvedPoses]) -> Floats:
+    """Margins of every pose in parts of the mechanism's size, shape (designs, margins): negative where one is missed.
+
+    They are squares of lengths, or angles in radians, smooth in the dimensions; nan where a group before does not
+    assemble. `solved` are the poses as `mechdesign.questions.poses.solve_poses` gives them.
+    """
+    return np.concatenate([_margins(study.mechanism, part).reshape(poses.designs, -1) for part in solved], axis=1)
+
+
+def shortfall(margins: Floats) -> Floats:
+    """Sum of the missed margins of designs, shape (designs,): each counts from 0 to 1, nan as 1."""
+    missed = np.maximum(-margins, 0.0)
+    return np.asarray(np.where(np.isnan(missed), 1.0, missed / (1.0 + missed)).sum(axis=1))
+
+
+def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
+    """Margins of some poses, shape (poses, margins)."""
+    configuration, size = solved.configuration, mechanism.size
+    found: list[Value] = [closure / size**2 for closure in configuration.closures]
+    if mechanism.plan(solved.given).iterative:
+        assembled = (configuration.reason == Reason.OK) | (configuration.reason == Reason.LIMIT)
+        found.append(np.where(assembled, 1.0, -1.0))
+    found += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]
+    places = {**mechanism.nominal, **configuration.places}
+    with np.errstate(all="ignore"):
+        found += [
+            margin / bound.scale(size)
+            for bound in mechanism.bounds
+            for _, margin in bound.margins(configuration, places)
+        ]
+    columns = [np.broadcast_to(np.asarray(margin, dtype=float), configuration.shape) for margin in found]
+    return np.stack(columns, axis=1) if columns else np.empty((*configuration.shape, 0))

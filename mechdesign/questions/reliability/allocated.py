@@ -1,0 +1,76 @@
+"""The data of a study file with its allocated tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.cheapest import DIGITS, Tolerance
+from mechdesign.questions.reliability.schema.clearances import Clearance
+from mechdesign.study import Study
+from mechdesign.study.text.document import plain
+
+
+def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats) -> dict[str, Any]:
+    """The study's data with its tolerances times the factors `scales`, shape (tolerances,).
+
+    A wildcard is written out, dimension by dimension, unless all its dimensions keep equal tolerances. `allocate` is
+    left out, unless a requirement judges its tables.
+    """
+    section = study.reliability
+    assert section is not None
+    data: dict[str, Any] = plain(study.resolved)
+    changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
+    written = data["reliability"]
+    judged = (["allocation"], ["confirmation"])
+    if not any(requirement.result.split(".")[1:2] in judged for requirement in study.requirements):
+        del written["allocate"]
+    entries = written.get("dimensions") or {}
+    # Of several wildcards the last one counts.
+    key_of = {name: name if name in entries else [key for key in entries if fnmatchcase(name, key)][-1]
+              for name in section.dimensions}  # fmt: skip
+    dimensions: dict[str, Any] = {}
+    for key, raw in entries.items():
+        by_name = {name: _dimension(raw, *changed[name], study) if name in changed else raw
+                   for name, origin in key_of.items() if origin == key}  # fmt: skip
+        values = [*by_name.values(), raw]
+        dimensions |= by_name if any(value != values[0] for value in values[:-1]) else {key: values[0]}
+    if entries:
+        written["dimensions"] = dimensions
+    for point, raw in (written.get("clearances") or {}).items():
+        if point in changed:
+            written["clearances"][point] = _clearance(raw, section.clearances[point], *changed[point])
+    return data
+
+
+def _dimension(raw: Any, tolerance: Tolerance, scale: float, study: Study) -> Any:
+    size = _number(tolerance.given * scale)
+    if isinstance(raw, dict) and raw.get("sigma") is not None:
+        return {**raw, "sigma": size}
+    width = raw["tolerance"] if isinstance(raw, dict) else raw
+    new: Any = size
+    grade = tolerance.grade(scale).replace("IT", "js")
+    if grade and not tolerance.middle and grade not in study.parameters.nominal:
+        new = grade
+    elif isinstance(width, list) or tolerance.middle:
+        new = [_number(tolerance.middle - size, 12), _number(tolerance.middle + size, 12)]
+    # A study gives a leg only beside a tolerance class, which a number replaces.
+    return {**{key: raw[key] for key in raw if key != "leg"}, "tolerance": new} if isinstance(raw, dict) else new
+
+
+def _clearance(raw: dict[str, Any], clearance: Clearance, tolerance: Tolerance, scale: float) -> dict[str, Any]:
+    """A clearance with its radius or diameter times a factor, and the tolerance of that in proportion."""
+    key = "radial" if clearance.radial is not None else "diametral"
+    size = clearance.radius if clearance.radial is not None else 2.0 * clearance.radius
+    new = {**raw, key: _number(size * scale)}
+    if isinstance(raw.get("tolerance"), list):
+        new["tolerance"] = [_number(scale * end, 12) for end in clearance.tolerance]
+    elif raw.get("tolerance") is not None and clearance.tolerance[1]:
+        new["tolerance"] = _number(scale * clearance.tolerance[1], 12)
+    return new
+
+
+def _number(value: float, digits: int = DIGITS) -> float:
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,267 @@
+"""Joint density of two errors of made mechanisms: regions of given shares beside ellipses, and surfaces [S2]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, Rectangle
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.reliability.figures.looks import Sampled, heading, look
+from mechdesign.questions.reliability.simulation import CELLS, REACH
+from mechdesign.report.figures import style
+from mechdesign.report.figures.panels import title
+from mechdesign.report.figures.shapes import lighter
+
+# Shares of the made mechanisms that an ellipse or a region holds, with the ellipses' dashes and the regions' tints.
+SHARES = (0.5, 0.9, 0.997)
+_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
+_TINTS = (0.3, 0.55, 0.78)
+# A region is drawn if at least this many samples lie outside it: with fewer its edge is random.
+_FEWEST_OUTSIDE = 30
+# Of the net that samples are counted on before they are smoothed: half width, in deviations, and cells a side.
+_NET_REACH = 5.5
+_NET_CELLS = 165
+MAX_MARKS = 600
+# A limit farther out than this, in reaches of the errors, is named and not drawn.
+_FAR_FROM_ERRORS = 5.0
+# Inches.
+_LEFT = 0.88
+_LEGEND = 2.75
+_LEGEND_ROW = 0.19
+_TOP = 0.75
+_BELOW = 0.6
+_MIN_HEIGHT = 2.6
+_MAX_HEIGHT = 5.6
+_BEYOND = "#FBEDE4"  # where a limit is broken
+Ends = tuple[float, float]
+
+
+def density_figures(given: Sampled) -> dict[str, Figure]:
+    """``density_contours``, in the errors' units, and ``density``: both densities as surfaces [S2, Fig. 5]."""
+    assert given.samples.pair is not None
+    labels = [
+        style.axis_label(f"{heading(given.samples.outputs[k], given.samples.orders[k])} error", given.samples.units[k])
+        for k in given.samples.pair
+    ]
+    return {"density_contours": _contours(given, labels), "density": _surfaces(given, labels)}
+
+
+def _contours(given: Sampled, labels: list[str]) -> Figure:
+    """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
+    samples = given.samples
+    pair = list(samples.pair or ())
+    errors, units = samples.errors[pair], samples.units[pair]
+    ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
+    limits = _Limits.of(given, ellipses[-1])
+    alike = bool(units[0] == units[1])
+    failed = ~samples.kept
+    across, up, tall = _view([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
+    figure, (axes,) = style.page(1, 1, tall, left=_LEFT, right=_beside(), top=_TOP, bottom=_BELOW)
+    axes.set(xlim=across, ylim=up, xlabel=labels[0], ylabel=labels[1])
+    axes.locator_params(nbins=4 if style.narrow() else 7)
+    if alike:
+        axes.set_aspect("equal")
+    entries: dict[str, Any] = limits.draw(axes)
+    region, method = smoothed(errors), look(given.method).words
+    if region is not None:
+        colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
+        levels = [*region.levels[::-1], 1.01 * region.density.max()]
+        axes.contourf(region.x, region.y, region.density, levels, colors=colors[::-1], zorder=1.5)
+        entries |= {f"{method}: holds {_percent(share)}": Patch(color=color)
+                    for share, color in zip(SHARES, colors, strict=False)}  # fmt: skip
+    for share, dashes, ellipse in zip(SHARES, _DASHES, ellipses, strict=True):
+        (entries[f"first order: holds {_percent(share)}"],) = axes.plot(
+            *ellipse, color=style.INK, linestyle=dashes, linewidth=1.2, zorder=2.5
+        )
+    outside = ~failed if region is None else region.outside & ~failed
+    marks: dict[str, tuple[Floats, dict[str, Any]]] = {
+        "other samples" if region else "samples": (errors[:, outside], {"marker": ".", "ms": 3, "color": style.FAINT}),
+        "samples that fail": (errors[:, failed], {"marker": "x", "ms": 4, "color": style.VERMILION, "zorder": 2.7}),
+        "no error": (np.zeros((2, 1)), {"marker": "+", "ms": 11, "mew": 1.8, "color": style.INK, "zorder": 3}),
+    }
+    for words, (places, mark) in marks.items():
+        if places.size:
+            (entries[words],) = axes.plot(*places[:, :MAX_MARKS], linestyle="none", **mark)
+    count = f"{samples.errors.shape[1]:,} samples"
+    if limits.words:
+        count += f", {(number := int(failed.sum())):,} of them fail" + f" ({MAX_MARKS} marked)" * (number > MAX_MARKS)
+    note = f"{method}: {count}" + (f", smoothed over {region.width:.2f} of their deviation" if region else "")
+    note += "; " * bool(limits.far) + limits.far
+    title(figure, f"Two errors of made mechanisms {given.where}", note, left=_LEFT)
+    place: dict[str, Any]
+    if style.narrow():
+        style.grow(figure, below=_LEGEND_ROW * len(entries))
+        place = {"loc": "lower left", "bbox_to_anchor": (_LEFT / style.width(), 0.01)}
+    else:
+        right_of = 1 - (_LEGEND - 0.1) / style.width(), axes.get_position().y1
+        place = {"loc": "upper left", "bbox_to_anchor": right_of}
+    figure.legend(entries.values(), entries, borderaxespad=0.0, **place)
+    return figure
+
+
+def _beside() -> float:
+    """Inches at the right of the panel: on a wide page of the legend."""
+    return 0.15 if style.narrow() else _LEGEND
+
+
+def _ellipse(mean: Floats, covariance: Floats, share: float) -> Floats:
+    """Ellipse that holds a share of a bivariate normal law, of radius sqrt(-2 ln(1 - share)), shape (2, points)."""
+    values, vectors = np.linalg.eigh(covariance)
+    turn = np.linspace(0.0, 2 * np.pi, 181)
+    axes = vectors * np.sqrt(np.maximum(values, 0.0) * -2 * np.log1p(-share))
+    return np.asarray(mean[:, None] + axes @ np.stack([np.cos(turn), np.sin(turn)]))
+
+
+class Region(NamedTuple):
+    """A smoothed density on a net of places, its levels that hold `SHARES`, and which samples lie outside all."""
+
+    x: Floats
+    y: Floats
+    density: Floats
+    levels: list[float]
+    outside: Flags
+    width: float
+
+
+def smoothed(errors: Floats) -> Region | None:
+    """Density of errors, shape (2, n), by a normal kernel of Scott's width n^(-1/6) deviations; None of too few.
+
+    A level is the density that a share of the samples lies above, at their own places.
+    """
+    count = errors.shape[1]
+    shares = [share for share in SHARES if (1 - share) * count >= _FEWEST_OUTSIDE]
+    if not shares:
+        return None
+    values, vectors = np.linalg.eigh(np.cov(errors))
+    if values[0] <= 1e-12 * values[1]:
+        return None
+    mean, axes = errors.mean(axis=1), vectors * np.sqrt(values)
+    own = np.linalg.solve(axes, errors - mean[:, None])
+    centres = ((np.arange(_NET_CELLS) + 0.5) / _NET_CELLS * 2 - 1) * _NET_REACH
+    width = count ** (-1 / 6)
+    kernel = np.exp(-0.5 * (np.subtract.outer(centres, centres) / width) ** 2)
+    cells = np.clip((own / _NET_REACH + 1) / 2 * _NET_CELLS, 0, _NET_CELLS - 1).astype(np.intp)
+    counts = np.zeros((_NET_CELLS, _NET_CELLS))
+    np.add.at(counts, tuple(cells), 1.0)
+    density = kernel @ counts @ kernel
+    at = density[cells[0], cells[1]]
+    levels = [float(level) for level in np.quantile(at, [1 - share for share in shares])]
+    net = np.stack(np.meshgrid(centres, centres, indexing="ij"))
+    x, y = mean[:, None, None] + np.tensordot(axes, net, axes=1)
+    return Region(x, y, density, levels, at < levels[-1], width)
+
+
+class _Limits(NamedTuple):
+    """The limits of two errors: a circle or a band for each; what of them is near enough to be drawn, and in words."""
+
+    radius: float | None
+    bands: tuple[Ends, Ends]
+    near: Floats
+    words: str
+    far: str
+
+    @classmethod
+    def of(cls, given: Sampled, outermost: Floats) -> _Limits:
+        samples = given.samples
+        assert samples.pair is not None
+        pair = samples.pair
+        unit = samples.units[pair[0]]
+        reach = np.abs(outermost).max(axis=1)
+        if samples.discs:
+            radius = samples.discs[0][2]
+            words, shown = (
+                f"limit: {radius:g} {unit}".rstrip() + " from no error",
+                radius < _FAR_FROM_ERRORS * reach.max(),
+            )
+            near = radius * np.array([[-1, 1], [-1, 1]]) if shown else np.empty((2, 0))
+            return cls(radius, ((-np.inf, np.inf),) * 2, near, words, "" if shown else f"{words}, outside")
+        known = {channel: (low, high) for channel, low, high in samples.bands}
+        bands = tuple(known.get(channel, (-np.inf, np.inf)) for channel in pair)
+        near, far = np.zeros((2, 4)), []
+        for k, (ends, channel) in enumerate(zip(bands, pair, strict=True)):
+            for place, end in enumerate(ends):
+                if np.isfinite(end) and abs(end) < _FAR_FROM_ERRORS * reach[k]:
+                    near[k, 2 * k + place] = end
+                elif np.isfinite(end):
+                    far.append(f"{end:+g} {samples.units[channel]} of {samples.outputs[channel]}")
+        return cls(None, (bands[0], bands[1]), near, "limits" if known else "",
+                   f"limits outside: {', '.join(far)}" if far else "")  # fmt: skip
+
+    def draw(self, axes: Axes) -> dict[str, Patch]:
+        """Draw the limit as a line, and tint what lies beyond it; returns it by its words."""
+        if not self.near.any():
+            return {}
+        axes.set_facecolor(_BEYOND)
+        # The sides of what is open, or far, lie outside the picture.
+        (left, right), (low, high) = (
+            np.clip(ends, 2 * seen[0] - seen[1], 2 * seen[1] - seen[0]).tolist()
+            for ends, seen in zip(self.bands, (axes.get_xlim(), axes.get_ylim()), strict=True)
+        )
+        looks: tuple[dict[str, Any], ...] = (
+            {"facecolor": "white", "zorder": 0.4},
+            {"fill": False, "edgecolor": style.VERMILION, "linewidth": 1.8, "zorder": 2.6},
+        )
+        for drawn in looks:
+            inside = axes.add_patch(
+                Rectangle((left, low), right - left, high - low, **drawn)
+                if self.radius is None
+                else Circle((0.0, 0.0), self.radius, **drawn)
+            )
+        return {self.words: inside}
+
+
+def _view(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends, float]:
+    """Ranges of the axes that show places of shape (2, n) and no error, and the height (inches) that suits them."""
+    places = np.concatenate([np.zeros((2, 1)), *parts], axis=1)
+    low, high = places.min(axis=1), places.max(axis=1)
+    middle, span = (low + high) / 2, 1.08 * (high - low)
+    wide = style.width() - _LEFT - _beside()
+    tall = float(np.clip(wide * span[1] / span[0], _MIN_HEIGHT, _MAX_HEIGHT)) if alike else 0.9 * wide
+    if alike:
+        span = max(span[0] / wide, span[1] / tall) * np.array([wide, tall])
+    (left, bottom), (right, top) = middle - span / 2, middle + span / 2
+    return (left, right), (bottom, top), tall
+
+
+def _surfaces(given: Sampled, labels: list[str]) -> Figure:
+    """Both densities over the cells of the density's table [S2, Fig. 5]."""
+    samples, table = given.samples, given.tables["density"].take(given.rows("density"))
+    shape = (2, 1) if style.narrow() else (1, 2)
+    figure = style.new_figure(1.0 + 3.2 * shape[0], layout=None)
+    figure.subplots_adjust(
+        left=0.02, right=0.82 if style.narrow() else 0.92, bottom=0.08, top=0.8, wspace=0.15, hspace=0.3
+    )
+    x, y = (
+        (samples.mean[k] + np.sqrt(samples.covariance[k, k]) * table[axis]).reshape(CELLS, CELLS)
+        for k, axis in zip(samples.pair or (), "xy", strict=True)
+    )
+    densities = {
+        "bivariate normal, first order": table["normal"].reshape(CELLS, CELLS),
+        f"simulation ({look(given.method).words})": table["simulated"].reshape(CELLS, CELLS),
+    }
+    top = max(density.max() for density in densities.values())
+    panels = figure.subplots(*shape, subplot_kw={"projection": "3d"})
+    for axes, (name, density) in zip(panels, densities.items(), strict=True):
+        axes.plot_surface(
+            x, y, density, rstride=1, cstride=1, cmap=style.COLORMAP, edgecolor=style.INK, linewidth=0.25, vmax=top
+        )
+        axes.set_title(name, fontsize=10)
+        axes.set_zlim(0, top)
+        axes.set_xlabel(labels[0], labelpad=6)
+        axes.set_ylabel(labels[1], labelpad=6)
+        axes.set_zlabel("density of standardised errors", labelpad=4)
+        axes.tick_params(labelsize=7)
+        axes.locator_params(nbins=5)
+        axes.view_init(elev=28, azim=-60)
+    note = f"{CELLS} x {CELLS} cells within {REACH:g} standard deviations of the mean, samples as counted"
+    title(figure, f"Density of two errors {given.where}", note, left=_LEFT)
+    return figure
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:g} %"

@@ -1,0 +1,118 @@
+"""How each method is drawn, the same in every picture, and what its rows of a table are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.first_order import ORDERS
+from mechdesign.questions.reliability.schema.limits import SUFFIXES as ORDER_SUFFIXES
+from mechdesign.questions.reliability.schema.methods import METHODS, Method
+from mechdesign.questions.reliability.tables import Samples
+from mechdesign.report.figures import style
+from mechdesign.results import Table
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
+
+
+def look(name: str) -> Method:
+    """A method with its colour as Matplotlib knows it; what is sampled is drawn as dots, without a line."""
+    return replace(METHODS[name], color=getattr(style, METHODS[name].color))
+
+
+class Sampled(NamedTuple):
+    """What the pictures of samples show: the tables of a method, and its samples at one of the poses."""
+
+    study: Study
+    tables: Mapping[str, Table]
+    method: str
+    samples: Samples
+    poses: Poses
+
+    @property
+    def where(self) -> str:
+        """The pose in words, and among several why it is shown."""
+        limited = self.samples.bands or self.samples.discs
+        in_words = followed_in_words if limited else pose_in_words
+        return f"at {in_words(self.study, self.poses, self.samples.pose)}"
+
+    def rows(self, table: str) -> Flags:
+        """Rows of a table that are about this pose."""
+        matching = np.ones(len(self.tables[table]), dtype=bool)
+        for name, values in self.poses.values.items():
+            column, value = self.tables[table][name], values[self.samples.pose]
+            matching &= (column == value) | (np.isnan(column) & np.isnan(value))
+        return matching
+
+
+def followed_in_words(study: Study, poses: Poses, pose: int) -> str:
+    """The pose whose samples are shown, in words, and that it fails most unless the study chose it."""
+    chosen = study.reliability is not None and study.reliability.shown is not None
+    return "the pose that fails most, " * (poses.count > 1 and not chosen) + pose_in_words(study, poses, pose)
+
+
+def methods(table: Table) -> list[str]:
+    """Methods of a table, in the order in which they are drawn: what is computed below what is sampled."""
+    present = set(table["method"].tolist())
+    return sorted((name for name in METHODS if name in present), key=lambda name: METHODS[name].sampled)
+
+
+def best_probability(table: Table) -> str:
+    """The method whose probabilities stand where there is room for one only."""
+    return max(methods(table), key=lambda name: METHODS[name].accuracy)
+
+
+def best_moments(table: Table) -> str:
+    """The method whose moments stand where there is room for one only; those that end early have fewer samples."""
+
+    def rank(name: str) -> tuple[bool, bool, int]:
+        method = METHODS[name]
+        return method.errors, not method.precise, method.accuracy
+
+    return max(methods(table), key=rank)
+
+
+def channels(table: Table) -> list[tuple[str, str, str]]:
+    """Output, order and unit of each quantity of a table, positions first."""
+    quantities = dict.fromkeys(
+        zip(table["output"].tolist(), table["order"].tolist(), table["unit"].tolist(), strict=True)
+    )
+    return sorted(quantities, key=lambda channel: list(SUFFIXES).index(channel[1]))
+
+
+def heading(output: str, order: str) -> str:
+    """An output by its name, its velocity as such."""
+    return output if order == "position" else f"{output} {order}"
+
+
+def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: str) -> Floats:
+    """Lowest and highest error allowed (study units) of a coordinate, or by the circle about its point; inf if none.
+
+    Shape (2, poses), or (2, 1) where they are those of all poses.
+    """
+    section = study.reliability
+    assert section is not None
+    band = section.limits.get(f"{output}{SUFFIXES[order]}")
+    if band is not None and band.absolute:
+        table = tables["capability"]
+        own = table.take(table.where(output=output, order=order, method=table["method"][0]))
+        ends = np.stack([own["lsl"], own["usl"]]) - own["nominal"]
+        return np.where(np.isnan(ends), [[-np.inf], [np.inf]], ends)
+    if band is not None:
+        return np.array([[-np.inf if band.min is None else band.min], [np.inf if band.max is None else band.max]])
+    circle = section.limits.get(f"{output.rpartition('.')[0]}{SUFFIXES[order]}")
+    radius = np.inf if circle is None or circle.radius is None else circle.radius
+    return np.array([[-radius], [radius]])
+
+
+def apart(limits: tuple[float, float], low: float, high: float) -> tuple[list[float], list[float]]:
+    """Finite limits between two ends, and those beyond them."""
+    known = [limit for limit in limits if np.isfinite(limit)]
+    return [limit for limit in known if low < limit < high], [limit for limit in known if not low < limit < high]

@@ -1,0 +1,265 @@
+"""First-order errors: sensitivities of position, velocity and acceleration, their moments and worst cases [S2, S3].
+
+Var(output) = sum over sources of (d output / d source)^2 Var(source)          [S3, eqs. 12-14]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.expressions import Number
+from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.margins import closures
+from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.kinematics.rates import DriveRates
+from mechdesign.questions.reliability.deflection import Elastic
+from mechdesign.questions.reliability.question import Channel
+from mechdesign.questions.reliability.schema.variation import LOADS
+from mechdesign.questions.reliability.sources import Pin, Sources
+
+ORDERS = ("position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrder:
+    """Linear error model at a batch of poses.
+
+    Parameters
+    ----------
+    components : ndarray, shape (channels, components, poses)
+        Derivative of each channel (radians, lengths) by each independent component of the sources.
+    offset : ndarray, shape (channels, poses)
+        Values where no source deviates: deflections under the mean load, or the nominal margins of assembly.
+    """
+
+    sources: Sources
+    components: Floats
+    offset: Floats
+
+    @staticmethod
+    def unknown(sources: Sources, channels: int, poses: int) -> FirstOrder:
+        """A model with components of nan, to be filled in."""
+        count = sum(len(source.directions) for source in sources.all)
+        return FirstOrder(sources, np.full((channels, count, poses), np.nan), np.zeros((channels, poses)))
+
+    @cached_property
+    def owner(self) -> Ints:
+        """Index of the source of each component, shape (components,)."""
+        return np.repeat(np.arange(len(self.sources.all)), [len(source.directions) for source in self.sources.all])
+
+    def take(self, poses: Sequence[int] | Ints) -> FirstOrder:
+        """The model at these poses."""
+        return replace(
+            self, sources=self.sources.take(poses), components=self.components[:, :, poses],
+            offset=self.offset[:, poses],
+        )  # fmt: skip
+
+    @cached_property
+    def _spread(self) -> tuple[Floats, Floats]:
+        """Mean and variance of each component, shape (components, poses); (components, 1) where poses do not differ."""
+        spreads = [source.spread for source in self.sources.all]
+        mean, variance = (_rows([spread[k] for spread in spreads])[self.owner] for k in (0, 1))
+        return mean, variance
+
+    @cached_property
+    def _ends(self) -> tuple[Floats, Floats]:
+        """Lowest and highest deviation of each source, shape (sources, poses) or (sources, 1)."""
+        low, high = zip(*(source.ends for source in self.sources.all), strict=True)
+        return _rows(low), _rows(high)
+
+    @cached_property
+    def _weighted(self) -> Floats:
+        """Covariance of each component with the channels, in the shape of `components`."""
+        variance, correlation = self._spread[1], self.sources.correlated()
+        if correlation is None:
+            return np.asarray(variance * self.components)
+        sigma = np.sqrt(variance)
+        if correlation.ndim == 2:
+            return np.asarray(sigma * (correlation @ (sigma * self.components)))
+        return np.asarray(sigma * np.einsum("pzy,cyp->czp", correlation, sigma * self.components))
+
+    def beside(self, other: FirstOrder) -> FirstOrder:
+        """A model with the channels of both."""
+        return replace(
+            self, components=np.concatenate([self.components, other.components]),
+            offset=np.concatenate([self.offset, other.offset]),
+        )  # fmt: skip
+
+    def covariance(self) -> Floats:
+        """Covariance of the channels, shape (poses, channels, channels) [S2, eq. 9]."""
+        return np.asarray(np.moveaxis(self.components, 2, 0) @ np.moveaxis(self._weighted, 2, 0).swapaxes(1, 2))
+
+    def deviation(self) -> Floats:
+        """Standard deviation of each channel, shape (channels, poses)."""
+        return np.asarray(np.sqrt(np.maximum(np.einsum("czp,czp->cp", self.components, self._weighted), 0.0)))
+
+    def shift(self) -> Floats:
+        """Mean error of each channel, shape (channels, poses): deflections, and tolerances that are not symmetric."""
+        return np.asarray((self._spread[0] * self.components).sum(axis=1) + self.offset)
+
+    def distance(self) -> Floats:
+        """Mean of each channel in standard deviations, shape (channels, poses); infinite where it is nan."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.nan_to_num(self.shift() / self.deviation(), nan=np.inf, posinf=np.inf, neginf=-np.inf)
+
+    @cached_property
+    def sensitivity(self) -> Floats:
+        """Derivative by each source, shape (channels, sources, poses); for a clearance sqrt(s_x^2 + s_y^2)."""
+        parts = [self.components[:, self.owner == k] for k in range(len(self.sources.all))]
+        return np.stack([part[:, 0] if part.shape[1] == 1 else np.linalg.norm(part, axis=1) for part in parts], axis=1)
+
+    @cached_property
+    def _steepest(self) -> Floats:
+        """As `sensitivity`, but for a slider the sum over its two ends, which may both be at their worst."""
+        steepest = self.sensitivity.copy()
+        for k, source in enumerate(self.sources.all):
+            if isinstance(source, Pin) and source.kind == "slide":
+                steepest[:, k] = np.abs(self.components[:, self.owner == k]).sum(axis=1)
+        return steepest
+
+    def share(self) -> Floats:
+        """Share of each source in the variance, shape (channels, sources, poses); nan where nothing varies.
+
+        The share of a correlated source is its covariance with the error, which may be negative.
+        """
+        products = self.components * self._weighted
+        parts = np.stack([products[:, self.owner == k].sum(axis=1) for k in range(len(self.sources.all))], axis=1)
+        total = parts.sum(axis=1, keepdims=True)
+        return np.asarray(np.divide(parts, total, out=np.full_like(parts, np.nan), where=total > 0))
+
+    def worst_case(self) -> Floats:
+        """Sum of |sensitivity| times the larger end of the tolerance, shape (channels, poses)."""
+        reach = np.maximum(*map(np.abs, self._ends))
+        return np.asarray((np.abs(self._steepest) * reach).sum(axis=1))
+
+    def worst_ends(self) -> tuple[Floats, Floats]:
+        """Lowest and highest error with all sources at the worst ends of their tolerances, shape (channels, poses)."""
+        low, high = (self._steepest * ends for ends in self._ends)
+        return np.minimum(low, high).sum(axis=1) + self.offset, np.maximum(low, high).sum(axis=1) + self.offset
+
+
+def correlation(covariance: Floats) -> Floats:
+    """Correlation of two errors from their covariance, (..., 2, 2); nan if one is constant [inverse of S2, eq. 11]."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        product = np.sqrt(covariance[..., 0, 0] * covariance[..., 1, 1])
+        return np.asarray(np.where(product > 0, covariance[..., 0, 1] / product, np.nan))
+
+
+def nominal_values(
+    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: DriveRates
+) -> list[Value]:
+    """Values of the channels at solved configurations (radians, lengths)."""
+    orders = {channel.order for channel in channels}
+    velocity = acceleration = None
+    if orders - {0}:
+        linear = mechanism.linearize(configuration)
+        velocity = linear.velocity(rates.velocities)
+        acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
+    values = []
+    for channel in channels:
+        if velocity is None or channel.order == 0:
+            values.append(configuration.value(channel.coordinate))
+        elif acceleration is None or channel.order == 1:
+            values.append(first(configuration, channel.coordinate, velocity))
+        else:
+            values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
+    return values
+
+
+def derivatives(
+    mechanism: Mechanism,
+    configuration: Configuration,
+    channels: Sequence[Channel],
+    names: Sequence[str],
+    rates: DriveRates,
+    elastic: Elastic | None = None,
+) -> Floats:
+    """Derivative of each channel by places, drives and loads, shape (channels, names, n), at a flat batch.
+
+    `elastic` has these configurations, or the single nominal pose of all of them.
+
+    Raises
+    ------
+    MechanismError
+        For the acceleration of a measure that is an expression.
+    """
+    # If only loads vary, the batch is the single nominal mechanism.
+    slopes = np.zeros((len(channels), len(names), *(configuration.shape or (1,))))
+    for row, name in enumerate(names):
+        if elastic is not None and name in LOADS:
+            slopes[:, row] = elastic.flexibility[:, list(LOADS).index(name)]
+    rows = [row for row, name in enumerate(names) if name not in LOADS]
+    if not rows:
+        return slopes
+    names = [names[row] for row in rows]
+    linear = mechanism.linearize(configuration)
+    position = linear.sensitivity(names)
+    if any(channel.order for channel in channels):
+        velocity = linear.velocity(rates.velocities)
+        acceleration = linear.acceleration(velocity, rates.accelerations)
+        velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
+    for row, channel in zip(slopes, channels, strict=True):
+        if channel.order == 0:
+            row[rows] = first(configuration, channel.coordinate, position)
+        elif channel.order == 1:
+            row[rows] = second(configuration, channel.coordinate, velocity, position, velocity_z)
+        else:
+            row[rows] = acceleration_sensitivity(
+                configuration, channel.coordinate, velocity, acceleration, position, velocity_z, acceleration_z
+            )
+    return slopes
+
+
+def linear_errors(
+    mechanism: Mechanism,
+    configuration: Configuration,
+    channels: Sequence[Channel],
+    sources: Sources,
+    rates: DriveRates,
+    elastic: Elastic | None = None,
+) -> FirstOrder:
+    """Linear error model at a flat batch of nominal configurations with fixed drives; raises as `derivatives`."""
+    names, slopes = _directions(sources)
+    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
+    offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
+    return FirstOrder(sources, _chained(slopes, by_name), offset)
+
+
+def linear_margins(mechanism: Mechanism, configuration: Configuration, sources: Sources) -> FirstOrder:
+    """Linear model of the margins of assembly at a flat batch of nominal configurations with fixed drives.
+
+    A made mechanism with a negative margin cannot be assembled.
+    """
+    names, slopes = _directions(sources)
+    moved = [k for k, name in enumerate(names) if name not in LOADS]
+    margins, by_name = closures(mechanism.linearize(configuration), [names[k] for k in moved])
+    return FirstOrder(sources, _chained(slopes[:, moved], by_name), margins)
+
+
+def _directions(sources: Sources) -> tuple[list[str], Floats]:
+    """Names of places, drives and loads, and their derivatives by the sources' components, shape (components, names).
+
+    Of shape (components, names, poses) where poses differ in them.
+    """
+    directions = [direction for source in sources.all for direction in source.directions]
+    names = list(dict.fromkeys(name for direction in directions for name in direction))
+    slopes = np.stack(np.broadcast_arrays(*(direction.get(name, 0.0) for direction in directions for name in names)))
+    return names, slopes.reshape(len(directions), len(names), *slopes.shape[1:])
+
+
+def _chained(slopes: Floats, by_name: Floats) -> Floats:
+    """Derivatives by components from those by names, (channels, names, poses), and the slopes of `_directions`."""
+    if slopes.ndim == 2:
+        return np.asarray(slopes @ by_name)
+    return np.asarray(np.einsum("znp,cnp->czp", slopes, by_name))
+
+
+def _rows(values: Sequence[Number]) -> Floats:
+    """Numbers as rows of an array, shape (numbers, poses), or (numbers, 1) where poses do not differ."""
+    return np.stack(np.broadcast_arrays(*map(np.atleast_1d, values)))

@@ -1,0 +1,205 @@
+"""Warnings about the results of the methods of reliability, and about how far they can be trusted."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.questions.reliability.engine.problem import WIDTH, Estimate, reached
+from mechdesign.questions.reliability.methods.auto import FACTOR, disagree
+from mechdesign.questions.reliability.schema.methods import METHODS
+from mechdesign.questions.reliability.task import MethodResult, Task
+
+# Distance of a dead centre, in standard deviations of its margin, up to which there is a warning (1 in a million).
+_NEAR = 4.75
+
+
+def method_warnings(found: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings about the results of the methods."""
+    return [
+        *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
+        *_pointless(found, task), *_not_assembled(found, task), *_unassembled(found), *_of_cycles(found, task),
+    ]  # fmt: skip
+
+
+def _outside(task: Task) -> list[Caution]:
+    """Warnings of nominal values outside their own limits, each at its farthest pose."""
+    found = []
+    for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
+        beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
+        poses = np.flatnonzero(beyond > 0)
+        if not len(poses):
+            continue
+        pose, scale, unit = int(np.argmax(beyond)), task.scale[band.output], task.labels[2][band.output]
+        value = scale * task.nominal[band.output, pose]
+        low, high = (value + scale * end[pose] for end in np.broadcast_arrays(band.low, band.high))
+        between = f"{low:.6g} to {high:.6g}"
+        if not np.isfinite(low) or not np.isfinite(high):
+            between = f"at least {low:.6g}" if np.isfinite(low) else f"at most {high:.6g}"
+        several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
+        found.append(Caution(
+            "suspect",
+            f"{task.question.channels[band.output].name}: the nominal value {value:.6g} at {task.where(pose)}{several} "
+            f"lies outside its limits, {between}{f' {unit}' if unit else ''}",
+            pose=task.where(pose),
+        ))  # fmt: skip
+    return found
+
+
+def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of pairs of methods whose intervals are more than `FACTOR` apart, each at its worst pose."""
+    apart: dict[tuple[str, str], list[tuple[float, int, Estimate, Estimate]]] = {}
+    for pose in range(task.poses.count):
+        estimates: dict[str, Estimate] = {}
+        for result in results:
+            for rung, estimate in result.rungs.get(pose, {}).items():
+                estimates.setdefault(rung, estimate)
+            if pose in result.estimates and not result.rungs:
+                estimates[result.method] = result.estimates[pose]
+        for pair in itertools.combinations(estimates, 2):
+            one, other = (estimates[name] for name in pair)
+            times = disagree(one, other)
+            if times > FACTOR:
+                apart.setdefault(pair, []).append((times, pose, one, other))
+    warnings = []
+    for (name, second), cases in apart.items():
+        factor, pose, one, other = max(cases, key=lambda case: case[0])
+        times_apart = f"{factor:.3g} times" if factor < 1e6 else "many orders of magnitude"
+        several = task.poses.count > 1
+        others = f" (at {len(cases)} of {task.poses.count} poses; here they are farthest)" if several else ""
+        warnings.append(Caution(
+            "disagree",
+            f"{name} and {second} disagree at {task.where(pose)}: the probability of failure is {one.failure:.3g} by "
+            f"the one and {other.failure:.3g} by the other, {times_apart} apart{others}",
+            "reliability", pose=task.where(pose),
+        ))  # fmt: skip
+    return warnings
+
+
+def _unseen(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of methods without a failed sample, with the upper end of the interval."""
+    cases = []
+    for result in results:
+        poses = {pose: e for pose, e in result.estimates.items() if e.samples and not e.failures}
+        if poses:
+            pose, widest = max(poses.items(), key=lambda item: item[1].high)
+            where = f"at {task.where(pose)}" if len(poses) == 1 else f"at {len(poses)} poses"
+            cases.append((result.method, widest, "samples", where))
+        if result.cycle is not None and result.cycle.samples and not result.cycle.failures:
+            cases.append((result.method, result.cycle, "made mechanisms", "over the whole cycle"))
+    return [
+        Caution(
+            "unconverged",
+            f"{method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
+            f"{estimate.high:.2g}",
+            "reliability",
+        )
+        for method, estimate, what, where in cases
+    ]
+
+
+def _unreached(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `auto` ended before its precision, with the worst pose and the precision reached there."""
+    precision = task.precision
+    short: dict[int, float] = {}
+    for result in results:
+        for pose in result.rungs:
+            estimate = result.estimates[pose]
+            # `_unseen` warns where no sample failed.
+            if estimate.failures and not reached(precision, estimate.failure, estimate.low, estimate.high):
+                half = 0.5 * (estimate.high - estimate.low)
+                short[pose] = half / (WIDTH * estimate.failure) if precision.half_width is None else half
+    if not short:
+        return []
+    pose = max(short, key=short.__getitem__)
+    if precision.half_width is None:
+        asked, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
+        what = "the coefficient of variation"
+    else:
+        asked, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+        what = "half the interval"
+    others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
+    return [Caution(
+        "unconverged",
+        f"auto: {what} is {there} at {task.where(pose)}{others}, not the {asked} asked; it ends at {task.most} "
+        "samples, which reliability.samples sets",
+        "reliability", pose=task.where(pose),
+    )]  # fmt: skip
+
+
+def _pointless(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning where `form` found no design point although samples break limits."""
+    unknown = [pose for result in results if result.method == "form"
+               for pose, estimate in result.estimates.items() if math.isnan(estimate.failure)]  # fmt: skip
+    if not unknown:
+        return []
+    others = f" and at {len(unknown) - 1} more poses" if len(unknown) > 1 else ""
+    return [Caution(
+        "unconverged",
+        f"form: samples break a limit at {task.where(unknown[0])}{others}, but no design point was found: it has no "
+        "probability there; trust the samples",
+        "reliability", pose=task.where(unknown[0]),
+    )]  # fmt: skip
+
+
+def _not_assembled(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """A warning of dead centres near the nominal pose, to the first order, for methods that draw no mechanisms."""
+    names = ", ".join(result.method for result in results if result.normal is not None)
+    distance = task.closing.distance().min(axis=0, initial=math.inf)
+    poses = np.flatnonzero(distance < _NEAR)
+    if not names or not len(poses):
+        return []
+    pose = int(np.argmin(distance))
+    share = 50.0 * math.erfc(float(distance[pose]) / math.sqrt(2.0))
+    several = f" (the worst of {len(poses)} poses)" if len(poses) > 1 else ""
+    return [Caution(
+        "unassembled",
+        f"{names}: {share:.2g} % of the made mechanisms cannot be assembled at {task.where(pose)}{several}, "
+        "by the first order of the margin to a dead centre; they count as failures, and near a dead centre errors are "
+        "not normal: compare with form or monte_carlo",
+        pose=task.where(pose),
+    )]  # fmt: skip
+
+
+def _unassembled(results: Sequence[MethodResult]) -> list[Caution]:
+    """Warnings of importance samples, drawn about the limits, that cannot be assembled."""
+    warnings = []
+    for result in results:
+        used = [(METHODS[result.used.get(pose, result.method)], e) for pose, e in result.estimates.items()]
+        drawn = [e for method, e in used if e.invalid and method.sampled and not method.errors]
+        if drawn:
+            invalid, samples = sum(part.invalid for part in drawn), sum(part.samples for part in drawn)
+            warnings.append(Caution(
+                "unassembled",
+                f"{result.method}: {invalid} of {samples} samples drawn about the limits cannot be assembled; they "
+                "count as failures",
+            ))  # fmt: skip
+    return warnings
+
+
+def _of_cycles(results: Sequence[MethodResult], task: Task) -> list[Caution]:
+    """Warnings of cycles that cannot be assembled at some pose, and where `auto` ended before its precision."""
+    warnings = []
+    simulated = {part.method: part.cycle for part in results if part.cycle is not None and part.cycle.samples}
+    first = next(iter(simulated.values()), None)
+    if first is not None and first.invalid:
+        warnings.append(Caution(
+            "unassembled",
+            f"{first.invalid} of {first.samples} made mechanisms cannot be assembled at some pose of the cycle; "
+            "they count as failures",
+        ))  # fmt: skip
+    return warnings + [
+        Caution(
+            "unconverged",
+            f"{method}: half the interval of the whole cycle is {0.5 * (last.high - last.low):.3g} at "
+            f"{last.failure:.3g}, not as precise as asked; it ends at {last.samples} made mechanisms, which "
+            "reliability.samples sets",
+            "reliability",
+        )
+        for method, last in simulated.items()
+        if METHODS[method].precise and last.failures and not reached(task.precision, last.failure, last.low, last.high)
+    ]

@@ -1,0 +1,245 @@
+"""The channels and limits of a reliability section: outputs by order, and the limits on their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.algebra import TURN
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.outputs import default_outputs, expand_outputs
+from mechdesign.questions.poses import radians
+from mechdesign.questions.reliability.laws import at_rows
+from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
+from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
+from mechdesign.study import Study
+from mechdesign.study.text import fields
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One quantity whose error is computed: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
+
+    coordinate: Coordinate
+    order: int
+
+    @property
+    def name(self) -> str:
+        """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
+        return self.coordinate.name + SUFFIXES[self.order]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Limits low <= error <= high of the channel with the index `output`; either may be infinite, or an array of poses.
+
+    If `absolute`, they limit the value of the channel instead of its error.
+    """
+
+    output: int
+    low: Any
+    high: Any
+    absolute: bool = False
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A circle about zero that limits the errors of the channels `x` and `y`; its radius may be an array of poses."""
+
+    x: int
+    y: int
+    radius: Any
+
+
+@dataclass(frozen=True, eq=False)
+class ReliabilityQuestion:
+    """Channels (outputs order by order, all positions first), and the limits on their errors.
+
+    `pair` are the two limited channels, or without limits the two outputs, where there are exactly two.
+    """
+
+    channels: tuple[Channel, ...]
+    bands: tuple[Band, ...]
+    discs: tuple[Disc, ...]
+    pair: tuple[int, int] | None
+
+    @property
+    def limited(self) -> bool:
+        """Whether there are limits, and so a reliability."""
+        return bool(self.bands or self.discs)
+
+    def take(self, poses: Sequence[int] | Ints) -> ReliabilityQuestion:
+        """The question at these poses, where limits are arrays of poses."""
+        bands, discs = limits_at(self.bands, self.discs, poses)
+        return replace(self, bands=bands, discs=discs)
+
+    @property
+    def single(self) -> list[ReliabilityQuestion]:
+        """One question for each limit, in the order of `kept`."""
+        alone = [replace(self, bands=(band,), discs=()) for band in self.bands]
+        return alone + [replace(self, bands=(), discs=(disc,)) for disc in self.discs]
+
+    def at(self, nominal: Sequence[Any] | Floats) -> ReliabilityQuestion:
+        """The question with limits of errors only, at poses where the channels have these nominal values.
+
+        An angle is taken at the turn nearest to the middle of its two absolute limits.
+        """
+        bands = tuple(self._about(band, nominal[band.output]) if band.absolute else band for band in self.bands)
+        return replace(self, bands=bands)
+
+    def _about(self, band: Band, value: Any) -> Band:
+        channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
+        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle).all():
+            value = value - TURN * np.round((value - middle) / TURN)
+        return Band(band.output, band.low - value, band.high - value)
+
+    @cached_property
+    def limited_channels(self) -> list[int]:
+        """Indices of the channels that have limits."""
+        return sorted({b.output for b in self.bands} | {k for d in self.discs for k in (d.x, d.y)})
+
+    @cached_property
+    def narrowed(self) -> ReliabilityQuestion:
+        """The question with the limited channels only."""
+        place = {channel: k for k, channel in enumerate(self.limited_channels)}
+        return ReliabilityQuestion(
+            tuple(self.channels[k] for k in self.limited_channels),
+            tuple(replace(band, output=place[band.output]) for band in self.bands),
+            tuple(replace(disc, x=place[disc.x], y=place[disc.y]) for disc in self.discs),
+            None,
+        )
+
+    def kept(self, errors: Floats) -> Flags:
+        """Whether errors of shape (channels, n) keep each limit (bands, then discs), shape (limits, n).
+
+        Errors of a mechanism that is not assembled are nan and keep no limit.
+        """
+        kept = np.ones((len(self.bands) + len(self.discs), errors.shape[1]), dtype=bool)
+        with np.errstate(invalid="ignore"):
+            for row, band in zip(kept, self.bands, strict=False):
+                error = errors[band.output]
+                row[:] = (error >= band.low) & (error <= band.high)
+            for row, disc in zip(kept[len(self.bands) :], self.discs, strict=True):
+                x, y = errors[disc.x], errors[disc.y]
+                row[:] = x * x + y * y <= disc.radius * disc.radius
+        return kept
+
+    @property
+    def _ends(self) -> list[tuple[int, float, float]]:
+        """Finite ends of the bands: channel, end, and 1 for an upper or -1 for a lower end."""
+        return [(b.output, end, sign) for b in self.bands for end, sign in ((b.high, 1.0), (b.low, -1.0))
+                if np.isfinite(end)]  # fmt: skip
+
+    def margins(self, errors: Floats) -> Floats:
+        """Distances of errors, shape (channels, n), from the finite ends and circles, negative beyond, (margins, n)."""
+        bands = [sign * (end - errors[output]) for output, end, sign in self._ends]
+        return np.stack([*bands, *(disc.radius - np.hypot(errors[disc.x], errors[disc.y]) for disc in self.discs)])
+
+    def margin_slopes(self, errors: Floats, slopes: Floats) -> Floats:
+        """Derivatives of the margins from those of the errors, shape (channels, dimension, n)."""
+        gradients = [-sign * slopes[output] for output, _, sign in self._ends]
+        for disc in self.discs:
+            x, y = errors[disc.x], errors[disc.y]
+            with np.errstate(invalid="ignore", divide="ignore"):
+                gradients.append((-x * slopes[disc.x] - y * slopes[disc.y]) / np.hypot(x, y))
+        return np.stack(gradients)
+
+
+def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple[tuple[Band, ...], tuple[Disc, ...]]:
+    """The limits at one pose or some, by an index of the arrays of poses."""
+    return (
+        tuple(replace(band, low=at_rows(band.low, poses), high=at_rows(band.high, poses)) for band in bands),
+        tuple(replace(disc, radius=at_rows(disc.radius, poses)) for disc in discs),
+    )
+
+
+def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
+    """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
+    mechanism = study.mechanism
+    limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
+    limited = [
+        part
+        for base, _, limit in limits
+        for part in ((f"{base}.x", f"{base}.y") if limit.radius is not None else (base,))
+    ]
+    names = section.outputs or (() if limited else default_outputs(mechanism))
+    outputs = expand_outputs(study, tuple(names))
+    listed = [output.name for output in outputs]
+    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in listed)))
+    places = [output.name for output in outputs]
+    orders = 3 if section.rates or section.accelerations or section.speed else 1
+    bands, discs = [], []
+    for base, order, limit in limits:
+        begin = order * len(outputs)
+        if limit.radius is not None:
+            discs.append(Disc(begin + places.index(f"{base}.x"), begin + places.index(f"{base}.y"), limit.radius))
+        else:
+            low, high = (
+                radians(study, mechanism.coordinate(base), value) if value is not None else bound
+                for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
+            )
+            bands.append(Band(begin + places.index(base), low, high, limit.absolute))
+    pair: tuple[int, int] | None = None
+    if len(bands) == 2 and not discs:
+        pair = (bands[0].output, bands[1].output)
+    elif len(discs) == 1 and not bands:
+        pair = (discs[0].x, discs[0].y)
+    elif not limited and len(outputs) == 2:
+        pair = (0, 1)
+    channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
+    return ReliabilityQuestion(channels, tuple(bands), tuple(discs), pair)
+
+
+def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
+    """Name of the limited coordinate or point, and the order (0 position, 1 velocity, 2 acceleration)."""
+
+    def exists(name: str) -> bool:
+        try:
+            return mechanism.graph.is_point(name) or bool(mechanism.coordinate(name))
+        except MechanismError:
+            return False
+
+    return split_order(name, exists)
+
+
+def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Caution]:
+    """A warning for each output whose pin has a clearance, where the study does not say which link's point it is."""
+    section: dict[str, Any] = study.resolved["reliability"]
+    names = [*fields.as_list(section.get("outputs")), *(section.get("limits") or {})]
+    warnings = []
+    for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
+        plain = ("", study.mechanism.graph.node(point))
+        about = [c.name for c in question.channels if not c.order and plain in c.coordinate.ends]
+        named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
+        if about and rest and not named:
+            warnings.append(Caution(
+                "assumed",
+                f"{', '.join(about)}: {point} has a clearance and is that of {' and '.join(rest)}, not of {link}, "
+                f"in which the pin moves; say so by {rest[0]}.{point}, or give reliability.clearances.{point} a 'link'",
+            ))  # fmt: skip
+    return warnings
+
+
+def _named(name: str, point: str) -> bool:
+    rest = name.partition(".")[2]
+    return rest == point or rest.startswith((f"{point}.", f"{point}_"))
+
+
+def holders(study: Study, coordinate: Coordinate) -> str:
+    """Names of the links whose points a coordinate uses, for points with a clearance or an elastic bearing."""
+    graph = study.mechanism.graph
+    names = [
+        link or " ".join(links)
+        for point, links in links_meant(study.reliability, study.stiffness, graph).items()
+        for link, node in coordinate.ends
+        if node == graph.node(point)
+    ]
+    return " ".join(dict.fromkeys(names))

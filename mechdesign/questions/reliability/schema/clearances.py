@@ -1,0 +1,187 @@
+"""Clearances of pins and slides, as the study file gives them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import model_validator
+
+from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
+from mechdesign.questions.reliability.schema.variation import DISTRIBUTIONS, Dimension, Tolerance, millimetre
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import Context, failure, shown
+
+HELP_PAGE = "theory/reliability"
+
+PIN_MODELS = {
+    "normal": "x and y of the pin normal, the clearance three standard deviations; of a slider each end",
+    "normal_in_disc": "as normal, and cut at the circle of the clearance; of a slider at its walls",
+    "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
+    "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
+}
+_EFFECTS = {
+    "offset": "moves the joint's point in the link's frame, by x and y",
+    "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
+}
+# Clearances down to minus this count as zero.
+CLEARANCE_ROUNDING = 1e-9
+
+
+class Fit(NamedTuple):
+    """A fit as it is written, its mean diametral clearance, and half the tolerances of its hole and of its shaft."""
+
+    text: str
+    diametral: float
+    hole: float
+    shaft: float
+
+
+def _fit(raw: Any, context: Context) -> Fit:
+    if not isinstance(raw, str):
+        raise failure(f"expected a fit such as 20 H7/g6, not {shown(raw)}")
+    unit = millimetre(context, raw)
+    try:
+        _, hole, shaft = fit_deviations(raw)
+    except ToleranceClassError as error:
+        raise failure(str(error)) from None
+    least, most = hole[0] - shaft[1], hole[1] - shaft[0]
+    if least < -CLEARANCE_ROUNDING:
+        kind = "an interference" if most <= CLEARANCE_ROUNDING else "a transition"
+        raise failure(
+            f"{raw} is {kind} fit, from {least:+.4g} to {most:+.4g} mm, and no clearance is negative; a pin that is "
+            "pressed in has none: leave it out, or take a clearance fit such as H7/g6 or H7/h6"
+        )
+    halves = [float(0.5 * (high - low) * unit) for low, high in (hole, shaft)]
+    return Fit(raw, float(0.5 * (least + most) * unit), *halves)
+
+
+_FIT = {**fields.NAME_FORM, "title": "fit"}
+
+
+class PinModel(fields.Model):
+    """How a pin lies in its hole, for each kind of method; a word alone is for both."""
+
+    short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
+    analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
+    """Model of the methods that compute: analytic, second_order."""
+    monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
+    """Model of the methods that sample, and of form."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        return {"analytic": raw, "monte_carlo": raw} if isinstance(raw, str) else raw
+
+
+class Clearance(fields.Model):
+    """Clearance of a pin or slide: one of ``radial``, ``diametral`` and ``fit``. Coordinates of a pin's point are those
+    of the links in which it does not move; an output may name its link, coupler.P.x.
+    """
+
+    one_of = ("a clearance needs either 'radial' or 'diametral', or a 'fit'", "radial", "diametral", "fit")
+    radial: fields.NonNegativeLength | None = None
+    """Mean radial clearance: half the difference of the diameters; of a slide its play on either side. Example: 0.03"""
+    diametral: fields.NonNegativeLength | None = None
+    """Mean difference of the diameters of hole and pin. Example: 0.06"""
+    fit: Annotated[Fit, fields.Read(_fit, _FIT)] | None = None
+    """Fit of ISO 286-1 with its size in mm; tolerances of hole and shaft follow. Example: 20 H7/g6"""
+    tolerance: Tolerance = (0.0, 0.0)
+    """How far the clearance given (radial or diametral) deviates: a half-width, or the lowest and highest. A fit has
+    its own. Example: 0.01
+    """
+    distribution: Annotated[str, fields.choice(DISTRIBUTIONS, "distribution")] = "normal"
+    """Distribution of the clearance over its tolerance; of a fit normal or uniform."""
+    pin: PinModel = PinModel()
+    link: fields.LinkName | None = None
+    """Link in which the pin moves. Left out: the last link at the joint that no output is said to be of. Example:
+    forearm
+    """
+    effect: Annotated[str, fields.choice(_EFFECTS, "effect of a clearance")] = "offset"
+    """What the pin's place changes."""
+    length: fields.PositiveLength | None = None
+    """Length of a slider in its guide, centred on the joint's point: it shifts and tilts. Prismatic joints need it; no
+    others have it. Example: 40
+    """
+
+    @property
+    def radius(self) -> float:
+        """Mean radial clearance, half the difference of the diameters."""
+        if self.radial is not None:
+            return self.radial
+        diametral = self.fit.diametral if self.fit is not None else self.diametral
+        return 0.0 if diametral is None else 0.5 * diametral
+
+    @property
+    def radius_spread(self) -> Dimension | None:
+        """Variation of the radial clearance; None where it has none, and of a fit."""
+        if not np.any(self.tolerance):
+            return None
+        factor = 1.0 if self.radial is not None else 0.5
+        low, high = (factor * end for end in self.tolerance)
+        return Dimension.model_construct(tolerance=(low, high), sigma=None, distribution=self.distribution)
+
+    def flaw(self) -> str:
+        """The mistake in its numbers, of one design or several; empty if there is none."""
+        spread = self.radius_spread
+        if spread is None:
+            return ""
+        size, low = map(np.ravel, np.broadcast_arrays(self.radius, spread.ends(self.radius)[0]))
+        least = int(np.argmin(size + low))
+        if size[least] + low[least] < -CLEARANCE_ROUNDING:
+            size, low = ((1.0 if self.radial is not None else 2.0) * part[least] for part in (size, low))
+            return f"a clearance of {size:g} that is {-low:g} smaller is negative: such a pin does not go in its hole"
+        return spread.flaw(self.radius)
+
+
+def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
+    """A clearance with the link that its pin moves in, which is not that `meant` by outputs; None without its joint."""
+    path: KeyPath = ("reliability", "clearances", point)
+    mechanism, report = checker.mechanism, checker.report
+    _check_radius(checker, clearance, path)
+    if point in mechanism.slides:
+        return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
+    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
+        return None
+    if clearance.length is not None:
+        report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
+    links = mechanism.owners[point]
+    held = [*links, *(j.slot for j in mechanism.joints.values() if j.slot and j.point == point)]
+    if len(held) < 2:
+        report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
+    # By default the pin moves in the last link that no output or limit names.
+    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
+    if link not in links:
+        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
+    elif clearance.effect == "length":
+        binary = mechanism.links[link]
+        if point not in (binary.from_, binary.to) or binary.telescopic:
+            message = f"changes a binary link's length, and {point!r} is no end of such a link in {link!r}"
+            report((*path, "effect"), message)
+    return clearance.model_copy(update={"link": link})
+
+
+def _check_slide_clearance(checker: Checker, clearance: Clearance, path: KeyPath, *, tilts: bool) -> Clearance:
+    for key in {"link", "effect"} & clearance.model_fields_set:
+        checker.report((*path, key), f"a slide's clearance has no {key!r}: its slider shifts across the line")
+    if tilts and clearance.length is None:
+        message = "the slider tilts in its guide as far as its 'length' along the line lets it; give that too"
+        checker.report(path, message, at_key=True)
+    elif not tilts and clearance.length is not None:
+        checker.report((*path, "length"), "a pin in a slot does not tilt; leave it out")
+    return clearance
+
+
+def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None:
+    """Check the variation of the clearance."""
+    report = checker.report
+    checker.kind((*path, "tolerance"), "length")
+    if clearance.fit is not None:
+        if "tolerance" in clearance.model_fields_set:
+            report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
+        if clearance.distribution not in ("normal", "uniform"):
+            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
+    if flaw := clearance.flaw():
+        report((*path, "tolerance"), flaw)

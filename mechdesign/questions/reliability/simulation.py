@@ -1,0 +1,291 @@
+"""Made mechanisms at one pose: exact kinematics, errors, limits, and Monte Carlo simulation chunk by chunk [S2, S3]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+
+import numpy as np
+
+from mechdesign.errors import MechanismError
+from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.plan import Plan
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.progress import NULL, Progress
+from mechdesign.questions.kinematics.rates import DriveRates
+from mechdesign.questions.reliability.deflection import Elastic
+from mechdesign.questions.reliability.engine.problem import Estimate, Problem, counted, slopes
+from mechdesign.questions.reliability.first_order import derivatives, nominal_values
+from mechdesign.questions.reliability.question import ReliabilityQuestion
+from mechdesign.questions.reliability.sources import Made, Sources
+from mechdesign.work.chunks import map_chunks
+
+# Samples of a chunk.
+CHUNK = 20_000
+# Cells of the density's grid along each axis [S2, Fig. 4].
+CELLS = 25
+# Half the width of the grid, in standard deviations.
+REACH = 3.0
+# Number of chunks over which the density is counted: a million samples.
+_DENSITY_CHUNKS = 50
+# Samples between two entries of the trend in the first chunks; after these it has entries at powers of two.
+_TREND_STEP = 1000
+# Number of first chunks, whose errors are also kept for the histogram.
+_TREND_CHUNKS = 16
+# Step of the difference quotients by the standard normal variables, in standard deviations.
+_SOURCE_STEP = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """One pose at which made mechanisms are solved, with the nominal drives and their rates.
+
+    Parameters
+    ----------
+    pose : int
+        Row of the pose, which also names its streams of random numbers.
+    plan : Plan
+        The drives' plan with the assembly modes of the pose.
+    nominal, centres
+        The nominal mechanism, and the nominal values of the channels.
+    scale : two of (float, float) or None
+        Mean and standard deviation of each error of the pair, for its density; None without a density.
+    followed : bool
+        Whether to record the trend of means and failures, and to keep the errors of the first chunks.
+    """
+
+    question: ReliabilityQuestion
+    pose: int
+    mechanism: Mechanism
+    plan: Plan
+    nominal: Configuration
+    rates: DriveRates
+    centres: Sequence[float]
+    elastic: Elastic | None
+    scale: tuple[tuple[float, float], tuple[float, float]] | None = None
+    followed: bool = False
+
+    def narrowed(self) -> Setting:
+        """The same pose with the limited channels only, which suffice for the limits."""
+        channels = self.question.limited_channels
+        return replace(
+            self, question=self.question.narrowed, centres=[self.centres[k] for k in channels], scale=None,
+            elastic=None if self.elastic is None else self.elastic.only(channels),
+        )  # fmt: skip
+
+
+def forward_plan(mechanism: Mechanism, configuration: Configuration) -> Plan:
+    """The drives' plan with the assembly modes of a single solved pose.
+
+    A pose given by outputs is solved with the assembly modes of the inverse problem, and may be in another assembly
+    mode of the drives than the sketch. Each group is tried in both modes, in order: it depends only on those before it.
+    """
+    forward = mechanism.forward
+    drives = [configuration.value(mechanism.coordinate(name)) for name in mechanism.drives]
+    modes = list(forward.modes)
+    for index, group in enumerate(forward.structure.groups):
+        errors = {}
+        for mode in (modes[index], -modes[index]) if modes[index] else ():
+            modes[index] = mode
+            solved = Plan(mechanism, forward.structure, modes).solve(drives, start=configuration, limits=False)
+            errors[mode] = sum(float(np.abs(solved.rotations[k] - configuration.rotations[k])) for k in group.angles)
+            errors[mode] += sum(float(np.abs(solved.slides[k] - configuration.slides[k])) for k in group.slides)
+        # A mode that cannot be assembled has nan and comes last.
+        modes[index] = min(errors, key=lambda mode: (np.isnan(errors[mode]), errors[mode]), default=modes[index])
+    return forward if tuple(modes) == forward.modes else Plan(mechanism, forward.structure, modes)
+
+
+def solve(setting: Setting, made: Made) -> Configuration:
+    """Made mechanisms at the pose, drives with their errors; angles at the turn nearest to the nominal pose."""
+    mechanism, nominal = setting.mechanism, setting.nominal
+    drives: list[Value] = [
+        nominal.value(mechanism.coordinate(name)) + made.drives.get(name, 0.0) for name in mechanism.drives
+    ]
+    solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
+    return solved.beside(nominal, [channel.coordinate for channel in setting.question.channels])
+
+
+def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
+    """Errors (value minus nominal), shape (channels, count), and which of the made mechanisms are assembled."""
+    solved = solve(setting, made)
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        values = nominal_values(setting.mechanism, solved, setting.question.channels, setting.rates)
+    errors = np.empty((len(values), count))
+    for error, value, centre in zip(errors, values, setting.centres, strict=True):
+        error[:] = value - centre
+    if setting.elastic is not None:
+        errors += setting.elastic.errors(made.loads, count)
+    return errors, np.broadcast_to(solved.valid, (count,))
+
+
+def problem_of(setting: Setting, sources: Sources) -> Problem:
+    """Margins of the limits, nan where the mechanism cannot be assembled, with gradients where the model has them."""
+    setting = setting.narrowed()
+    question = setting.question
+
+    def margins(u: Floats) -> Floats:
+        errors, valid = errors_of(setting, sources.made(sources.at(u, directed=True)), u.shape[1])
+        distances = question.margins(errors)
+        distances[:, ~valid] = np.nan
+        return distances
+
+    def gradients(u: Floats) -> tuple[Floats, Floats]:
+        made = sources.made(sources.at(u, directed=True))
+        errors, valid = errors_of(setting, made, u.shape[1])
+        names = [name for part in made for name in part]
+        by_name = derivatives(
+            setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic
+        )
+        by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _SOURCE_STEP))
+        distances = question.margins(errors)
+        distances[:, ~valid] = np.nan
+        return distances, question.margin_slopes(errors, by_variable)
+
+    def varying(u: Floats) -> Floats:
+        """Places, drives and loads, shape (names, n)."""
+        parts = sources.made(sources.at(u, directed=True))
+        return np.array([np.broadcast_to(value, (u.shape[1],)) for part in parts for value in part.values()])
+
+    try:
+        gradients(np.zeros((len(sources.owners), 1)))
+    except MechanismError:
+        return Problem(len(sources.owners), margins, circles=sources.circles)
+    return Problem(len(sources.owners), margins, gradients, sources.circles)
+
+
+def generator(seed: int, *stream: int) -> np.random.Generator:
+    """The stream of random numbers of this name; chunks of poses have their own, so that `jobs` changes no number."""
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(entropy=seed, spawn_key=stream)))
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums of errors about the nominal value, and of their products, over valid samples; chunks add up in order.
+
+    Parameters
+    ----------
+    broken : ndarray of int, shape (limits,)
+        Samples that break each limit, in the order of `ReliabilityQuestion.kept`.
+    density : ndarray of int, shape (CELLS * CELLS,) or (0,)
+        Samples in each cell, of `counted` samples.
+    trend : ndarray, shape (steps, 3 + channels)
+        Numbers of samples, valid ones and failures, and sums of errors, cumulated step by step.
+    kept : ndarray, shape (channels, n)
+        Errors of valid samples of the first chunks.
+    """
+
+    samples: int
+    valid: int
+    failures: int
+    broken: Ints
+    errors: Floats
+    products: Floats
+    density: Ints
+    counted: int
+    trend: Floats
+    kept: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Mean error of each channel."""
+        return self.errors / self.valid
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the channels' errors; nan of a single sample."""
+        if self.valid < 2:
+            return np.full(self.products.shape, np.nan)
+        centred = self.products - np.outer(self.errors, self.errors) / self.valid
+        return np.asarray(centred / (self.valid - 1))
+
+    @property
+    def estimate(self) -> Estimate:
+        """Probability of failure from counted failures."""
+        return counted(self.failures, self.samples, self.samples - self.valid, self.samples)
+
+    @staticmethod
+    def total(parts: Sequence[Sums]) -> Sums:
+        """The sum of consecutive chunks."""
+        return reduce(Sums.__add__, parts)
+
+    def __add__(self, other: Sums) -> Sums:
+        offset = np.concatenate([[self.samples, self.valid, self.failures], self.errors])
+        return Sums(
+            self.samples + other.samples,
+            self.valid + other.valid,
+            self.failures + other.failures,
+            self.broken + other.broken,
+            self.errors + other.errors,
+            self.products + other.products,
+            self.density + other.density if len(other.density) else self.density,
+            self.counted + other.counted,
+            np.concatenate([self.trend, other.trend + offset]) if len(other.trend) else self.trend,
+            np.concatenate([self.kept, other.kept], axis=1) if other.kept.size else self.kept,
+        )
+
+
+def simulate(
+    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, sums: dict[int, Sums],
+    jobs: int | None = 1, progress: Progress = NULL,
+) -> None:  # fmt: skip
+    """Fill `sums` by pose: every chunk at all poses before the next one, so that an interrupt keeps every pose."""
+    work = partial(_simulated, settings, sources, seed, samples)
+    items = range(-(-samples // CHUNK) * len(settings))
+    for pose, part in map_chunks(work, items, jobs, travels=True):
+        sums[pose] = sums[pose] + part if pose in sums else part
+        progress.update(part.samples)
+
+
+def _simulated(
+    settings: Sequence[Setting], sources: Sources, seed: int, samples: int, item: int
+) -> tuple[int, Sums]:  # fmt: skip
+    chunk, place = divmod(item, len(settings))
+    count = min(CHUNK, samples - chunk * CHUNK)
+    return settings[place].pose, simulate_chunk(settings[place], sources, seed, chunk, count)
+
+
+def simulate_chunk(setting: Setting, sources: Sources, seed: int, chunk: int, count: int) -> Sums:
+    """Draw `count` made mechanisms at one pose and sum their errors."""
+    made = sources.made(sources.draw(generator(seed, setting.pose, chunk), count))
+    return sums_of(setting, made, count, chunk)
+
+
+def sums_of(setting: Setting, made: Made, count: int, chunk: int) -> Sums:
+    """Sums over made mechanisms; the first chunks also have the density, the trend and the errors."""
+    errors, valid = errors_of(setting, made, count)
+    kept = setting.question.kept(errors)
+    within = np.asarray(kept.all(axis=0))
+    broken = count - np.count_nonzero(kept, axis=1)
+    failures, assembled = count - int(np.count_nonzero(within)), int(np.count_nonzero(valid))
+    early = setting.followed and chunk < _TREND_CHUNKS
+    trend = _trend(errors, valid, within) if early else np.zeros((0, 3 + len(errors)))
+    if assembled < count:
+        errors = errors[:, valid]
+    sums = errors.sum(axis=1)
+    if setting.followed and not early and chunk.bit_count() == 1:
+        trend = np.concatenate([[count, assembled, failures], sums])[None]
+    density = np.zeros(0, dtype=np.intp)
+    if setting.scale is not None and setting.question.pair is not None and chunk < _DENSITY_CHUNKS:
+        standard = [(errors[k] - mean) / sigma
+                    for k, (mean, sigma) in zip(setting.question.pair, setting.scale, strict=True)]  # fmt: skip
+        density = _count_cells(np.stack(standard))
+    return Sums(
+        count, assembled, failures, broken, sums, errors @ errors.T, density, assembled if len(density) else 0, trend,
+        errors if early else np.empty((len(errors), 0)),
+    )  # fmt: skip
+
+
+def _trend(errors: Floats, valid: Flags, within: Flags) -> Floats:
+    begins = np.arange(0, len(valid), _TREND_STEP)
+    steps = np.concatenate([[valid, ~within], np.where(valid, errors, 0.0)])
+    counts = np.minimum(begins + _TREND_STEP, len(valid))
+    return np.concatenate([counts[None], np.add.reduceat(steps, begins, axis=1).cumsum(axis=1)]).T
+
+
+def _count_cells(standard: Floats) -> Ints:
+    """Samples in each cell of the density's grid, from two standardised errors, shape (2, n)."""
+    cells = np.floor((standard + REACH) * (CELLS / (2 * REACH)))
+    x, y = cells[:, ((cells >= 0) & (cells < CELLS)).all(axis=0)]
+    return np.bincount((x * CELLS + y).astype(np.intp), minlength=CELLS * CELLS)

@@ -1,0 +1,170 @@
+"""The random sources that a study gives: its tolerances, clearances and random loads, as laws in the core's units."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.errors import StudyError
+from mechdesign.expressions import Number
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.geometry import offset_names, slide_offset
+from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
+from mechdesign.questions.reliability.copula import Correlation
+from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law, marginal
+from mechdesign.questions.reliability.schema.clearances import Clearance
+from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
+from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
+from mechdesign.questions.reliability.sources import Pin, Scalar, Sources, geometric
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+
+# Largest deviation, in radians or in sizes of the mechanism.
+MAX_DEVIATION = 1e6
+# Largest deviation of a force or moment, in the study's units.
+MAX_LOAD = 1e100
+
+
+def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, list[Caution]]:
+    """Sources of a study, and warnings about parameters that vary several places together.
+
+    `poses` of designs give numbers that are arrays of poses, for the first order.
+
+    Raises
+    ------
+    StudyError
+        If nothing varies, the correlations contradict each other, or the numbers of a design give no tolerance.
+    """
+    section = study.reliability
+    if section is None or not (section.dimensions or section.clearances):
+        message = "asks what varies: give 'dimensions' or 'clearances'"
+        raise StudyError((study.problem(message, "reliability"),))
+    mechanism: Mechanism = study.mechanism
+    poses = Poses.single({}) if poses is None else poses
+    section = poses.section(section)
+    sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
+    scalars = []
+    slopes: Mapping[str, Number]
+    warnings: list[Caution] = []
+    together: list[str] = []
+    for name, dimension in section.dimensions.items():
+        nominal = sizes.get(name, 0.0)
+        if name in study.parameters.nominal:
+            kind = "parameter"
+            slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.changed))
+            moved = [place for place, slope in slopes.items() if np.any(slope)]
+            dimensions = [place for place in moved if not place.startswith(MEASURED)]
+            if not moved:
+                idle = f"parameter '{name}' changes no dimension of the mechanism"
+                warnings.append(Caution("ignored", idle))
+            elif len(dimensions) > 1:
+                together.append(f"'{name}' {', '.join(dimensions)}")
+        else:
+            kind, slopes = "load" if name in LOADS else "drive" if name in mechanism.drives else "place", {name: 1.0}
+            if kind == "place":
+                warnings += _twice(study, name, section.dimensions)
+        moves = {place: (slope, _quantity(mechanism, place)) for place, slope in slopes.items()}
+        turned = kind != "parameter" and moves[name][1] == "angle"
+        factor = study.units.angle_factor if turned else 1.0
+        unit = study.units.label(LOADS[name]) if kind == "load" else study.unit_of(name)
+        scalars.append(Scalar(name, kind, _law(study, name, dimension, nominal, factor), moves, factor, unit))
+    if together:
+        parameters = "parameter that moves" if len(together) == 1 else "parameters that move"
+        words = f"{parameters} several dimensions together: {'; '.join(together)}"
+        warnings.append(Caution("assumed", words))
+    scalars.sort(key=lambda scalar: ("parameter", "place", "drive", "load").index(scalar.kind))
+    pins = tuple(_pin(study, name, clearance) for name, clearance in section.clearances.items())
+    sources = Sources(study, tuple(scalars), pins, _correlation(section, scalars))
+    _check_sizes(sources)
+    return sources, warnings
+
+
+def _law(study: Study, name: str, dimension: Dimension, nominal: Number, factor: float) -> Marginal:
+    """The law of a dimension, in the core's units."""
+    if dimension.measured is not None:
+        values, about = dimension.deviations(nominal / factor, study.folder)
+        return Measured.of(factor * values, factor * about, nominal)
+    try:
+        flaw = dimension.flaw(nominal)
+        if not flaw:
+            return marginal(dimension, nominal, factor)
+    except ToleranceClassError as error:
+        flaw = str(error)
+    raise StudyError((study.problem(flaw, "reliability", "dimensions", name),))
+
+
+def _quantity(mechanism: Mechanism, name: str) -> str:
+    """Quantity of a place, a drive or a load."""
+    places = mechanism.description.places
+    return LOADS[name] if name in LOADS else places[name].quantity if name in places else mechanism.quantity(name)
+
+
+def _check_sizes(sources: Sources) -> None:
+    """Raise a StudyError for deviations so large that their squares overflow."""
+    study, size = sources.study, sources.study.mechanism.size or 1.0
+    loads = (MAX_LOAD, "1e100")
+    most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads, "none": loads}
+    for scalar in sources.scalars:
+        for slope, quantity in scalar.moves.values():
+            allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
+            if not max(np.max(np.abs(slope * end)) for end in scalar.ends) <= allowed:
+                message = f"varies by more than {words}; look at its unit"
+                raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))
+    for pin in sources.pins:
+        if not np.max(pin.ends[1]) <= MAX_DEVIATION * size:
+            message = "is more than a million times the size of the mechanism; look at its unit"
+            raise StudyError((study.problem(message, "reliability", "clearances", pin.name),))
+
+
+def _twice(study: Study, place: str, varying: Collection[str]) -> list[Caution]:
+    """A warning for each varying parameter that also sets a place with a tolerance of its own."""
+    both = [name for name in study.parameters.nominal
+            if name in varying and study.parameters.derivatives(name).get(place)]  # fmt: skip
+    return [
+        Caution(
+            "assumed",
+            f"'{place}' varies by its own tolerance, and with parameter '{name}': both count, as independent errors "
+            "that add up; leave one of them out if they are the same error",
+        )
+        for name in both
+    ]
+
+
+def _correlation(section: ReliabilitySection, scalars: Sequence[Scalar]) -> Correlation | None:
+    if not section.correlation:
+        return None
+    place = {scalar.name: k for k, scalar in enumerate(scalars)}
+    pairs = {(place[pair.one], place[pair.other]): pair.coefficient for pair in section.correlation}
+    return Correlation.of([scalar.law for scalar in scalars], pairs)
+
+
+def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
+    if flaw := clearance.flaw():
+        raise StudyError((study.problem(flaw, "reliability", "clearances", name),))
+    joints, spread, radius = study.mechanism.description.joints, clearance.radius_spread, clearance.radius
+    law = None if spread is None else marginal(spread, radius)
+    if clearance.fit is not None:
+        law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
+    kind = "slide" if name in joints else clearance.effect
+    pin = Pin(name, radius, law, clearance.pin.analytic, clearance.pin.monte_carlo, kind, ())
+    if kind == "slide":
+        return replace(pin, directions=_slider(joints[name], clearance.length))
+    if clearance.link is None:
+        raise StudyError(f"reliability.clearances.{name}: name the 'link' whose pin moves")
+    moved = (f"{clearance.link}.length",) if kind == "length" else offset_names(clearance.link, name)
+    return replace(pin, directions=tuple({place: 1.0} for place in moved))
+
+
+def _slider(joint: Joint, length: Number | None) -> tuple[dict[str, Number], ...]:
+    """Directions of the rear and front end of a slider: it shifts by their mean and tilts by their difference/length.
+
+    A pin in a slot only shifts.
+    """
+    offset = slide_offset(joint.name)
+    if length is None or not isinstance(joint, Prismatic):
+        return ({offset: 1.0},)
+    return tuple({offset: 0.5, str(joint.angle): slope} for slope in (-1.0 / length, 1.0 / length))

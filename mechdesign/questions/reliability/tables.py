@@ -1,0 +1,349 @@
+"""Tables of the reliability question from the linear error model, the results of the methods, and their samples."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.poses import pose_columns
+from mechdesign.questions.reliability import methods
+from mechdesign.questions.reliability.columns import (
+    CAPABILITY,
+    CONTRIBUTIONS,
+    CONVERGENCE,
+    DENSITY,
+    ESTIMATE,
+    HISTOGRAM,
+    MOMENTS,
+    RELIABILITY,
+)
+from mechdesign.questions.reliability.engine.problem import Estimate, binomial, counted
+from mechdesign.questions.reliability.first_order import correlation
+from mechdesign.questions.reliability.question import ReliabilityQuestion, holders
+from mechdesign.questions.reliability.simulation import CELLS, REACH, Sums
+from mechdesign.questions.reliability.sobol import SobolIndices
+from mechdesign.questions.reliability.task import MethodResult, Strings, Task
+from mechdesign.results import Column, Drawn, Table
+from mechdesign.study.poses import Poses
+
+# Bins of a histogram.
+_BINS = 60
+# Largest distance of a histogram's errors from the mean, in standard deviations.
+_FARTHEST = 6.0
+# Standard deviation, as a share of the output's size, up to which it is rounding and the output constant.
+_CONSTANT = 1e-12
+# Estimate at poses that were not computed.
+_UNKNOWN = Estimate(np.nan, np.nan, np.nan, 0)
+
+
+def at_poses(task: Task, rows: Ints) -> list[Column]:
+    """Columns of the poses of these rows."""
+    return pose_columns(task.study, task.poses, rows)
+
+
+def _channels(task: Task, channels: Ints) -> dict[str, Strings]:
+    """Names of these channels, by columns."""
+    output, order, _ = task.labels
+    return {"output": output[channels], "order": order[channels]}
+
+
+def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[MethodResult]:
+    """Results with moments of the errors; the first order's where no method has any."""
+    return [result for result in results if result.sums or result.normal] or [methods.run("analytic", task)]
+
+
+def moments(task: Task, results: Sequence[MethodResult]) -> Table:
+    """Mean and standard deviation of every output and order at every pose."""
+    known = _with_moments(task, results)
+    means, covariances = zip(*(result.moments(task) for result in known), strict=True)
+    scale, linear = task.scale[:, None], task.linear
+    shape = (task.poses.count, len(known), len(scale))
+    pose, method, channel = (index.ravel() for index in np.indices(shape))
+    mean = np.stack(means)[method, channel, pose] * scale[channel, 0]
+    variance = np.stack(covariances)[method, pose, channel, channel]
+    sigma = np.sqrt(np.maximum(variance, 0.0)) * scale[channel, 0]
+    nominal = (task.nominal * scale)[channel, pose]
+    low, high = linear.worst_ends()
+    return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
+        {}, method=np.array([result.method for result in known])[method], **_channels(task, channel), nominal=nominal,
+        mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
+        worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
+        unit=task.labels[2][channel], valid=task.reason[pose] == 0,
+    ))  # fmt: skip
+
+
+def success(task: Task, results: Sequence[MethodResult]) -> Table:
+    """Reliability of every pose by every method, and of the whole cycle."""
+    entries = []
+    length = task.poses.count // task.poses.designs
+    for design in range(task.poses.designs):
+        first = design * length
+        entries += [(pose, result, result.estimates.get(pose, _UNKNOWN), result.used.get(pose, result.method), False)
+                    for pose in range(first, first + length) for result in results]  # fmt: skip
+        cycles = [(result, result.cycles[design]) for result in results if result.cycles]
+        entries += [
+            (first, result, cycle, "monte_carlo" if cycle.samples else "bounds", True) for result, cycle in cycles
+        ]
+    poses, methods_of, estimates, used, cycle_of = zip(*entries, strict=True)
+    pose, whole = np.array(poses), np.array(cycle_of)
+    failure, low, high, error, samples, invalid, evaluations = (
+        np.array([getattr(e, name) for e in estimates])
+        for name in ("failure", "low", "high", "error", "samples", "invalid", "evaluations")
+    )
+    columns = [
+        *RELIABILITY.columns({}, scope=np.where(whole, "cycle", "pose")),
+        *(replace(c, values=np.where(whole, np.nan, c.values)) for c in at_poses(task, pose)),
+        *RELIABILITY.columns(
+            {"kind of interval": "99.7 %; of counted failures Clopper-Pearson"},
+            method=[result.method for result in methods_of], reliability=1.0 - failure, low=1.0 - high, high=1.0 - low,
+            failure=failure, failure_low=low, failure_high=high, error=error, samples=samples, invalid=invalid,
+            evaluations=evaluations, used=np.array(used), sigma_level=_sigma_level(failure), ppm=1e6 * failure,
+        ),
+    ]  # fmt: skip
+    if task.question.pair is not None:
+        pair = np.ix_(range(task.poses.count), task.question.pair, task.question.pair)
+        values = np.full(len(whole), np.nan)
+        values[~whole] = np.stack([correlation(result.moments(task)[1][pair]) for result in results], axis=1).ravel()
+        columns += RELIABILITY.columns({}, rho=values)
+    all_valid = (task.reason == 0).reshape(task.poses.designs, -1).all(axis=1)
+    valid = np.where(whole, all_valid[pose // length], task.reason[pose] == 0)
+    return RELIABILITY.table([*columns, *RELIABILITY.columns({}, valid=valid)])
+
+
+def _sigma_level(failure: Floats) -> Floats:
+    # SciPy takes a quarter of a second to import, and a study without limits does not need it.
+    from scipy.special import ndtri
+
+    return np.asarray(-ndtri(failure))
+
+
+def capability(task: Task, results: Sequence[MethodResult]) -> Table:
+    """Process capability of each limited output by itself, at every pose by every method that has moments [ISO 22514].
+
+    Limits of an error are added to the nominal value.
+    """
+    known, question = _with_moments(task, results), task.question.at(task.nominal)
+    single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
+    shape = (task.poses.count, len(known), len(single))
+    pose, method, limit = (index.ravel() for index in np.indices(shape))
+    scale = task.scale[rows]
+    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in known), strict=True))
+    # Circles have no value and no limits of a value: nan.
+    nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
+    nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
+    mean[..., :bands] = np.moveaxis(means[:, rows], 2, 0) * scale
+    sigma[..., :bands] = np.sqrt(np.maximum(covariances[:, :, rows, rows].swapaxes(0, 1), 0.0)) * scale
+    for k, band in enumerate(question.bands):
+        low[..., k], high[..., k] = (scale[k] * np.reshape(end, (-1, 1)) for end in (band.low, band.high))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.isfinite(low) & np.isfinite(high)
+        cp = np.where(both, (high - low) / (6.0 * sigma), np.nan)
+        cpk = np.minimum(high - mean, mean - low) / (3.0 * sigma)
+    upper = np.where(np.isfinite(high), nominal + high, np.nan)
+    for k, disc in enumerate(question.discs, bands):
+        upper[..., k] = np.reshape(disc.radius, (-1, 1))
+    estimates = [_by_limit(task, result, single) for result in known]
+    failure, least, most = (
+        np.array([[[getattr(by_pose.get(row, _UNKNOWN), name) for by_pose in limits] for limits in estimates]
+                  for row in range(len(nominal))])
+        for name in ("failure", "low", "high")
+    )  # fmt: skip
+    output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
+    output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
+    return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
+        {}, method=np.array([result.method for result in known])[method], output=output[limit], order=order[limit],
+        lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
+        mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
+        sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
+        ppm_high=1e6 * most.ravel(), unit=unit[limit], valid=task.reason[pose] == 0,
+    ))  # fmt: skip
+
+
+def _by_limit(task: Task, result: MethodResult, single: Sequence[ReliabilityQuestion]) -> list[dict[int, Estimate]]:
+    """Estimates by pose for each limit alone: from normal errors, or from the failures counted among plain samples."""
+    if len(single) == 1 and result.estimates:
+        return [result.estimates]
+    if result.normal is not None:
+        return [methods.of_normal(task, question, *result.normal) for question in single]
+    return [
+        {pose: counted(int(sums.broken[k]), sums.samples, sums.samples - sums.valid, sums.samples)
+         for pose, sums in result.sums.items()}
+        for k in range(len(single))
+    ]  # fmt: skip
+
+
+def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
+    """Sensitivity to each source and its share of the variance, to the first order; Sobol' indices by pose."""
+    sensitivity, share = (np.moveaxis(part, 2, 0) for part in (task.linear.sensitivity, task.linear.share()))
+    pose, channel, source = (index.ravel() for index in np.indices(share.shape))
+    names = np.array([source.name for source in task.sources.all])
+    pins, study = len(task.sources.pins), task.study
+    factors = np.array([scalar.factor for scalar in task.sources.scalars] + [1.0] * pins)
+    # A parameter without a known unit appears by its name in the derivative's unit.
+    below = [scalar.name if scalar.unit is None else scalar.unit for scalar in task.sources.scalars]
+    below += [study.units.label("length")] * pins
+    units = np.array(
+        [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
+    )
+    links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
+    return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
+        {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
+        derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],
+        share=share.ravel(), **_index_values(indices, share.shape),
+    ))  # fmt: skip
+
+
+def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
+    """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; none where not asked."""
+    columns: dict[str, Floats] = {}
+    for kind in ("first", "total") if found else ():
+        values = np.full((3, *shape), np.nan)
+        for pose, indices in found.items():
+            values[:, pose] = getattr(indices, kind)
+        columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
+    return columns
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Errors of sampled mechanisms at the pose that is shown, in the study's units.
+
+    Parameters
+    ----------
+    outputs, orders, units : ndarray of str, shape (channels,)
+    errors : ndarray, shape (channels, n)
+        Errors of the samples that can be assembled.
+    kept : ndarray of bool, shape (n,)
+        Whether a sample keeps every limit.
+    bands, discs
+        The limits of errors: (channel, lowest, highest error); (channel of x, channel of y, radius).
+    pair : (int, int) or None
+        The two channels whose density is drawn.
+    mean, covariance : ndarray, shapes (channels,) and (channels, channels)
+        Mean and covariance of the errors to the first order.
+    """
+
+    pose: int
+    outputs: Strings
+    orders: Strings
+    units: Strings
+    errors: Floats
+    kept: Flags
+    bands: tuple[tuple[int, float, float], ...]
+    discs: tuple[tuple[int, int, float], ...]
+    pair: tuple[int, int] | None
+    mean: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnErrors(Drawn):
+    """The poses at which errors were asked, and samples at one of them; None where no method samples errors."""
+
+    poses: Poses
+    samples: Samples | None
+
+
+def drawn_samples(task: Task, sums: Mapping[int, Sums]) -> Samples | None:
+    """The samples that pictures show; None where no errors are drawn."""
+    setting = next((setting for setting in task.settings if setting.followed), None)
+    if setting is None or setting.pose not in sums or not sums[setting.pose].kept.size:
+        return None
+    pose, question, scale, errors = setting.pose, setting.question, task.scale, sums[setting.pose].kept
+    return Samples(
+        pose, *task.labels, errors * scale[:, None], np.logical_and.reduce(question.kept(errors)),
+        tuple((b.output, b.low * scale[b.output], b.high * scale[b.output]) for b in question.bands),
+        tuple((d.x, d.y, d.radius) for d in question.discs), question.pair,
+        task.linear.shift()[:, pose] * scale, task.linear.covariance()[pose] * np.outer(scale, scale),
+    )  # fmt: skip
+
+
+def of_drawn(task: Task, sums: Mapping[int, Sums]) -> list[Table]:
+    """Density, histogram, convergence and estimate tables, those that `sums` by pose have data for."""
+    built = [_density(task, sums), _histogram(task, sums)]
+    followed = next(((row, part) for row, part in sorted(sums.items()) if len(part.trend)), None)
+    if followed is not None:
+        built += [_convergence(task, *followed), _estimate(task, *followed) if task.question.limited else None]
+    return [table for table in built if table is not None]
+
+
+def _density(task: Task, sums: Mapping[int, Sums]) -> Table | None:
+    """Density of the two outputs within 3 standard deviations: bivariate normal beside the simulated one [S2]."""
+    pair = list(task.question.pair or ())
+    rows = [row for row, part in sorted(sums.items()) if pair and len(part.density) and part.counted]
+    blocks = task.linear.covariance()[rows][:, pair][:, :, pair] if rows else np.zeros((0, 2, 2))
+    rho = correlation(blocks)
+    kept = np.flatnonzero(1.0 - rho**2 > 0)
+    if not len(kept):
+        return None
+    rows, blocks, rho = [rows[k] for k in kept], blocks[kept], rho[kept, None]
+    centres = (np.arange(CELLS) + 0.5) * (2 * REACH / CELLS) - REACH
+    place = [grid.ravel() for grid in np.meshgrid(centres, centres, indexing="ij")]
+    x, y = place
+    rest = 1.0 - rho**2
+    normal = np.exp(-(x * x - 2 * rho * x * y + y * y) / (2 * rest)) / (2 * np.pi * np.sqrt(rest))
+    simulated = [sums[row].density / (sums[row].counted * (2 * REACH / CELLS) ** 2) for row in rows]
+    names, shift = [task.question.channels[k].name for k in pair], task.linear.shift()
+    columns = at_poses(task, np.repeat(rows, len(x)))
+    for k, channel in enumerate(pair):
+        sigma, mean = np.sqrt(blocks[:, k, k]) * task.scale[channel], shift[channel, rows] * task.scale[channel]
+        errors = mean[:, None] + np.outer(sigma, place[k])
+        columns.append(DENSITY["<output>_error"].column(errors.ravel(), task.labels[2][channel], output=names[k]))
+    for axis, name, values in zip("xy", names, place, strict=True):
+        columns += DENSITY.columns({"output": name}, **{axis: np.tile(values, len(rows))})
+    columns += DENSITY.columns({}, normal=normal.ravel(), simulated=np.concatenate(simulated))
+    return DENSITY.table(columns)
+
+
+def _histogram(task: Task, sums: Mapping[int, Sums]) -> Table | None:
+    """Each output's error at the pose that is shown, beside the normal law of the same mean and deviation."""
+    row = next((row for row, part in sorted(sums.items()) if part.kept.shape[1] > 1), None)
+    if row is None:
+        return None
+    units, nominal = task.labels[2], np.abs(task.nominal[:, row] * task.scale)
+    varying, parts = [], []
+    for k, error in enumerate(sums[row].kept * task.scale[:, None]):
+        mean, sigma = float(error.mean()), float(error.std(ddof=1))
+        # The deviation of a constant output is rounding, which scales with the lengths it is computed from.
+        size = task.study.mechanism.size if units[k] == task.study.units.label("length") else 0.0
+        if not sigma > _CONSTANT * max(size, float(nominal[units == units[k]].max())):
+            continue
+        low = max(float(error.min()), mean - _FARTHEST * sigma)
+        high = min(float(error.max()), mean + _FARTHEST * sigma)
+        count, edges = np.histogram(error, bins=_BINS, range=(low, high))
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        normal = np.exp(-0.5 * ((middle - mean) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+        varying.append(k)
+        parts.append(np.stack([edges[:-1], edges[1:], count, normal]))
+    if not parts:
+        return None
+    channel, samples = np.repeat(varying, _BINS), sums[row].kept.shape[1]
+    low_, high_, count_, normal_ = np.concatenate(parts, axis=1)
+    return HISTOGRAM.table(at_poses(task, np.full(len(channel), row)) + HISTOGRAM.columns(
+        {"samples": str(samples)}, **_channels(task, channel), low=low_, high=high_, count=count_.astype(np.int64),
+        density=count_ / (samples * (high_ - low_)), normal=normal_, unit=units[channel],
+    ))  # fmt: skip
+
+
+def _convergence(task: Task, row: int, sums: Sums) -> Table:
+    """Mean of each output by the number of samples, at the pose that is shown [S3, Fig. 4]."""
+    trend = sums.trend[sums.trend[:, 1] > 0]
+    means = (task.nominal[:, row] + trend[:, 3:] / trend[:, 1:2]) * task.scale
+    step, channel = (index.ravel() for index in np.indices(means.shape))
+    return CONVERGENCE.table(at_poses(task, np.full(len(step), row)) + CONVERGENCE.columns(
+        {}, samples=trend[step, 1].astype(np.int64), **_channels(task, channel), mean=means.ravel(),
+        unit=task.labels[2][channel],
+    ))  # fmt: skip
+
+
+def _estimate(task: Task, row: int, sums: Sums) -> Table:
+    """Share of failures by the number of samples, with its interval, at the pose that is shown."""
+    samples, failures = (sums.trend[:, k].astype(np.int64) for k in (0, 2))
+    interval = np.array([binomial(k, n) for k, n in zip(failures.tolist(), samples.tolist(), strict=True)])
+    columns = ESTIMATE.columns(
+        {}, samples=samples, failure=failures / samples, failure_low=interval[:, 0], failure_high=interval[:, 1]
+    )
+    return ESTIMATE.table([*at_poses(task, np.full(len(samples), row)), *columns])

@@ -1,0 +1,163 @@
+"""How the body is held in a pose: its legs as equivalent springs [S4, Fig. 6], and a motion that nothing holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mechdesign.numerics.arrays import Complexes
+from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.stiffness.analysis import DrawnPose
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
+from mechdesign.report.figures.labels import Label, covered, place_labels
+from mechdesign.report.figures.panels import quantity
+from mechdesign.report.figures.scene import Scene, hull, pose
+from mechdesign.report.figures.shapes import point_labels
+from mechdesign.results import Table
+from mechdesign.study import Poses, Study
+
+_COIL_LENGTH = 0.17  # over the size of the mechanism
+_COIL_SWING = 0.12  # half the width of a coil over its length
+_COIL_TURNS = 7
+_ORDER = 5.0  # above the mechanism
+LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
+
+
+def springs_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
+    scene = pose(study.mechanism, drawn.configuration)
+    coils = _coils(study, drawn, scene) if scene is not None else []
+    if scene is None or not coils:
+        return None
+    places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
+    figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
+    draw_coils(axes, coils)
+    place_labels(axes, [coil.label for coil in coils] + point_labels(scene), covered(axes), order=8)
+    return figure
+
+
+def _coils(study: Study, drawn: DrawnPose, scene: Scene) -> list[Coil]:
+    legs, length = drawn.body.legs or (), _COIL_LENGTH * scene.span
+    coils, own = [], drawn.springs
+    columns = (own.leg, own.place, own.angle, own.stiffness)
+    for k, place, angle, stiffness in zip(*(column.tolist() for column in columns), strict=True):
+        if np.isnan(angle):
+            continue
+        leg, along = legs[k], complex(np.exp(1j * angle))
+        base, tip = scene.points[leg.base], scene.points[leg.tip]
+        inward = ((base - place) * along.conjugate()).real
+        grounded = abs(inward) > length and abs(base - place - inward * along) < 1e-6 * scene.span
+        if grounded:
+            anchor = base
+        else:
+            # Its line passes the leg's base: away from the body.
+            body = scene.points[drawn.body.section.point]
+            anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
+        text = quantity(stiffness, study.units.label("stiffness"))
+        coils.append(Coil(text, place, anchor, tip, length, grounded))
+    return coils
+
+
+@dataclass(frozen=True)
+class Coil:
+    """A spring from the point where it holds to its anchor; `tip` is the end of its leg, `length` of its coiled middle.
+
+    The anchor of a grounded one is a joint of the ground, which the mechanism's drawing shows already.
+    """
+
+    text: str
+    place: complex
+    anchor: complex
+    tip: complex
+    length: float
+    grounded: bool
+
+    @property
+    def path(self) -> Complexes:
+        """The drawn line."""
+        span = self.anchor - self.place
+        share = np.linspace(0, 1, 600)
+        part = min(0.7, self.length / abs(span))
+        inside = np.clip((share - 0.5) / part + 0.5, 0, 1)
+        wave = _COIL_SWING * self.length * np.sin(2 * np.pi * _COIL_TURNS * inside)
+        return self.place + span * (share + 1j * wave / abs(span))
+
+    @property
+    def label(self) -> Label:
+        """Its stiffness, beside its middle."""
+        span = self.anchor - self.place
+        anchors = tuple(self.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
+        heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
+        return Label(self.text, anchors, style.VERMILION, 16, heading, 9.5)
+
+
+def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
+    """Coil springs along their lines, each with a hatched anchor, and a dashed line to where the leg ends."""
+    for coil in coils:
+        if abs(coil.place - coil.tip) > 1e-3 * abs(coil.anchor - coil.place):
+            _line(axes, np.array([coil.tip, coil.place]), 1.1, 0.0, linestyle=(0, (4, 3)))
+        _line(axes, coil.path, 3.6, 0.05, color="white")
+        _line(axes, coil.path, 1.5, 0.1)
+        axes.plot(
+            [coil.place.real], [coil.place.imag], "o", markersize=5, color=style.VERMILION, markeredgecolor="white",
+            zorder=_ORDER + 0.3,
+        )  # fmt: skip
+        if coil.grounded:
+            continue
+        along = coil.length * (coil.anchor - coil.place) / abs(coil.anchor - coil.place)
+        bar = 0.2j * along
+        _line(axes, np.array([coil.anchor - bar, coil.anchor + bar]), 1.6, 0.1)
+        for foot in coil.anchor + np.linspace(-1, 1, 6) * bar:
+            _line(axes, np.array([foot, foot + (0.1 + 0.07j) * along]), 1.0, 0.1)
+
+
+def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: object) -> None:
+    options: dict[str, Any] = {"color": style.VERMILION, "solid_capstyle": "round", "solid_joinstyle": "round"} | look
+    axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_ORDER + lift, **options))
+
+
+def free_motion_figure(study: Study, table: Table, poses: Poses, drawn: DrawnPose) -> Figure | None:
+    """The asked body moved both ways along its free twist, at the first pose that has one."""
+    section, row = drawn.body.section, drawn.row
+    scene = pose(study.mechanism, drawn.configuration)
+    if scene is None:
+        return None
+    at = scene.points[section.point]
+    body = [at, *hull([scene.points[p] for p in scene.link_points(section.link)])] if section.link else [at]
+    turn = float(table["free_phi"][row]) if "free_phi" in table else 0.0
+    rest = np.array([*body[1:], *body[1:2]] if len(body) > 1 else body)
+    shift = complex(table["free_x"][row], table["free_y"][row])
+    move = shift + 1j * turn * (rest - at)
+    scale = LARGEST_MOVE * scene.span / max(float(np.abs(move).max()), 1e-300)
+    if turn:
+        # Turned about its instantaneous centre, so that it keeps its shape.
+        centre = at + 1j * shift / turn
+        ways = [centre + (rest - centre) * np.exp(1j * way * scale * turn) for way in (1, -1)]
+    else:
+        ways = [rest + way * scale * move for way in (1, -1)]
+    places = np.concatenate([[*scene.points.values()], *ways])
+    figure, axes = posed(study, poses, drawn, places, "free motion")
+    for line, dash in zip(ways, ("-", "--"), strict=True):
+        axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
+                  marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip
+    axes.legend(loc="upper left", frameon=True, framealpha=0.85, edgecolor="none")
+    return figure
+
+
+def posed(
+    study: Study, poses: Poses, drawn: DrawnPose, places: Complexes, what: str, **look: Any
+) -> tuple[Figure, Axes]:
+    """The mechanism in a pose, in a window that holds these places, too."""
+    title = style.folded(f"{what} at {pose_in_words(study, poses, drawn.row)}", 11.0, style.width() - LEFT)
+    above = TITLE + style.line(11.0) * title.count("\n")
+    figure, axes = framed(places, study.units.label("length"), height=MAX_HEIGHT, above=above)
+    axes.set_title(title, loc="left")
+    draw_mechanism(axes, study.mechanism, drawn.configuration, **look)
+    return figure, axes

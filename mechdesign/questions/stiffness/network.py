@@ -1,0 +1,382 @@
+"""Bodies connected by joints and beams: a network, its loops, and the path from the ground to each body.
+
+Vertices are rigid bodies, and the places of elastic links at which something is attached to their beams. Edges are
+joints and, for an elastic link, the stretch of its beams from their beginning to each such place. A motor that holds
+the angle between two links without a common joint is an edge of its own, free to shift. A tree from the ground reaches
+every vertex; each other edge closes a loop.
+
+A telescopic leg is two bodies. The pin of a slot is a massless block. A pin of three or more links is a massless body
+to which each of them is hinged, unless one of them is the ground or the asked body.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
+from mechdesign.mechanism.mechanism import Mechanism
+from mechdesign.mechanism.model import Drive, Fixed, Prismatic
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, corners_of
+from mechdesign.questions.stiffness.schema import StiffnessSection
+
+# The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
+ASKED = ":asked"
+# Prefix of the massless body of a pin; its point follows.
+_PIN = "pin:"
+# Edges along a path, each with its direction: 1 from `a` to `b`, -1 from `b` to `a`.
+EdgePath = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class NetworkEdge:
+    """A joint, or a stretch of beams, from vertex `a` to vertex `b`, with its freedoms in order from `a`.
+
+    Parameters
+    ----------
+    name : str
+        Of a joint, its point or slide; of beams, their link.
+    point : str
+        The joint's point; of beams, the point at their end.
+    """
+
+    a: str
+    b: str
+    elements: tuple[Element, ...]
+    name: str
+    point: str
+
+    @property
+    def beam(self) -> Beam | None:
+        """The stretch of a link's beams; None for a joint."""
+        return next((element for element in self.elements if isinstance(element, Beam)), None)
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Bodies of a mechanism and the edges that connect them.
+
+    Parameters
+    ----------
+    asked : str
+        The body whose stiffness is computed: that of the `link`, or `ASKED` for a pin or the end of an elastic link.
+    link : str or None
+        None for a pin.
+    points : mapping of str to tuple of (str, str)
+        Points of each moving link, with the vertices to which they belong.
+    """
+
+    edges: tuple[NetworkEdge, ...]
+    asked: str
+    link: str | None
+    points: Mapping[str, tuple[tuple[str, str], ...]]
+
+
+def link_of(body: str) -> str:
+    """The link to which a body belongs; empty for a massless body."""
+    return "" if body.startswith((_PIN, "slot:", ASKED)) else body.removesuffix(":rod")
+
+
+def is_pin(body: str) -> bool:
+    """Whether a body is the massless pin of several links."""
+    return body.startswith(_PIN)
+
+
+def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Bodies:
+    """Bodies with all joints of a mechanism, the motors without a joint, and the beams of elastic links.
+
+    If the asked link is elastic, the asked body is its cross-section at the point `at`.
+    """
+    graph, description = mechanism.graph, mechanism.description
+
+    def holder(name: str, point: str) -> str:
+        return name if (name, point) in graph.points else rod_of(name)
+
+    asked = ASKED if link is None or link in section.elastic else holder(link, at)
+    builder = _Builder(mechanism, section, asked)
+    holders: dict[str, list[str]] = {}
+    for body, point in graph.points:
+        if ":" not in point:
+            holders.setdefault(point, []).append(body)
+    for name, leg in description.links.items():
+        if leg.telescopic and leg.ends is not None:
+            builder.slide(name, name, rod_of(name), leg.ends[1], base=leg.ends[0])
+    clamps = []
+    for name, joint in description.joints.items():
+        if isinstance(joint, Fixed):
+            clamps.append((holder(joint.links[0], joint.point), holder(joint.links[1], joint.point), joint.point))
+            continue
+        line = joint.line
+        through = line.through if line.through is not None else origin_of(line.link)
+        if isinstance(joint, Prismatic):
+            other = holder(joint.slider, joint.point)
+        else:
+            other = f"slot:{name}"
+            holders[joint.point].append(other)
+        builder.slide(name, holder(line.link, through), other, joint.point)
+    if asked == ASKED:
+        holders[at].append(ASKED)
+        if link is not None:
+            clamps.append((holder(link, at), ASKED, at))
+    for a, b, point in clamps:
+        builder.join(a, b, (), point, point)
+    pins = {point: _clusters(point, bodies, clamps) for point, bodies in holders.items()}
+    for point, clusters in pins.items():
+        builder.hinges(point, clusters)
+    for drive in description.drives.values():
+        if drive.kind == "angle" and drive.name not in builder.held:
+            builder.motor(drive, pins)
+    for name in section.elastic:
+        builder.beams(name)
+    return Bodies(tuple(builder.edges), asked, link, builder.points())
+
+
+@dataclass
+class _Builder:
+    """Collects edges.
+
+    `riding` are the slides on each body, with the points that ride there; `held` are the drives that hold a joint.
+    """
+
+    mechanism: Mechanism
+    section: StiffnessSection
+    asked: str
+    edges: list[NetworkEdge] = field(default_factory=list)
+    riding: dict[str, dict[str, str]] = field(default_factory=dict)
+    held: set[str | None] = field(default_factory=set)
+
+    def join(
+        self, a: str, b: str, elements: tuple[Element, ...], name: str, point: str, seat: str | None = None
+    ) -> None:  # fmt: skip
+        """Add a joint between two bodies at a point, on body `a` at the point or slide `seat`."""
+        self.edges.append(NetworkEdge(self._vertex(a, seat or point), self._vertex(b, point), elements, name, point))
+
+    def slide(self, name: str, a: str, b: str, point: str, base: str | None = None) -> None:
+        """Add a slide of body `b` along body `a`; the bearing of a telescopic leg is at its `base`."""
+        slide = self.mechanism.graph.slides.index(name)
+        drives = self.mechanism.description.drives.values()
+        drive = next((d.name for d in drives if d.kind != "angle" and d.target == name), None)
+        elements = (*self._freedom(Guide(slide, drive)), *self._bearing(name, base or point, slide))
+        # The beam of a leg's rod begins at the base.
+        end = self._vertex(b, point) if base is None else self._node(b, base)
+        self.edges.append(NetworkEdge(self._vertex(a, name), end, elements, name, point))
+        self.riding.setdefault(a, {})[name] = point
+
+    def hinges(self, point: str, clusters: list[list[str]]) -> None:
+        """Add the pin of clusters of bodies, with its bearing: between two, or between each of more and the pin."""
+        if len(clusters) < 2:
+            return
+        fixed = next((cluster for cluster in clusters if GROUND in cluster), None)
+        hub = fixed or next((cluster for cluster in clusters if self.asked in cluster), None)
+        # The ground and the asked body hold each cluster directly; an asked pin lies midway between two links.
+        if hub is None or not (fixed or hub == [ASKED] or len(clusters) == 2 or point not in self.section.bearings):
+            hub = clusters[0] if len(clusters) == 2 else [_PIN + point]
+        give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0) if hub == [ASKED] else 1.0
+        for cluster in clusters:
+            if cluster is not hub:
+                drive = self._drive_between(hub, cluster)
+                elements = (*self._freedom(Hinge(point, drive)), *self._bearing(point, point, None, give))
+                self.join(self._hinged_body(hub), self._hinged_body(cluster), elements, point, point)
+
+    def motor(self, drive: Drive, pins: Mapping[str, list[list[str]]]) -> None:
+        """Add a motor between two links without a common joint: at a pin of both, or else at their first points."""
+        links = (drive.reference, drive.target)
+        seat, point = (next(iter(self.mechanism.description.links[link].points), origin_of(link)) for link in links)
+        a, b = links
+        for pin, clusters in pins.items():
+            body, other_body = (next((b for c in clusters for b in c if link_of(b) == link), None) for link in links)
+            if body is not None and other_body is not None:
+                a, b, seat, point = body, other_body, pin, pin
+                break
+        elements = (Shift(1.0 + 0j), Shift(1j), *self._freedom(Hinge(point, drive.name)))
+        self.join(a, b, elements, drive.name, point, seat)
+
+    def beams(self, name: str) -> None:
+        """Add the beams of a link, from their beginning to each other point and to each slide on the link."""
+        link = self.mechanism.description.links[name]
+        body = rod_of(name) if link.telescopic else name
+        points = {point: point for point in corners_of(link)}
+        if not link.telescopic:
+            points |= {point: point for point in link.points} | self.riding.get(name, {})
+        root, *seats = points
+        section = self.section.elastic[name]
+        for seat in seats:
+            beam = Beam(link, root, points[seat], section)
+            self.edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{seat}", (beam,), name, points[seat]))
+
+    def points(self) -> dict[str, tuple[tuple[str, str], ...]]:
+        """Points of each moving link, with their vertices."""
+        points = {}
+        for name, link in self.mechanism.description.links.items():
+            if name == GROUND:
+                continue
+            vertices = [(point, self._node(name, point)) for point in link.points]
+            if link.telescopic and link.ends is not None:
+                vertices.append((link.ends[1], self._node(rod_of(name), link.ends[1])))
+            points[name] = tuple(vertices)
+        return points
+
+    def _freedom(self, element: Hinge | Guide) -> tuple[Element, ...]:
+        """The freedom of a joint; none if a rigid drive holds it."""
+        self.held.add(element.drive)
+        return (element,) if element.drive is None or element.drive in self.section.actuators else ()
+
+    def _bearing(self, name: str, point: str, slide: int | None, give: float = 1.0) -> tuple[Element, ...]:
+        return (Bearing(name, point, slide, give),) if name in self.section.bearings else ()
+
+    def _node(self, body: str, point: str) -> str:
+        """The vertex of a body at one of its points."""
+        link = link_of(body)
+        if body == GROUND or link not in self.section.elastic:
+            return body
+        telescopic = self.mechanism.description.links[link].telescopic
+        # The first body of a telescopic leg is rigid; the second is the cantilever from the leg's base to its end.
+        return body if telescopic and body == link else f"{body}@{point}"
+
+    def _vertex(self, body: str, point: str) -> str:
+        """The vertex of a body at a joint; that of a telescopic leg's rod is at its end."""
+        link = self.mechanism.description.links.get(link_of(body))
+        end = link.ends[1] if link is not None and link.telescopic and link.ends is not None else point
+        return self._node(body, end)
+
+    def _drive_between(self, first: list[str], second: list[str]) -> str | None:
+        """The drive of the angle between two clusters of bodies; None if there is none."""
+        clusters = [set(map(link_of, cluster)) for cluster in (first, second)]
+        for drive in self.mechanism.description.drives.values():
+            across = any(drive.target in a and drive.reference in b for a, b in (clusters, clusters[::-1]))
+            if drive.kind == "angle" and across:
+                return drive.name
+        return None
+
+    def _hinged_body(self, cluster: list[str]) -> str:
+        """The body of a cluster to which others are hinged: the ground or the asked body, or else the first."""
+        return next((body for body in (GROUND, self.asked) if body in cluster), cluster[0])
+
+
+def _clusters(point: str, bodies: list[str], clamps: list[tuple[str, str, str]]) -> list[list[str]]:
+    """Bodies at a point, those that are clamped to each other there in one cluster."""
+    clusters = [[body] for body in bodies]
+    for a, b, place in clamps:
+        if place == point:
+            joined = [c for c in clusters if a in c or b in c]
+            clusters = [c for c in clusters if c not in joined] + [[body for c in joined for body in c]]
+    return clusters
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Vertices, edges and loops that carry the `asked` body.
+
+    Parameters
+    ----------
+    paths : mapping of str to EdgePath
+        The path from the ground to each vertex.
+    loops : tuple of EdgePath
+        The edges around each loop.
+    points : mapping of str to tuple of (str, str)
+        Points of each moving link, with the vertices to which they belong.
+    """
+
+    edges: tuple[NetworkEdge, ...]
+    asked: str
+    paths: Mapping[str, EdgePath]
+    loops: tuple[EdgePath, ...]
+    points: Mapping[str, tuple[tuple[str, str], ...]]
+
+    @cached_property
+    def edges_along_beams(self) -> tuple[tuple[int, ...], ...]:
+        """The edges along the beams of each elastic link that carries a load."""
+        edges: dict[str, tuple[int, ...]] = {}
+        for k, edge in enumerate(self.edges):
+            if edge.beam:
+                edges[edge.name] = (*edges.get(edge.name, ()), k)
+        return tuple(edges.values())
+
+    def pin(self, point: str) -> tuple[str, ...]:
+        """Vertices whose mean displacement is that of the elastic pin at a point; none where the pin is rigid."""
+        for edge in self.edges:
+            if edge.name == point and any(isinstance(element, Bearing) for element in edge.elements):
+                return (edge.a,) if is_pin(edge.a) else (edge.a, edge.b)
+        return ()
+
+    def signs(self, path: Sequence[tuple[int, int]]) -> Floats:
+        """Direction of each edge along a path, 0 for the others, shape (edges,)."""
+        signs = np.zeros(len(self.edges))
+        for edge, sign in path:
+            signs[edge] += sign
+        return signs
+
+
+def build_network(bodies: Bodies) -> Network:
+    """The network of a mechanism; parts that carry no load have no edges and move with the vertex they hang on."""
+    kept = carrying(bodies)
+    # On a link that carries, an edge to an unloaded place stays: the beams before that place bend and move it.
+    bent = {edge.name for edge in kept if edge.beam}
+    kept = [edge for edge in bodies.edges if edge in kept or (edge.beam and edge.name in bent)]
+    network = _looped(tuple(_pinned(kept, bodies)), bodies)
+    return replace(network, paths=_with_idle(bodies.edges, network.paths))
+
+
+def carrying(bodies: Bodies) -> list[NetworkEdge]:
+    """Edges that can carry a load of the asked body: vertices with a single edge are removed, again and again."""
+    edges = list(bodies.edges)
+    while True:
+        degree = Counter(end for edge in edges for end in (edge.a, edge.b))
+        loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, bodies.asked)}
+        if not loose:
+            return edges
+        edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
+
+
+def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:
+    """Edges with each massless pin clamped to the first link that it joins, so that the pin cannot turn freely."""
+    pinned, seen = list[NetworkEdge](), set[str]()
+    for edge in edges:
+        pins = {end for end in (edge.a, edge.b) if is_pin(end) or (end == ASKED and bodies.link is None)}
+        if pins - seen:
+            edge = replace(edge, elements=tuple(element for element in edge.elements if not isinstance(element, Hinge)))
+        seen |= pins
+        pinned.append(edge)
+    return pinned
+
+
+def _with_idle(edges: Sequence[NetworkEdge], paths: Mapping[str, EdgePath]) -> dict[str, EdgePath]:
+    """Paths to all vertices: a vertex that carries no load has the path of the vertex on which it hangs."""
+    all_paths = dict(paths)
+    waiting = list(edges)
+    while waiting:
+        ready = [edge for edge in waiting if edge.a in all_paths or edge.b in all_paths]
+        for edge in ready:
+            near, far = (edge.a, edge.b) if edge.a in all_paths else (edge.b, edge.a)
+            all_paths.setdefault(far, all_paths[near])
+        waiting = [edge for edge in waiting if edge not in ready]
+    return all_paths
+
+
+def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
+    """The network of the shortest paths from the ground, and of a loop for every other edge."""
+    paths: dict[str, EdgePath] = {GROUND: ()}
+    queue = deque([GROUND])
+    tree: set[int] = set()
+    while queue:
+        vertex = queue.popleft()
+        for k, edge in enumerate(edges):
+            for near, far, sign in ((edge.a, edge.b, 1), (edge.b, edge.a, -1)):
+                if near == vertex and far not in paths:
+                    paths[far] = (*paths[vertex], (k, sign))
+                    tree.add(k)
+                    queue.append(far)
+    loops = []
+    for k, edge in enumerate(edges):
+        if k not in tree and edge.a in paths and edge.b in paths:
+            total: dict[int, int] = {k: 1}
+            for path, sign in ((paths[edge.a], 1), (paths[edge.b], -1)):
+                for other, direction in path:
+                    total[other] = total.get(other, 0) + sign * direction
+            loops.append(tuple((e, s) for e, s in total.items() if s))
+    return Network(edges, bodies.asked, paths, tuple(loops), bodies.points)

@@ -1,0 +1,46 @@
+"""Where can it work? The reachable region of a point, its performance indices and its boundary."""
+
+from __future__ import annotations
+
+from mechdesign.progress import NULL, Progress
+from mechdesign.questions.workspace.boundary import poses_along
+from mechdesign.questions.workspace.drawn import DrawnRegion
+from mechdesign.questions.workspace.ellipses import ellipses
+from mechdesign.questions.workspace.point_path import point_path
+from mechdesign.questions.workspace.question import questions
+from mechdesign.questions.workspace.reached import Reached, reach
+from mechdesign.questions.workspace.remarks import remarks, rough, unreachable
+from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.tables import tables
+from mechdesign.results import Result
+from mechdesign.study import Study
+from mechdesign.work.threads import one_thread
+
+
+@one_thread()
+def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
+    """Region that a point reaches, its indices, local ones on a grid, and its boundary; see `mechdesign.workspace`."""
+    section = study.workspace
+    if section is not None and study.mechanism.mobility == 1:
+        return point_path(study)
+    asked = questions(study)
+    assert section is not None
+    progress.start(len(asked), "regions")
+    regions: list[Reached] = []
+    for question in asked:
+        regions.append(reach(question))
+        progress.update(1)
+    full = [region for region in regions if region.boundary is not None]
+    if not full:
+        raise unreachable(study, asked)
+    warnings = [caution for row, region in enumerate(regions) for caution in remarks(study, region, row)]
+    counts = {"regions": len(regions), "empty": len(regions) - len(full)}
+    ranged = next((name for name, values in section.at.items() if isinstance(values, Over)), "")
+    named = {table.name: table for table in tables(study, regions, ranged)}
+    if ranged:
+        return Result("workspace", named, (*warnings, *rough(ranged, regions)), counts)
+    first = full[0]
+    assert first.boundary is not None
+    along = poses_along(study, first.question.held, first.boundary)
+    drawn = DrawnRegion(along, ellipses(first.question.field, first.patches))
+    return Result("workspace", named, tuple(warnings), counts, drawn=drawn)

@@ -1,0 +1,131 @@
+"""The boundary of a region, curve by curve: places, what ends the region there, drives; and poses along it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.poses import radians
+from mechdesign.questions.workspace.ranged import Ranged
+from mechdesign.region.field import Field
+from mechdesign.region.patches import Patch
+from mechdesign.study import Study
+
+# Where rounding leaves a drive without a value on the boundary it is read so far inside (as a part of the radius).
+BESIDE = 1e-12
+# Poses along all curves of one side of the boundary.
+POSES = {"inner": 2, "outer": 4}
+# So far inside the boundary, as a part of the way to its middle: on it rounding may open the mechanism.
+INSIDE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Points of the curves that bound a region, first those where rays enter it; all of shape (points,).
+
+    Parameters
+    ----------
+    z : ndarray of complex
+    theta : ndarray
+        Angles of the rays (radians).
+    kind, at : ndarray of str
+        Whether a limit or a singularity ends the region there, and which.
+    side : ndarray of str
+        ``inner`` or ``outer``: which end of the ray's interval.
+    curve, piece : ndarray of int
+        Numbers of the curve and of the region's piece.
+    values : sequence of (Coordinate, ndarray)
+        The drives (radians or lengths); over a range of a held coordinate its value that decides.
+    """
+
+    z: Complexes
+    theta: Floats
+    kind: np.ndarray
+    at: np.ndarray
+    side: np.ndarray
+    curve: Ints
+    piece: Ints
+    values: Sequence[tuple[Coordinate, Floats]]
+
+
+def boundary_of(field: Field, patches: Sequence[Patch], reasons: Sequence[tuple[str, str]]) -> Boundary:
+    """The boundary of a region; `reasons` are the `causes` of its field."""
+    curves = [
+        (patch, edge) for side in ("inner", "outer") for patch in patches for edge in patch.edges if edge.side == side
+    ]
+    lengths = [len(patch.theta) for patch, _ in curves]
+    theta, radius = np.concatenate([p.theta for p, _ in curves]), np.concatenate([e.radius for _, e in curves])
+    margin, side, piece = (
+        np.repeat(values, lengths)
+        for values in ([e.margin for _, e in curves], [e.side for _, e in curves], [p.piece for p, _ in curves])
+    )
+    about, turn = patches[0].about, np.exp(1j * theta)
+    inwards, z = np.where(side == "inner", 1.0, -1.0), np.asarray(about + radius * turn)
+    if isinstance(field, Ranged):
+        values = [_deciding(field, z, margin)]
+    else:
+        values = _drives(field, z, np.asarray(about + radius * (1 + BESIDE * inwards) * turn), inwards)
+    kind, at = (np.array(words)[margin] for words in ([kind for kind, _ in field.labels], [at for _, at in reasons]))
+    curve = np.repeat(np.arange(len(curves)), lengths)
+    return Boundary(z, theta, kind, at, side, curve, piece, values)
+
+
+def _deciding(over: Ranged, z: Complexes, margin: Ints) -> tuple[Coordinate, Floats]:
+    """The held coordinate of a range, and its value that decides at each point."""
+    row = np.array([over.extreme(label) for label in range(len(over.labels))])[margin]
+    return over.outputs[2 + over.which], np.take_along_axis(over.deciding(z)[1], row[None], axis=0)[0]
+
+
+def _drives(field: Field, z: Complexes, within: Complexes, inwards: Floats) -> list[tuple[Coordinate, Floats]]:
+    """Drives on the boundary, or `within` the region where rounding opens the mechanism on it.
+
+    Angles lie within the drive's limits; where it has none they are continuous along each side, in the turn that is
+    nearest to the sketch.
+    """
+    mechanism, sides = field.mechanism, np.flatnonzero(np.diff(inwards)) + 1
+    exact, near = field.configuration(z, {}), field.configuration(within, {})
+    drives = []
+    for drive in mechanism.forward.structure.given:
+        here, beside = (np.broadcast_to(c.value(drive), z.shape) for c in (exact, near))
+        values = np.where(np.isfinite(here), here, beside)
+        if drive.quantity == "angle" and drive.name not in mechanism.turns({}):
+            drawn = float(mechanism.sketch_configuration.value(drive))
+            parts = [np.unwrap(part) for part in np.split(values, sides)]
+            turns = [2 * np.pi * np.round((np.mean(part) - drawn) / (2 * np.pi)) for part in parts]
+            values = np.concatenate([part - turn for part, turn in zip(parts, turns, strict=True)])
+        drives.append((drive, values))
+    return drives
+
+
+def poses_along(study: Study, held: Mapping[str, float], boundary: Boundary) -> Configuration:
+    """Poses at places a little inside the boundary, evenly along each of its sides, shape (places,).
+
+    `held` are the coordinates that are held, in the study's units; pieces that are left out do not count.
+    """
+    assert study.workspace is not None
+    mechanism, point = study.mechanism, study.workspace.point
+    own = boundary.piece == 1 if study.workspace.assembly == "same" else np.ones(len(boundary.z), dtype=bool)
+    places = _places(boundary.z[own], boundary.side[own], boundary.curve[own])
+    plan = mechanism.plan((f"{point}.x", f"{point}.y", *held))
+    values = [radians(study, mechanism.coordinate(name), value) for name, value in held.items()]
+    return plan.solve([places.real, places.imag, *values], limits=False)
+
+
+def _places(z: Complexes, side: np.ndarray, curve: Ints) -> Complexes:
+    places = []
+    middle = complex(np.mean(z.real), np.mean(z.imag)) if len(z) else 0j
+    for end, number in POSES.items():
+        own, of = z[side == end], curve[side == end]
+        if not len(own):
+            continue
+        steps = np.where(np.diff(of, prepend=-1) == 0, np.abs(np.diff(own, prepend=own[:1])), 0.0)
+        along = np.cumsum(steps)
+        for share in (np.arange(number) + 0.5) / number:
+            k = int(np.searchsorted(along, share * along[-1]))
+            places.append(own[k] + INSIDE * (middle - own[k]) * (1 if end == "outer" else -1))
+    return np.array(places, dtype=complex)

@@ -1,0 +1,207 @@
+"""What bounds a region: with the mechanism along it, the study before, the largest shapes inside, and the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Rectangle
+
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value
+from mechdesign.numerics.arrays import Complexes
+from mechdesign.questions.poses import in_study_units, radians
+from mechdesign.questions.workspace.drawn import DrawnRegion
+from mechdesign.questions.workspace.figures.regions import ROOM, Region, fill, lines, pieces, places, sheet, some
+from mechdesign.questions.workspace.tables import curves
+from mechdesign.report.before import Before
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.labels import HALO
+from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
+from mechdesign.report.figures.panels import MAX_PANELS, Along, legend_below, stack, tick_abscissa
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+CIRCLE = ("circle_x", "circle_y", "circle_radius")
+RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
+SIDES = ("inner", "outer")
+# Of the drives.
+LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
+DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
+_DRIVES_HEIGHT = 1.9  # inches, of a panel
+_SMALL_SYMBOLS = 0.7
+
+
+def workspace_figure(
+    study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
+) -> Figure:
+    """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
+    section, mechanism = study.workspace, study.mechanism
+    assert section is not None
+    reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
+    extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
+                             places_before(before)])  # fmt: skip
+    where = f" at {region.title}" if region.title else ""
+    title = title or f"workspace of point {section.point}{where}, the mechanism along its boundary"
+    page = sheet(study, extent, [""], title, bar=False, pad=ROOM)
+    (axes,) = page.axes
+    fill(axes, region.local)
+    page.ends([region])
+    draw_before(axes, before)
+    for index in range(len(drawn.along.reason)):
+        draw_mechanism(axes, mechanism, drawn.along, index, faint=True)
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
+    name_both(page.figure, before)
+    return page.figure
+
+
+def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
+    """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
+    title = "the mechanism where it is best conditioned"
+    return regions_figure([(region.title, study, region) for region in some(regions)], title, before)
+
+
+def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
+    """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
+    study, shown = parts[0][1], [region for _, _, region in parts]
+    assert study.workspace is not None
+    poses = [_pose_inside(own, region) for _, own, region in parts]
+    reached = np.concatenate([np.ravel(pose.point(point)) for pose in poses for point in study.mechanism.points])
+    everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
+                                 places_before(before)])  # fmt: skip
+    title = f"workspace of point {study.workspace.point}, {title}"
+    page = sheet(study, everywhere, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
+    for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
+        fill(axes, region.local)
+        draw_mechanism(axes, own.mechanism, configuration, faint=True, size=_SMALL_SYMBOLS)
+        draw_before(axes, before, region.held)
+    page.ends(shown)
+    name_both(page.figure, before)
+    return page.figure
+
+
+def _pose_inside(study: Study, region: Region) -> Configuration:
+    """The pose at the node of a region where the Jacobian is conditioned best."""
+    return solved_inside(study, region, [int(np.argmax(np.nan_to_num(region.local["inverse_condition"], nan=-1.0)))])
+
+
+def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = slice(None)) -> Configuration:
+    """Poses with the point at some nodes of a region's grid, not judged by the limits."""
+    assert study.workspace is not None
+    point, local = study.workspace.point, region.local
+    given: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
+    plan = study.mechanism.plan(tuple(given))
+    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
+    return plan.solve(np.broadcast_arrays(*values), limits=False)
+
+
+def inscribed_figure(study: Study, result: Result, regions: Sequence[Region]) -> Figure | None:
+    """The regions with the shapes that their row of indices gives; None where it gives none."""
+    table = result.tables["indices"]
+    if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
+        return None
+    shown = some(regions)
+    places = np.concatenate([region.places() for region in shown])
+    page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
+                 bar=False)  # fmt: skip
+    unit = study.units.label("length")
+    size = 9 if len(shown) == 1 else 7.5
+    for axes, region in zip(page.axes, shown, strict=True):
+        fill(axes, region.local)
+        shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
+        if CIRCLE[0] in table:
+            x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
+            shapes.append((Circle((x, y), radius), (x, y), f"r = {radius:.4g}", style.BLUE))
+            axes.plot(x, y, "+", color=style.BLUE, zorder=4)
+        if RECTANGLE[0] in table:
+            x, y, width, height = (float(table[name][region.row]) for name in RECTANGLE)
+            corner = (x - width / 2, y - height / 2)
+            shapes.append((Rectangle(corner, width, height), corner, f"{width:.4g} x {height:.4g}", style.GREEN))
+        for shape, place, words, color in shapes:
+            if np.isfinite(place).all():
+                shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)
+                axes.add_patch(shape)
+                axes.annotate(f"{words} {unit}".strip(), place, (4, 4), textcoords="offset points", color=color,
+                              fontsize=size, zorder=5, path_effects=HALO)  # fmt: skip
+    page.ends(shown)
+    return page.figure
+
+
+def drives_figure(study: Study, regions: Sequence[Region]) -> Figure:
+    """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
+    names, mechanism = study.mechanism.drives, study.mechanism
+    parts = [
+        (region.boundary, side, region.title)
+        for region in some([region for region in regions if len(region.boundary)])
+        for side in SIDES
+        if (region.boundary["side"] == side).any()
+    ][:MAX_PANELS]
+    label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
+    figure, panels = stack(len(parts), "Drives along the boundary of the workspace", label, tall=_DRIVES_HEIGHT)
+    units = {study.units.label(mechanism.quantity(name)) for name in names}
+    limits: dict[float, list[str]] = {}
+    for bound in mechanism.bounds:
+        for end in bound.ends(mechanism.nominal) if bound.drive else ():
+            if end is not None:
+                value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
+                limits.setdefault(value, []).append(bound.coordinate.name)
+    entries: dict[str, Line2D] = {}
+    for axes, (boundary, side, where) in zip(panels, parts, strict=True):
+        for number, name in enumerate(names):
+            for rows in curves(boundary):
+                if boundary["side"][rows[0]] != side:
+                    continue
+                own = boundary.take(rows)
+                (entries[name],) = axes.plot(own["theta"], own[name], color=LINE_COLORS[number % len(LINE_COLORS)],
+                                             linestyle=DASHES[number % len(DASHES)], linewidth=1.9)  # fmt: skip
+        for limit, limited in limits.items():
+            entries["limit of a drive"] = axes.axhline(limit, color=style.INK, linewidth=0.9, zorder=1.5)
+            axes.annotate(", ".join(limited), (1, limit), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
+                          textcoords="offset points", fontsize=7.5, path_effects=HALO)  # fmt: skip
+        axes.set_title(", ".join(filter(None, (where, f"{side} boundary"))), loc="left", fontsize=9.5)
+        axes.set_ylabel(style.axis_label("drive", "".join(units) if len(units) == 1 else ""))
+    every = np.concatenate([boundary["theta"] for boundary, *_ in parts])
+    tick_abscissa(panels[-1], Along(every, label))
+    panels[-1].set_xlim(float(every.min()), float(every.max()))
+    legend_below(figure, list(entries.values()), list(entries))
+    return figure
+
+
+def draw_before(axes: Axes, before: Before | None, held: Mapping[str, float] | None = None) -> None:
+    """The boundary or the path of the study before; where nothing is held, its mechanism in its sketch pose."""
+    if before is None:
+        return
+    for line in _lines(before, held):
+        draw_line(axes, line, 1.8)
+    if not held:
+        mechanism = before.study.mechanism
+        draw_pose(axes, mechanism, mechanism.sketch_configuration)
+
+
+def places_before(before: Before | None) -> Complexes:
+    """All points of what is drawn of the study before."""
+    curves = [*_lines(before), sketch_places(before.study)] if before is not None else []
+    return np.concatenate([np.empty(0, dtype=complex), *curves])
+
+
+def sketch_places(study: Study) -> Complexes:
+    """Places of all points in the sketch pose."""
+    mechanism = study.mechanism
+    return np.concatenate([np.ravel(mechanism.sketch_configuration.point(point)) for point in mechanism.points])
+
+
+def _lines(before: Before, held: Mapping[str, float] | None = None) -> list[Complexes]:
+    """Curves that end its region, for values of held coordinates if they are given; its path."""
+    tables = before.result.tables
+    if "path" in tables:
+        z = places(tables["path"])
+        return [z[rows] for rows in pieces(tables["path"])]
+    if "boundary" not in tables:
+        return []
+    edge = tables["boundary"]
+    return lines(edge.take(edge.where(**{name: value for name, value in (held or {}).items() if name in edge})))

@@ -1,0 +1,94 @@
+"""A picture of how evenly a point moves and holds over its region: ellipses of velocity and of force."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.workspace.ellipses import Ellipses
+from mechdesign.questions.workspace.figures.regions import Region, fill, sheet
+from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import LEFT
+from mechdesign.report.figures.panels import quantity, round_down
+from mechdesign.study import Study
+
+# Half axis of the largest ellipse drawn at the common scale, over the distance of neighbouring places; of this share
+# of the ellipses none is larger. The rest would cover others: they grow without bounds towards singularities.
+_LARGEST = 0.48
+_USUAL = 0.7
+_TURN = np.exp(1j * np.linspace(0.0, 2 * np.pi, 97))
+# Inches: what the legend of the ellipses needs, and of the ends of the region below it.
+_ROOM = 0.66
+_ABOVE_ENDS = 0.24
+_VELOCITY: dict[str, Any] = {"color": style.BLUE, "linestyle": "-"}
+_FORCE: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (3, 1.2))}
+
+
+def ellipses_figure(study: Study, region: Region, ellipses: Ellipses | None) -> Figure | None:
+    """Velocity ellipses, J u for drive rates u of unit size, and force ellipses, J^-T u for efforts u [Yoshikawa 1985].
+
+    None where the Jacobian is not that of a point.
+    """
+    section, units = study.workspace, study.units
+    if ellipses is None or section is None or not len(ellipses.places):
+        return None
+    title = f"where point {section.point} is fast (velocity ellipse) and where strong (force ellipse)"
+    page = sheet(study, region.places(), [""], title, bar=False, below=_ROOM)
+    (axes,) = page.axes
+    fill(axes, region.local)
+    page.ends([region])
+    with np.errstate(divide="ignore", over="ignore"):
+        u, sizes, _ = np.linalg.svd(ellipses.matrices)
+        inverse = 1 / sizes
+    directions = u[:, 0, :] + 1j * u[:, 1, :]
+    mechanism = study.mechanism
+    angular = section.characteristic_length is None and mechanism.quantity(mechanism.drives[0]) == "angle"
+    length, velocity = units.label("length"), units.label("velocity")
+    rate, effort = (f"rad/{units.time}", units.label("moment")) if angular else (velocity, units.label("force"))
+    mixed = section.characteristic_length
+    arcs = f", 1 rad = {quantity(mixed, length)}" if mixed is not None else ""
+    handles, thin = [], False
+    for name, half, look, unit, cause in (
+        ("velocity", sizes, _VELOCITY, velocity, f"rates (root of squares {_one(rate)}{arcs})"),
+        ("force", inverse, _FORCE, units.label("force"), f"efforts (root of squares {_one(effort)})"),
+    ):
+        on_axes, stands_for, fits = _scale(half.max(axis=1), ellipses.spacing)
+        words = f"{quantity(on_axes, length).rstrip()} long: {quantity(stands_for, unit)}"
+        handles.append(Line2D([], [], linewidth=1.4, label=f"{name} by unit drive {cause}: half axis {words}", **look))
+        for place, axis, pair in zip(ellipses.places, directions, half * on_axes / stands_for, strict=True):
+            largest = float(pair.max())
+            small = largest > fits
+            share = fits / largest if small else 1.0
+            ends = np.minimum(share * pair, fits)
+            edge = place + ends[0] * axis[0] * _TURN.real + ends[1] * axis[1] * _TURN.imag
+            axes.plot(edge.real, edge.imag, linewidth=0.7 if small else 1.4, zorder=4, **look)
+            thin |= small
+    if thin:
+        handles.append(Line2D([], [], color=style.FAINT, linewidth=0.7, label="thin: longer than drawn"))
+    if style.narrow():
+        for handle in handles:
+            handle.set_label(style.folded(str(handle.get_label()), 9.0, style.width() - LEFT - 0.5))
+        style.grow(page.figure, below=style.line(9.0) * sum(str(each.get_label()).count("\n") for each in handles))
+    height = page.figure.get_figheight()
+    page.figure.legend(handles=handles, loc="lower left", borderaxespad=0.3,
+                       bbox_to_anchor=(LEFT / style.width() - 0.02, _ABOVE_ENDS / height))  # fmt: skip
+    return page.figure
+
+
+def _one(unit: str) -> str:
+    """One of a unit: 1 mm/s, 1/s."""
+    return style.printed(unit if unit.startswith("1/") else f"1 {unit}")
+
+
+def _scale(half: Floats, spacing: float) -> tuple[float, float, float]:
+    """A round length on the axes, the round value of a half axis it stands for, and the longest half axis drawn."""
+    fits = _LARGEST * spacing
+    usual = float(np.quantile(half[np.isfinite(half)], _USUAL))
+    lengths = [round_down(fits / part) for part in (1.0, 2.2, 5.0)]
+    # For each length the next round value above, so that no ellipse that should fit is larger.
+    scales = [(length, 1 / round_down(fits / (length * usual))) for length in lengths]
+    return (*max(scales, key=lambda each: each[0] / each[1]), fits)

@@ -1,0 +1,80 @@
+"""The path of a point with one degree of freedom, and how fast the point is over the drive."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
+from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, sheet
+from mechdesign.report.before import Before
+from mechdesign.report.figures import style
+from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.overlay import name_both
+from mechdesign.report.figures.panels import coordinate_label
+from mechdesign.results import Result, Table
+from mechdesign.study import Study
+
+# Speed ratios grow without bound at dead centres: colours end at this quantile.
+_SHOWN_RATIOS = 0.97
+
+
+def path_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
+    """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
+    path = result.tables["path"]
+    return {"path": _path(study, path, before), "speed_ratio": _speed(study, path)}
+
+
+def _ends(ratio: Floats) -> tuple[float, bool]:
+    """The largest value with a colour of its own, and whether a tail lies beyond it."""
+    finite = ratio[np.isfinite(ratio)]
+    high, top = float(np.quantile(finite, _SHOWN_RATIOS)), float(finite.max())
+    return (high, True) if top > 1.5 * high or len(finite) < len(ratio) else (top, False)
+
+
+def _label(path: Table) -> str:
+    return style.axis_label("speed ratio", path.column("speed_ratio").unit)
+
+
+def _path(study: Study, path: Table, before: Before | None) -> Figure:
+    mechanism, section = study.mechanism, study.workspace
+    assert section is not None
+    z = places(path)
+    title = f"path of point {section.point}, by its speed over the drive's"
+    reached = np.concatenate([z, sketch_places(study), places_before(before)])
+    page = sheet(study, reached, [""], title, bar=True, pad=ROOM)
+    (axes,) = page.axes
+    ratio = path["speed_ratio"]
+    top, tail = _ends(ratio)
+    norm = Normalize(0.0, top)
+    for rows in pieces(path):
+        axes.plot(z[rows].real, z[rows].imag, color=style.INK, linewidth=5.5, solid_capstyle="round", zorder=3.25)
+        coloured(axes, z[rows], ratio[rows], norm, 4)
+    draw_before(axes, before)
+    draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
+    name_both(page.figure, before)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), _label(path), extend="max" if tail else "neither")
+    return page.figure
+
+
+def _speed(study: Study, path: Table) -> Figure:
+    drive = study.mechanism.drives[0]
+    figure = style.new_figure(3.4)
+    axes = figure.add_subplot()
+    parts = pieces(path)
+    looks = zip(style.PALETTE * len(parts), DASHES * len(parts), strict=False)
+    for rows, (color, dashes) in zip(parts, looks, strict=False):
+        name = f"piece {int(path['piece'][rows[0]])}"
+        axes.plot(path[drive][rows], path["speed_ratio"][rows], color=color, linestyle=dashes, label=name)
+    top, tail = _ends(path["speed_ratio"])
+    axes.set_ylim(0, 1.3 * top if tail else None)
+    axes.set_title("Speed of the point over that of the drive", loc="left")
+    axes.set_xlabel(coordinate_label(study, drive))
+    axes.set_ylabel(_label(path))
+    axes.margins(x=0.01)
+    if len(parts) > 1:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return figure

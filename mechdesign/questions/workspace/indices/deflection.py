@@ -1,0 +1,41 @@
+"""How far the loads of the stiffness section move its point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mechdesign.errors import StudyError
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.workspace.index import Evaluate, Index, length, of_compliance
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+
+def prepare(study: Study) -> Evaluate:
+    """The largest displacement over the loads; infinite where the point is free.
+
+    Raises
+    ------
+    StudyError
+        If the section has no loads.
+    """
+    assert study.stiffness is not None
+    loads = np.array(study.stiffness.loads)
+    if not len(loads):
+        message = "the index 'deflection' needs loads, for example {loads: [[100, 0, 0]]}"
+        raise StudyError((study.problem(message, "stiffness", "loads"),))
+
+    def evaluate(soft: Floats) -> Floats:
+        moved = np.einsum("nij,lj->nli", soft, loads[:, : soft.shape[1]])
+        return np.asarray(np.hypot(moved[:, :, 0], moved[:, :, 1]).max(axis=1))
+
+    return of_compliance(study, evaluate, np.inf)
+
+
+INDEX = Index(
+    "largest displacement of the stiffness section's point under its loads", prepare,
+    length, crossing=float("inf"), section="stiffness",
+)  # fmt: skip

@@ -1,0 +1,59 @@
+"""Reliability at a pose: the chance that first-order normal errors keep the limits of the reliability section."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from mechdesign.errors import StudyError
+from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.workspace.index import Evaluate, Index, number, of_configurations
+
+if TYPE_CHECKING:
+    from mechdesign.study import Study
+
+
+def prepare(study: Study) -> Evaluate:
+    """Probability that all limits hold, the drives held [S2, eqs. 10, 11].
+
+    Raises
+    ------
+    StudyError
+        Where nothing is limited, or a velocity whose drives' rates are not known.
+    """
+    from mechdesign.questions.kinematics.rates import constant_rates, of_given
+    from mechdesign.questions.reliability.deflection import elasticity
+    from mechdesign.questions.reliability.first_order import linear_errors, linear_margins, nominal_values
+    from mechdesign.questions.reliability.probability import made_failure
+    from mechdesign.questions.reliability.question import ask
+    from mechdesign.questions.reliability.study_sources import find_sources
+
+    assert study.reliability is not None
+    mechanism, sources, question = study.mechanism, find_sources(study)[0], ask(study, study.reliability)
+    if not question.limited:
+        message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
+        raise StudyError((study.problem(message, "reliability", "limits"),))
+    # Nothing else needs to be computed.
+    question, rates = question.narrowed, constant_rates(study, study.reliability, mechanism.drives)
+    if of_given(study, study.reliability) and any(channel.order for channel in question.channels):
+        message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
+        raise StudyError((study.problem(message, "reliability", "limits"),))
+    bent = elasticity(study)[0]
+
+    def evaluate(configuration: Configuration) -> Floats:
+        elastic = None if bent is None else bent.at(configuration, question.channels)
+        linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic)
+        bands = question.at(nominal_values(mechanism, configuration, question.channels, rates)).bands
+        return 1.0 - made_failure(linear, linear_margins(mechanism, configuration, sources), bands, question.discs)
+
+    return of_configurations(evaluate)
+
+
+INDEX = Index(
+    "probability that first-order errors keep the limits",
+    prepare,
+    number,
+    bounds=(0.0, 1.0),
+    section="reliability",
+    source="S2, eqs. 10, 11",
+)

@@ -1,0 +1,37 @@
+"""The Jacobian at places of a region, from which local indices are computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.derivatives import Jacobian
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.region.field import LENGTH, Field, Places
+from mechdesign.region.rays import Designs
+
+
+@dataclass(frozen=True, eq=False)
+class Local(Jacobian):
+    """The Jacobian of a field's outputs at a batch of points; `known` holds the indices computed so far."""
+
+    configuration: Configuration
+    known: dict[str, Value] = field(default_factory=dict)
+
+    @staticmethod
+    def at(seen: Field, z: Complexes, places: Places) -> Local:
+        """What local indices at points `z` are computed from."""
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            configuration = seen.configuration(z, places)
+            jacobian = Jacobian.of(
+                seen.mechanism.linearize(configuration), seen.outputs, places.get(LENGTH, seen.length)
+            )
+            return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
+
+    @staticmethod
+    def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:
+        """The same at places of rays, each of a design."""
+        return Local.at(designs.field, designs.about + radius * np.exp(1j * theta), designs.of(design))

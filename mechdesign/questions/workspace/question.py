@@ -1,0 +1,184 @@
+"""What the workspace section asks, made ready: the regions, the scan, the rule, the indices, the columns."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.errors import Problem, StudyError
+from mechdesign.indices import INDEX_NAMES, REGIONAL, STATISTICS, USUAL, needed_section
+from mechdesign.numerics.arrays import Flags
+from mechdesign.questions.poses import radians
+from mechdesign.questions.workspace.index import Prepared, prepare
+from mechdesign.questions.workspace.ranged import Every, Ranged, Some, SomeDesigns
+from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.strips import Integrand
+from mechdesign.region.rays import Designs
+from mechdesign.region.regions import Region, problem, regions
+from mechdesign.study import Study
+from mechdesign.study.text.fields import parts_of
+from mechdesign.study.text.units import Amount
+
+# Relative tolerance of the integrals where the study says none: of one region, and of each design of many.
+TOLERANCE, GRID_TOLERANCE = 1e-5, 1e-4
+COLUMNS = tuple(REGIONAL)
+MEANS = {"GII": "inverse_condition", "GRI": "resistivity"}
+# What is answered of a region over a range.
+OF_RANGE = ("SUI", "area", "box_area")
+
+
+@dataclass(frozen=True, eq=False)
+class Question(Region):
+    """What the workspace section asks of a region.
+
+    Parameters
+    ----------
+    counted : (float, float)
+        Range of angle that the means are taken over (radians).
+    indices : tuple of Prepared
+        Local indices that `wanted` needs.
+    wanted : tuple of str
+        Columns of the answer.
+    shown : tuple of Prepared
+        Local indices of the table of nodes: those of `MEANS`, then the others.
+    rays_through : type of Designs
+        How rays meet the region of the field.
+    """
+
+    counted: tuple[float, float]
+    rule: str
+    tolerance: float
+    nodes: int | None
+    indices: tuple[Prepared, ...]
+    wanted: tuple[str, ...]
+    shown: tuple[Prepared, ...]
+    rays_through: type[Designs] = Designs
+
+    @cached_property
+    def statistics(self) -> dict[str, tuple[str, str]]:
+        """Local index and statistic of the wanted columns that have them."""
+        return {column: both for column in self.wanted if any(both := split(column))}
+
+    @property
+    def where(self) -> str:
+        """At which held values, for messages; nothing where none is held."""
+        held = ", ".join(f"{name} = {value:g}" for name, value in self.held.items())
+        return f" at {held}" if held else ""
+
+    @property
+    def integrands(self) -> list[Integrand]:
+        """What the wanted means and standard deviations need: the indices, and their squares."""
+        wanted = self.statistics.values()
+        return [
+            Integrand(index, power)
+            for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
+            for index in self.indices
+            if any((index.name, kind) in wanted for kind in kinds)
+        ]
+
+    @property
+    def extremes(self) -> Flags:
+        """Whether the infimum, and the supremum of each index is wanted, shape (2, indices)."""
+        wanted = self.statistics.values()
+        return np.array([[(index.name, kind) in wanted for index in self.indices] for kind in ("min", "max")])
+
+
+def columns(names: Iterable[str]) -> tuple[str, ...]:
+    """Columns of a workspace with these local indices."""
+    return (*COLUMNS, *(f"{name}_{kind}" for name in names for kind in STATISTICS))
+
+
+def split(column: str) -> tuple[str, str]:
+    """Local index and statistic of a column, ``("", "")`` of the area and its like."""
+    if column in MEANS:
+        return MEANS[column], "mean"
+    name, _, kind = column.rpartition("_")
+    return (name, kind) if kind in STATISTICS and name in INDEX_NAMES else ("", "")
+
+
+def shared(study: Study, asked: Sequence[Question], moved: Collection[str]) -> bool:
+    """Whether designs that differ in these parameters share the questions, but for what their fields take as arrays."""
+    field = asked[0].field
+    of_field = ("workspace.characteristic_length", *(() if field.plan.iterative else ("workspace.at.",)))
+    numbers = [part for key, part in parts_of(study.workspace, "workspace") if not key.startswith(of_field)]
+    followed = {name for part in numbers if isinstance(part, Amount) and part.expression
+                for name in part.expression.names}  # fmt: skip
+    return not isinstance(field, Ranged) and followed.union(study.fixed).isdisjoint(moved)
+
+
+def batched(column: str) -> bool:
+    """Whether a column is evaluated for many designs at once: the area and its like, and what the Jacobian gives."""
+    name = split(column)[0]
+    return column in COLUMNS or bool(name and needed_section(name) is None)
+
+
+def questions(study: Study, tolerance: float = TOLERANCE, wanted: Sequence[str] | None = None) -> list[Question]:
+    """One question a value of ``at``; over a range of one of them one for all its values.
+
+    Parameters
+    ----------
+    tolerance : float
+        Of the integrals where the study says none.
+    wanted : sequence of str, optional
+        Columns of the answer; left out, all of those indices that the study asks for, over a range `OF_RANGE`.
+
+    Raises
+    ------
+    StudyError
+        If the section lacks what cannot be assumed.
+    """
+    section = study.workspace
+    over = {} if section is None else {name: values for name, values in section.at.items() if isinstance(values, Over)}
+    for name, values in over.items():
+        return list(_over_range(study, name, values, tolerance, OF_RANGE if wanted is None else wanted))
+    if section is not None and wanted is None:
+        wanted = columns(USUAL if section.indices is None else section.indices)
+    all_regions = regions(study)
+    assert section is not None
+    assert wanted is not None
+    (start, stop), margin = all_regions[0].scan, section.margin * study.units.angle_factor
+    if stop - start <= 2 * margin:
+        raise problem(study, "margin", "the margin leaves nothing of the scan; give a smaller one")
+    integrate_by = section.integrate
+    if "tolerance" in integrate_by.model_fields_set:
+        tolerance = integrate_by.tolerance
+    names = [name for name in dict.fromkeys(split(column)[0] for column in wanted) if name]
+    ready = {index.name: index for index in prepare(study, list(dict.fromkeys([*MEANS.values(), *names])))}
+    counted, indices = (start + margin, stop - margin), tuple(ready[name] for name in names)
+    return [
+        Question(**vars(region), counted=counted, rule=integrate_by.rule, tolerance=tolerance,
+                 nodes=integrate_by.nodes, indices=indices, wanted=tuple(wanted), shown=tuple(ready.values()))
+        for region in all_regions
+    ]  # fmt: skip
+
+
+def _over_range(
+    study: Study, name: str, over: Over, tolerance: float, wanted: Sequence[str]
+) -> Iterator[Question]:  # fmt: skip
+    """One question a value of the other held coordinates."""
+    assert study.workspace is not None
+    for column in wanted:
+        if column not in OF_RANGE:
+            known = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
+            raise problem(study, "at", f"{column} has no value: {known}; ask for single values: at: {{{name}: [...]}}")
+    # Only the area is asked, in which angles and lengths do not mix.
+    update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
+              "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip
+    coordinate = study.mechanism.coordinate(name)
+    low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
+    single = replace(study, workspace=study.workspace.model_copy(update=update))
+    for question in questions(single, tolerance, wanted):
+        base = question.field
+        if base.plan.iterative:
+            message = (
+                f"over a range of {name} the inverse problem must have a closed form, which it has not here; "
+                f"ask for single values: at: {{{name}: [...]}}"
+            )
+            raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
+        common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
+        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
+        held = {k: v for k, v in question.held.items() if k != name}
+        yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)

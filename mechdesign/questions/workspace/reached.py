@@ -1,0 +1,94 @@
+"""One region that the point reaches, with all that its tables, warnings and pictures tell of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.workspace.answer import Evaluation, answer, area_in_any_assembly, areas
+from mechdesign.questions.workspace.boundary import Boundary, boundary_of
+from mechdesign.questions.workspace.inscribed import INSCRIBED, inscribed
+from mechdesign.questions.workspace.nodes import Nodes, nodes_of
+from mechdesign.questions.workspace.question import OF_RANGE, Question
+from mechdesign.questions.workspace.ranged import Ranged
+from mechdesign.questions.workspace.singularities import Locus, causes, loci
+from mechdesign.region.patches import Patch, patches_of_pieces
+from mechdesign.region.rays import SINGLE, Effort
+from mechdesign.region.regions import RAYS
+
+# How finely a region over a range is looked for; its margins cost a hundred times as much.
+OVER_RANGE = Effort(48, 16, 96)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A region as the study asks for it; one that is empty has no patches, and none of what follows from them.
+
+    Parameters
+    ----------
+    singular : bool
+        Whether every pose is a forward singularity; indices have no value then, and all assemblies count.
+    areas : sequence of float
+        Area of each piece.
+    everywhere : float
+        Area in both assemblies; 0 where that is not looked for, or has no end.
+    shapes : ndarray
+        The largest circle and rectangle inside, as `INSCRIBED` names them; nan where they were not found.
+    loci : sequence of Locus
+        Curves of singularities inside the region and around it.
+    """
+
+    question: Question
+    answer: Evaluation
+    singular: bool = False
+    patches: Sequence[Patch] = ()
+    areas: Sequence[float] = ()
+    everywhere: float = 0.0
+    shapes: Floats = field(default_factory=lambda: np.full(len(INSCRIBED), np.nan))
+    loci: Sequence[Locus] = ()
+    boundary: Boundary | None = None
+    nodes: Nodes | None = None
+
+    @property
+    def beyond(self) -> float:
+        """Area that lies in the other assembly, if any."""
+        return self.everywhere - sum(self.areas)
+
+
+def reach(question: Question) -> Reached:
+    """Everything about one region; over a range of a held coordinate its area, its pieces and its boundary alone.
+
+    Raises
+    ------
+    AssemblyError
+        If the region has no end.
+    """
+    ranged = isinstance(question.field, Ranged)
+    singular = not ranged and question.field.singular_everywhere
+    if singular:
+        question = replace(question, field=replace(question.field, same_assembly=False))
+        given = answer(replace(question, indices=(), wanted=OF_RANGE), {}, 1, SINGLE)
+        nothing = {name: np.full(1, np.nan) for name in question.wanted}
+        given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
+    else:
+        given = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)
+    everywhere = 0.0 if ranged else area_in_any_assembly(question)
+    if not given.panels.closes[0] or given.pieces is None:
+        return Reached(question, given, singular, everywhere=everywhere)
+    field, parts = question.field, list(given.pieces.all())
+    pieces = areas(question, given, parts)
+    patches = patches_of_pieces(given.pieces.panels, parts, question.rays or RAYS)
+    reasons = causes(field)
+    boundary = boundary_of(field, patches, reasons)
+    region = Reached(question, given, singular, patches, pieces, everywhere, boundary=boundary)
+    if ranged:
+        return region
+    counted = [patch for patch in patches if patch.piece == 1 or not field.same_assembly]
+    others = [patch for patch in patches if patch not in counted]
+    return replace(
+        region, shapes=inscribed(field, question.scan, counted, others), nodes=nodes_of(field, question.shown, patches),
+        loci=loci(field, reasons, patches, singular=singular),
+    )  # fmt: skip

@@ -1,0 +1,132 @@
+"""What is to be known of regions: pieces and areas left out, errors, singularities; why nothing is reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.errors import AssemblyError
+from mechdesign.questions.workspace.quadrature import FINEST_AREA
+from mechdesign.questions.workspace.question import Question
+from mechdesign.questions.workspace.ranged import Ranged
+from mechdesign.questions.workspace.reached import Reached
+from mechdesign.questions.workspace.schema import Over
+from mechdesign.study import Study
+
+# An area is doubtful whose error is a larger part of it.
+AREA_SURE = 1e-3
+ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; redraw the sketch at those values"
+
+
+def remarks(study: Study, region: Reached, row: int) -> Iterator[Caution]:
+    """Warnings about one region, which is a row of the indices."""
+    question, there = region.question, region.question.where
+    ranged = isinstance(question.field, Ranged)
+    if region.singular:
+        words = f"every pose{there} is a forward singularity: indices have no value"
+        yield Caution("singular", words, "indices", row)
+    elif not ranged:
+        yield from _doubts(region)
+    if len(region.areas) > 1 and question.field.same_assembly:
+        yield _left_out(study, region)
+    if region.beyond > max(region.areas, default=0.0):
+        yield _in_other_assembly(study, region)
+    if region.patches and not ranged and not np.isfinite(region.shapes).all():
+        yield Caution(
+            "incomplete",
+            f"the largest circle or rectangle inside the region{there} was not found: where a limit "
+            "jumps (an angle's turn ends there) no slope leads along the boundary",
+            "indices",
+        )
+
+
+def rough(name: str, regions: Sequence[Reached]) -> Iterator[Caution]:
+    """A warning where areas over a range of a coordinate are not known closely."""
+    area, error = (
+        np.concatenate(column)
+        for column in zip(
+            *((region.answer.values["area"], region.answer.errors["area"]) for region in regions), strict=True
+        )
+    )
+    late = (area > 0) & (error > FINEST_AREA * area)
+    if late.any():
+        known = (error[late] / area[late]).max()
+        yield Caution(
+            "unconverged",
+            f"the area is known to {known:.1g} of itself only (area_error): over the range of {name} the boundary "
+            "is too rough for more",
+            "indices", int(late.argmax()),
+        )  # fmt: skip
+
+
+def unreachable(study: Study, questions: Sequence[Question]) -> AssemblyError:
+    """The error where no region has a place."""
+    section, question = study.workspace, questions[0]
+    assert section is not None
+    for name, over in section.at.items():
+        if isinstance(over, Over):
+            held = "".join(f", {key} = {value:g}" for key, value in question.held.items())
+            span = f"the range of {name} from {over.from_:g} to {over.to:g}{held}"
+            return AssemblyError(f"point {section.point} reaches nothing over {span}")
+    field, about = question.field, question.about
+    there = " at" * bool(question.held) + ";".join(each.where.removeprefix(" at") for each in questions)
+    if field.rootless:
+        return AssemblyError(f"point {section.point} reaches nothing{there}: {ROOTLESS}")
+    assembly = " in the sketch's assembly" if field.same_assembly else ""
+    return AssemblyError(
+        f"point {section.point} reaches nothing{there} on the scan about ({about.real:g}, {about.imag:g}): "
+        f"its links cannot close there{assembly}, or a limit forbids it; move scan.about, or widen the limits"
+    )
+
+
+def _doubts(region: Reached) -> Iterator[Caution]:
+    """Warnings where a region is empty, and where its area or the means over it are not known closely."""
+    question, values, errors = region.question, region.answer.values, region.answer.errors
+    there = question.where
+    if not region.patches:
+        assembly = " in the sketch's assembly" if question.field.same_assembly else ""
+        words = f"nothing is reachable{there}" + (f": {ROOTLESS}" if question.field.rootless else assembly)
+        yield Caution("unassembled", words, "indices")
+        return
+    error = errors["area"][0]
+    if error > AREA_SURE * values["area"][0]:
+        yield Caution(
+            "unconverged",
+            f"the area{there} is only known to {error:.2g}: a raster of places that are reached shows more than the "
+            "integral has found; put scan.about into the region, or take more rays",
+            "indices",
+        )
+    for name in ("GII", "GRI"):
+        error = errors[name][0]
+        if question.rule == "gauss" and not error <= 2 * question.tolerance * abs(values[name][0]):
+            words = f"{name}{there} is only known to {error:.1g}, not to the tolerance asked for"
+            yield Caution("unconverged", words, "indices")
+
+
+def _left_out(study: Study, region: Reached) -> Caution:
+    """That the indices are of one piece, and what is left out."""
+    areas, pieces = region.areas, region.answer.pieces
+    drawn = pieces is not None and pieces.drawn[0]
+    one = "of the piece that holds the sketch" if drawn else "of the largest (the sketch lies in none)"
+    many, unit = len(areas) - 1, study.units.label("area")
+    left = f"{'another' if many == 1 else f'{many} others, together'} of area {sum(areas[1:]):.4g} {unit}".rstrip()
+    return Caution(
+        "incomplete",
+        f"the region{region.question.where} has {len(areas)} pieces that do not hang together: indices are {one}; "
+        f"{left} {'is' if many == 1 else 'are'} left out ('assembly: any' counts all)",
+        "pieces",
+    )
+
+
+def _in_other_assembly(study: Study, region: Reached) -> Caution:
+    """That more lies in the other assembly than in the piece that is reported, with both areas."""
+    unit = study.units.label("area")
+    inside, beyond = (f"{area:.3g} {unit}".rstrip() for area in (sum(region.areas[:1]), region.beyond))
+    return Caution(
+        "incomplete",
+        f"more of the region{region.question.where} lies beyond a forward singularity, in the other assembly: about "
+        f"{beyond}, and {inside} here; 'assembly: any' counts all, or redraw the sketch in the other assembly",
+        "indices",
+    )

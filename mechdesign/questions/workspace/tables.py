@@ -1,0 +1,214 @@
+"""Tables of workspaces: indices, pieces, boundary, nodes, singularities, and the indices over all held values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.indices import index
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.columns import power_of_length
+from mechdesign.questions.poses import in_study_units
+from mechdesign.questions.workspace.boundary import Boundary
+from mechdesign.questions.workspace.columns import (
+    BOUNDARY,
+    HELD,
+    INDICES,
+    LOCAL,
+    PIECES,
+    RANGE_INDICES,
+    SINGULARITIES,
+    TOTALS,
+)
+from mechdesign.questions.workspace.index import determinant_power
+from mechdesign.questions.workspace.inscribed import INSCRIBED
+from mechdesign.questions.workspace.nodes import Nodes
+from mechdesign.questions.workspace.question import COLUMNS, OF_RANGE, Question, split
+from mechdesign.questions.workspace.reached import Reached
+from mechdesign.results import Column, Table
+from mechdesign.study import Study
+
+
+def tables(study: Study, regions: Sequence[Reached], ranged: str) -> Iterator[Table]:
+    """The tables of regions, some of which have a place; `ranged` is the held coordinate over a range, if any."""
+    held = _stacked([_held(study, region.question, 1) for region in regions])
+    if ranged:
+        indices = RANGE_INDICES.table([*held, *_range_indices(study, regions)], held=ranged)
+    else:
+        indices = INDICES.table([*held, *_indices(study, regions), *_inscribed(study, regions)])
+    yield indices
+    if held:
+        yield _totals(indices, [column.name for column in held])
+    full = [region for region in regions if region.patches]
+    if not ranged:
+        yield LOCAL.table(_stacked([_local(study, r.question, r.nodes) for r in full if r.nodes is not None]))
+    boundaries = [_boundary(study, r.question, r.boundary, ranged) for r in full if r.boundary is not None]
+    yield BOUNDARY.table(_stacked(boundaries))
+    if not ranged:
+        yield SINGULARITIES.table(_stacked([_singularities(study, region) for region in full]))
+    pieces = PIECES.table(_stacked([_pieces(study, region) for region in regions]))
+    if (pieces["piece"] > 1).any():
+        yield pieces
+
+
+def curves(table: Table) -> Iterator[Ints]:
+    """Rows of each curve of a boundary or of a locus."""
+    for curve in np.unique(table["curve"]):
+        yield np.flatnonzero(table["curve"] == curve)
+
+
+def index_columns(study: Study, question: Question) -> dict[str, Column]:
+    """The columns of the answer, without values."""
+    words = study.units.labels | {"as resistivity": index("resistivity").unit(study, question.field)}
+    kinds = {column.name: column for column in INDICES.columns(words, **dict.fromkeys(COLUMNS, ()))}
+    for name in (name for name in question.wanted if name not in COLUMNS):
+        local, kind = split(name)
+        words = {"index": local, "meaning of the index": index(local).meaning}
+        kinds[name] = INDICES[f"<index>_{kind}"].column((), index(local).unit(study, question.field), **words)
+    return kinds
+
+
+def _held(study: Study, question: Question, rows: int) -> list[Column]:
+    """The held coordinates, the same in each row."""
+    return [
+        HELD.column(np.full(rows, value), study.units.label(study.mechanism.quantity(name)), held=name)
+        for name, value in question.held.items()
+    ]
+
+
+def _stacked(parts: Sequence[Sequence[Column]]) -> tuple[Column, ...]:
+    """Columns of several regions below each other."""
+    return tuple(
+        replace(columns[0], values=np.concatenate([column.values for column in columns]))
+        for columns in zip(*parts, strict=True)
+    )
+
+
+def _indices(study: Study, regions: Sequence[Reached]) -> Iterator[Column]:
+    """The wanted indices of each region, and their errors."""
+    question, answers = regions[0].question, [region.answer for region in regions]
+    kinds = index_columns(study, question)
+
+    def column(name: str) -> Column:
+        return replace(kinds[name], values=np.concatenate([given.values[name] for given in answers]))
+
+    def error(name: str) -> Column:
+        values = np.concatenate([given.errors[name] for given in answers])
+        return INDICES["<statistic>_error"].column(values, kinds[name].unit, statistic=name)
+
+    estimated = question.rule == "gauss"
+    statistics = [name for name in question.wanted if name not in COLUMNS]
+    yield from (column(name) for name in COLUMNS)
+    yield from (error(name) for name in COLUMNS[:4] if estimated)
+    yield from (column(name) for name in statistics)
+    yield from (error(name) for name in statistics if estimated or not name.endswith(("_mean", "_std")))
+
+
+def _range_indices(study: Study, regions: Sequence[Reached]) -> list[Column]:
+    """The area of each region over a range, and what follows from it."""
+    values = {name: np.concatenate([region.answer.values[name] for region in regions]) for name in OF_RANGE}
+    error = np.concatenate([region.answer.errors["area"] for region in regions])
+    return RANGE_INDICES.columns(study.units.labels, **values, area_error=error)
+
+
+def _inscribed(study: Study, regions: Sequence[Reached]) -> list[Column]:
+    """The largest circle and rectangle inside each region."""
+    shapes = np.transpose([region.shapes for region in regions])
+    return INDICES.columns(study.units.labels, **dict(zip(INSCRIBED, shapes, strict=True)))
+
+
+def _totals(indices: Table, held: Sequence[str]) -> Table:
+    """Smallest, mean and largest of each statistic of the indices over the held values, and where they are."""
+    statistics = [column for column in indices.columns
+                  if column.name not in held and not column.name.endswith(("_error", "_x", "_y"))]  # fmt: skip
+    values = np.array([column.values for column in statistics], dtype=float)
+    known = ~np.isnan(values)
+    least = np.argmin(np.where(known, values, np.inf), axis=1)
+    most = np.argmax(np.where(known, values, -np.inf), axis=1)
+    row, some = np.arange(len(statistics)), known.any(axis=1)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(known, values, 0.0).sum(axis=1) / np.where(some, known.sum(axis=1), np.nan)
+    ends = {"smallest": least, "largest": most}
+    return TOTALS.table([
+        *TOTALS.columns({}, statistic=np.array([column.name for column in statistics]), smallest=values[row, least],
+                        mean=mean, largest=values[row, most]),
+        *(TOTALS[f"{end}_at_<held>"].column(np.where(some, indices[name][at], np.nan), indices.column(name).unit,
+                                            held=name)
+          for end, at in ends.items() for name in held),
+        *TOTALS.columns({}, unit=np.array([column.unit for column in statistics]),
+                        values=np.full(len(statistics), len(indices)),
+                        empty=np.full(len(statistics), int((indices["area"] == 0).sum()))),
+    ])  # fmt: skip
+
+
+def _local(study: Study, question: Question, nodes: Nodes) -> list[Column]:
+    """Local indices at the nodes of a region."""
+    columns = [
+        LOCAL["<index>"].column(values, each.index.unit(study, question.field),
+                                **{"index": each.name, "meaning of the index": each.index.meaning})
+        for each, values in nodes.values
+    ]  # fmt: skip
+    per_area = power_of_length(study.units, determinant_power(question.field))
+    words = study.units.labels | {"as its outputs over the drives, multiplied": per_area}
+    return [
+        *_held(study, question, len(nodes.z)),
+        *LOCAL.columns(words, x=nodes.z.real, y=nodes.z.imag),
+        *columns[:2],
+        *LOCAL.columns(words, det_J=nodes.determinant),
+        *columns[2:],
+        *LOCAL.columns(words, patch=nodes.patch, ray=nodes.ray, node=nodes.node, piece=nodes.piece),
+    ]
+
+
+def _boundary(study: Study, question: Question, boundary: Boundary, ranged: str) -> list[Column]:
+    """Points of the boundary curve by curve, the drives or the value of the range, and what ends the region there."""
+    labels, label = study.units.labels, study.units.label
+    name, key = ("<coordinate>", "coordinate") if ranged else ("<drive>", "drive")
+    angles: dict[str, Floats] = {} if ranged else {"theta": boundary.theta / study.units.angle_factor}
+    return [
+        *_held(study, question, len(boundary.z)),
+        *BOUNDARY.columns(labels, x=boundary.z.real, y=boundary.z.imag, kind=boundary.kind),
+        *(BOUNDARY[name].column(np.asarray(in_study_units(study, c, values)), label(c.quantity), **{key: c.name})
+          for c, values in boundary.values),
+        *BOUNDARY.columns(labels, at=boundary.at, **angles, side=boundary.side, curve=boundary.curve,
+                          piece=boundary.piece),
+    ]  # fmt: skip
+
+
+def _pieces(study: Study, region: Reached) -> list[Column]:
+    """Pieces of a region: the area of each, a place inside it, and whether it holds the sketch's place.
+
+    Of an empty region it is one row, piece 0 of area 0.
+    """
+    areas, pieces = region.areas, region.answer.pieces
+    number = np.arange(1, len(areas) + 1) if areas else np.zeros(1, dtype=int)
+    drawn = bool(areas) and pieces is not None and bool(pieces.drawn[0])
+    own = [[patch for patch in region.patches if patch.piece == k] for k in number]
+    widest = [max(patches, key=lambda patch: patch.width, default=None) for patches in own]
+    z = np.array([complex(np.nan, np.nan) if patch is None else patch.middle for patch in widest])
+    return [
+        *_held(study, region.question, len(z)),
+        *PIECES.columns(study.units.labels, piece=number, area=np.array([*areas] or [0.0]), x=z.real, y=z.imag,
+                        sketch=((number == 1) & drawn).astype(int)),
+    ]  # fmt: skip
+
+
+def _singularities(study: Study, region: Reached) -> list[Column]:
+    """Curves of singularities inside the region and around it."""
+    loci = region.loci
+    lengths = [len(locus.points) for locus in loci]
+    z = np.concatenate([np.zeros(0, dtype=complex), *(locus.points for locus in loci)])
+
+    def each(values: Sequence[str]) -> NDArray[np.str_]:
+        return np.repeat(np.array(values, dtype=str), lengths)
+
+    return [
+        *_held(study, region.question, len(z)),
+        *SINGULARITIES.columns(
+            study.units.labels, curve=np.repeat(np.arange(len(loci)), lengths),
+            kind=each([locus.kind for locus in loci]), x=z.real, y=z.imag, cause=each([locus.cause for locus in loci]),
+        ),
+    ]  # fmt: skip
