@@ -158,8 +158,8 @@ def _write(out: Path, found: Comparison) -> None:
         if marked(out / _PICTURE, creator):
             (out / _PICTURE).unlink()
         return
+    from mechdesign.report.comparison.picture import differences_figure
     from mechdesign.report.figures import style
-    from mechdesign.report.figures.differences import differences_figure
 
     with style.context():
         writer.write_file(

@@ -25,8 +25,8 @@ from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
 from mechdesign.questions.look import LONG
 from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.before import Before
 from mechdesign.report.cases import best_of
+from mechdesign.report.figures.before import Before
 from mechdesign.report.manifest import Extras
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings

@@ -27,7 +27,7 @@ from mechdesign.study import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mechdesign.report.before import Before
+    from mechdesign.report.figures.before import Before
     from mechdesign.report.figures.rendering import Gallery
 
 HELP_PAGE = "howto/report"

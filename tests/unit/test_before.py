@@ -14,8 +14,8 @@ from mechdesign.cli.app import app
 from mechdesign.errors import StudyError
 from mechdesign.questions.kinematics import figures as kinematics
 from mechdesign.questions.workspace import figures as workspace
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.overlay import COLOR
 from mechdesign.report.page.moving import moving
 

@@ -80,8 +80,8 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     table = result.tables.get("reliability")
     if result.command != "reliability" or table is None:
         return None
-    from mechdesign.questions.reliability.figures.looks import best_probability, followed_in_words
     from mechdesign.questions.reliability.tables import DrawnErrors
+    from mechdesign.report.figures.looks import best_probability, followed_in_words
 
     drawn = DrawnErrors.of(result)
     poses, rows = drawn.poses, table.where(scope="pose", method=best_probability(table))

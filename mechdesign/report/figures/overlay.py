@@ -12,8 +12,8 @@ from mechdesign.errors import printable
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Complexes
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.report.figures.panels import fitting

@@ -21,8 +21,8 @@ from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.questions.outputs import expand_outputs
 from mechdesign.questions.poses import Shown, SolvedPoses
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.linkage import Sheet, Sketcher

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import explain
-from mechdesign.report.before import Before
+from mechdesign.report.figures.before import Before
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
 from mechdesign.report.tables import cells, json_text, plain

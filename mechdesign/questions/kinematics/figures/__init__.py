@@ -7,7 +7,7 @@ from mechdesign.questions.kinematics.figures.curves import curves_figure
 from mechdesign.questions.kinematics.figures.paths import modes_figure, paths_figure
 from mechdesign.questions.kinematics.figures.poses import poses_figure
 from mechdesign.questions.kinematics.figures.transmission import transmission_figure
-from mechdesign.report.before import Before
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result

@@ -13,8 +13,8 @@ from matplotlib.patches import Patch
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.overlay import DASHES, name_both
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
 from mechdesign.report.figures.scene import ranks

@@ -15,8 +15,8 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.poses import Shown
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
 from mechdesign.report.figures.labels import paper

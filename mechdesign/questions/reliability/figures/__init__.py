@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from mechdesign.questions.reliability.figures.bars import allocation_figure, contributions_figure
 from mechdesign.questions.reliability.figures.densities import density_figures
 from mechdesign.questions.reliability.figures.errors import MAX_LISTED, estimate_figure, map_figures, sweep_figures
-from mechdesign.questions.reliability.figures.looks import Sampled, look
 from mechdesign.questions.reliability.figures.samples import convergence_figure, histogram_figure, trend_figure
 from mechdesign.questions.reliability.tables import DrawnErrors, Samples
+from mechdesign.report.figures.looks import Sampled, look
 from mechdesign.report.figures.panels import along, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result, Table

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
-from mechdesign.questions.reliability.figures.looks import best_probability, followed_in_words, heading
 from mechdesign.report.figures import style
+from mechdesign.report.figures.looks import best_probability, followed_in_words, heading
 from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, title
 from mechdesign.results import Table
 from mechdesign.study import Study

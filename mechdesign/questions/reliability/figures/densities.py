@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.reliability.figures.looks import Sampled, heading, look
 from mechdesign.questions.reliability.simulation import CELLS, REACH
 from mechdesign.report.figures import style
+from mechdesign.report.figures.looks import Sampled, heading, look
 from mechdesign.report.figures.panels import title
 from mechdesign.report.figures.shapes import lighter
 

@@ -12,7 +12,9 @@ from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.poses import pose_in_words
-from mechdesign.questions.reliability.figures.looks import (
+from mechdesign.questions.reliability.schema.methods import METHODS, Method
+from mechdesign.report.figures import style
+from mechdesign.report.figures.looks import (
     best_moments,
     best_probability,
     channels,
@@ -21,8 +23,6 @@ from mechdesign.questions.reliability.figures.looks import (
     look,
     methods,
 )
-from mechdesign.questions.reliability.schema.methods import METHODS, Method
-from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import (
     BELOW_BARE,
     BELOW_WITH_LEGEND,

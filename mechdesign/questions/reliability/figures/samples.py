@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.reliability.figures.looks import Sampled, apart, channels, heading, look, methods
 from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
+from mechdesign.report.figures.looks import Sampled, apart, channels, heading, look, methods
 from mechdesign.report.figures.panels import MAX_PANELS, clear_of_ticks, legend_below, number, stack, title
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.

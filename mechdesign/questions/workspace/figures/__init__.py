@@ -18,7 +18,7 @@ from mechdesign.questions.workspace.figures.index_maps import map_figures
 from mechdesign.questions.workspace.figures.point_path import path_figures
 from mechdesign.questions.workspace.figures.ranged import range_figures
 from mechdesign.questions.workspace.figures.regions import regions
-from mechdesign.report.before import Before
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result
 from mechdesign.study import Study

@@ -18,8 +18,8 @@ from mechdesign.questions.poses import in_study_units, radians
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import ROOM, Region, fill, lines, pieces, places, sheet, some
 from mechdesign.questions.workspace.tables import curves
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both

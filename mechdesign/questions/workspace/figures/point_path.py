@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
 from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, sheet
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
 from mechdesign.report.figures.panels import coordinate_label

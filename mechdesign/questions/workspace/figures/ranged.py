@@ -25,8 +25,8 @@ from mechdesign.questions.workspace.figures.regions import (
 )
 from mechdesign.questions.workspace.schema import Over
 from mechdesign.questions.workspace.tables import curves
-from mechdesign.report.before import Before
 from mechdesign.report.figures import style
+from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
 from mechdesign.results import Result, Table
