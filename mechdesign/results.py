@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -126,6 +126,20 @@ class TableKind:
     def table(self, columns: Iterable[Column], /, **words: str) -> Table:
         """The table of some columns, with the words that stand at the places of its meaning."""
         return Table(self.name, tuple(columns), _filled(self.meaning, words))
+
+
+@dataclass(frozen=True)
+class KeyNumber:
+    """A number at the top of a report: in which column it stands, and in which row."""
+
+    table: TableKind
+    column: str  #: its kind, by its declared name; empty: any
+    label: str  #: with the words of the row, the column's `name` and its `meaning` at its places in braces
+    row: Literal["first", "each", "largest", "smallest", "size"] = "each"  #: size: the largest, whatever its sign
+    by: tuple[str, ...] = ()  #: columns of words of which each value counts by itself
+    bounds: tuple[str, str] | None = None  #: columns of the ends between which it lies
+    interval: str = "from {low} to {high}"
+    several: str = ""  #: what the rows are, where the smallest of several stands beside the largest
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.results import VARIED, TableKind
+from mechdesign.results import VARIED, KeyNumber, TableKind
 
 SUMMARY = TableKind.of("summary", "what became of each question",
     ("study", "the study"), ("command", "the question"), ("outcome", "what became of it"),
@@ -29,3 +29,5 @@ SENSITIVITIES = TableKind.of("sensitivities", "derivatives of results with respe
     ("at", "the parameter, in its own unit"),
     ("at_unit", "unit of the parameter; empty where the study does not tell it"),
     ("settled", "1 where the differences agree"))  # fmt: skip
+KEY_NUMBERS: tuple[KeyNumber, ...] = ()
+PICTURES = {"sweep": "main_effects scatter response", "sensitivities": "sensitivities"}

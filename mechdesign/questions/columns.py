@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 
 from mechdesign.commands import QUESTIONS
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import ColumnKind, KeyNumber, TableKind
 from mechdesign.study import Units
 
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")
@@ -17,6 +17,12 @@ def tables_of(command: str) -> list[TableKind]:
     """The tables of a question, as the `columns` of its folder declare them."""
     declared = vars(import_module(QUESTIONS[command].columns))
     return [table for table in declared.values() if isinstance(table, TableKind)]
+
+
+def key_numbers(command: str) -> tuple[KeyNumber, ...]:
+    """The numbers at the top of a question's report, as its `columns` declare them."""
+    declared: tuple[KeyNumber, ...] = import_module(QUESTIONS[command].columns).KEY_NUMBERS
+    return declared
 
 
 def power_of_length(units: Units, power: int) -> str:

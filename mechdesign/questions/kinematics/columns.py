@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mechdesign.questions.columns import DRIVE, GIVEN, VALID
-from mechdesign.results import TableKind
+from mechdesign.results import KeyNumber, TableKind
 
 # Place in the meaning of a table of numbers of whole motions, see `mechdesign.questions.kinematics.along.over`.
 OVER = "over the motion, or of the asked poses only"
@@ -67,3 +67,10 @@ TARGETS = TableKind.of("targets", f"errors of the outputs against their targets 
 MODES = TableKind.of("modes", "the motion of every assembly mode",
     ("mode", "assembly: the joints that choose it and their sides"),
     ("<column>", "<its meaning in motion.csv>", "as in motion.csv"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
+    KeyNumber(MOTION, "<output>_velocity", "largest {meaning}", "size"),
+    KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
+    KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
+)  # fmt: skip
+PICTURES = "motion paths poses transmission modes"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 VARIABLE = ColumnKind("<variable>", "design variable", "as the variable")
 WORST_ROW = ColumnKind("<result>", "worst row of <result>", "as the result")
@@ -45,3 +45,10 @@ NEAREST = TableKind.of("nearest", "conditions of the design that is nearest to a
     ("bound", "what is asked for, in `unit`"),
     ("missing", "by how much the bound is missed, in `unit`; 0 where it is met"),
     ("unit", "unit of the three columns before"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(OPTIMUM, "<variable>", "best {name}", "first"),
+    KeyNumber(OPTIMUM, "", "{name} of the best", "first"),
+)  # fmt: skip
+PICTURES = "CPI objective indices designs pareto hypervolume convergence optimum"
+# Studies that it writes, and copies of the files that they read.
+STUDIES = "optimum.yaml optimum_*.yaml knee.yaml nearest.yaml *input_*"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mechdesign.questions.columns import GIVEN, VALID
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 METHOD = ColumnKind("method", "how it was computed")
 OUTPUT = ColumnKind("output", "coordinate")
@@ -97,3 +97,15 @@ CONFIRMATION = TableKind.of("confirmation", "reliability, or Cpk, of the allocat
     ("simulated", "the same by simulation"), ("low", "lower end of its interval, 99.7 %"),
     ("high", "upper end of its interval, 99.7 %"), ("method", "how it was simulated"), EVALUATIONS,
     ("met", "1 where the interval holds what is asked, or all of it is above"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(RELIABILITY, "failure", "failure probability, {method}", "largest", by=("method",),
+          bounds=("failure_low", "failure_high"), interval="99.7 % between {low} and {high}"),
+    KeyNumber(MOMENTS, "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
+    KeyNumber(CAPABILITY, "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
+)  # fmt: skip
+PICTURES = (
+    "bands means deviations difference deviation_map failure_map reliability density density_contours histogram "
+    "convergence estimate contributions allocation"
+)
+# Studies that it writes, and copies of the files that they read.
+STUDIES = "allocated.yaml *input_*"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mechdesign.questions.columns import GIVEN, VALID
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 LOAD = ColumnKind("load", "which of the study's loads")
 STIFFNESS = TableKind.of("stiffness", "stiffness at the asked point per pose, axes of the world, per radian",
@@ -49,3 +49,9 @@ FORCES = TableKind.of("forces", "what the joints bear under the study's loads",
      "links ('pin:')"), ("by", "what exerts it; in a telescopic leg its rod, on the part at its first end"),
     ("fx, fy", "force on the one by the other, axes of the world", "force"),
     ("mz", "moment likewise, about the joint's point", "moment"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(STIFFNESS, "k_min", "smallest stiffness", "smallest"),
+    KeyNumber(STIFFNESS, "k_max", "largest stiffness", "largest"),
+    KeyNumber(DEFLECTIONS, "dx", "largest deflection {name}", "size"),
+)  # fmt: skip
+PICTURES = "springs deflections free directions stiffness joint_forces force_hodographs"

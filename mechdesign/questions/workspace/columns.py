@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mechdesign.indices import REGIONAL, STATISTICS
 from mechdesign.questions.columns import DRIVE
-from mechdesign.results import ColumnKind, TableKind
+from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 HELD = ColumnKind("<held>", "held coordinate", "as the coordinate")
 PLACE = ColumnKind("x, y", "place of the point", "length")
@@ -68,3 +68,10 @@ SINGULARITIES = TableKind.of("singularities", "curves of singularities inside th
     HELD, ("curve", "points of one curve, in order"),
     ("kind", "forward: the drives do not hold the mechanism; inverse: a leg is stretched or folded"), PLACE,
     ("cause", "which links, and what they do there"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(INDICES, "area", "area of the region", "largest", several="regions"),
+    KeyNumber(INDICES, "SUI", "area over that of the rectangle around it", "largest", several="regions"),
+    KeyNumber(INDICES, "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
+    KeyNumber(INDICES, "<index>_mean", "mean {name}", "largest", several="regions"),
+)  # fmt: skip
+PICTURES = "workspace range path speed_ratio ellipses inscribed drives"

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.questions.columns import DRIVE, GIVEN
+from mechdesign.questions.columns import DRIVE, GIVEN, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
-from mechdesign.questions.optimize.columns import OPTIMUM
-from mechdesign.questions.reliability.columns import CAPABILITY, MOMENTS, RELIABILITY
-from mechdesign.questions.stiffness.columns import DEFLECTIONS, STIFFNESS
-from mechdesign.questions.workspace.columns import HELD, INDICES
+from mechdesign.questions.workspace.columns import HELD
 from mechdesign.report.cases import best_of
 from mechdesign.report.figures.style import printed, raised
-from mechdesign.results import Column, Result, Table, TableKind
+from mechdesign.results import Column, KeyNumber, Result, Table
 from mechdesign.rows import unit_of
 from mechdesign.statistics import Asked
 
@@ -48,53 +45,6 @@ class Headline:
     note: str = ""  # the pose where it occurs, or its bounds
 
 
-@dataclass(frozen=True)
-class _Rule:
-    """A rule that picks a number: which column, and which row."""
-
-    table: TableKind
-    column: str  # its kind, by its declared name; empty: any
-    label: str  # with the words of the row, the column's `name` and its `meaning`
-    row: Literal["first", "each", "largest", "smallest", "size"] = "each"  # size: the largest, whatever its sign
-    by: tuple[str, ...] = ()  # columns of words of which each value counts by itself
-    bounds: tuple[str, str] | None = None  # columns of the ends between which it lies
-    interval: str = "from {low} to {high}"
-    several: str = ""  # what the rows are, where the smallest of several is told beside the largest
-
-
-_RULES: dict[str, tuple[_Rule, ...]] = {
-    "kinematics": (
-        _Rule(EXTREMES, "range", "range of {output}", bounds=("min", "max")),
-        _Rule(MOTION, "<output>_velocity", "largest {meaning}", "size"),
-        _Rule(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
-        _Rule(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
-    ),
-    "workspace": (
-        _Rule(INDICES, "area", "area of the region", "largest", several="regions"),
-        _Rule(INDICES, "SUI", "area over that of the rectangle around it", "largest", several="regions"),
-        _Rule(INDICES, "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
-        _Rule(INDICES, "<index>_mean", "mean {name}", "largest", several="regions"),
-    ),
-    "optimize": (
-        _Rule(OPTIMUM, "<variable>", "best {name}", "first"),
-        _Rule(OPTIMUM, "", "{name} of the best", "first"),
-    ),
-    "reliability": (
-        _Rule(RELIABILITY, "failure", "failure probability, {method}", "largest", by=("method",),
-              bounds=("failure_low", "failure_high"), interval="99.7 % between {low} and {high}"),
-        _Rule(MOMENTS, "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
-        _Rule(CAPABILITY, "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
-    ),
-    "stiffness": (
-        _Rule(STIFFNESS, "k_min", "smallest stiffness", "smallest"),
-        _Rule(STIFFNESS, "k_max", "largest stiffness", "largest"),
-        _Rule(DEFLECTIONS, "dx", "largest deflection {name}", "size"),
-    ),
-    "sweep": (),
-    "sensitivities": (),
-}  # fmt: skip
-
-
 def shown(value: float) -> str:
     """A number with four digits, thousands separated, with a power of ten where it is very small or large."""
     value = float(value)
@@ -112,7 +62,7 @@ def shown(value: float) -> str:
 def headlines(result: Result) -> list[Headline]:
     """The headlines of a result, at most `MOST`, no name twice."""
     numbers = {each.label: each for each in _best(result.main)}
-    for rule in _RULES[result.command]:
+    for rule in key_numbers(result.command):
         table = result.tables.get(rule.table.name)
         if table is None or not len(table):
             continue
@@ -133,7 +83,7 @@ def _best(table: Table) -> Iterator[Headline]:
             yield Headline("cases on the Pareto front", shown(best.front), "", f"of {best.ranked} ranked cases")
 
 
-def _asked(result: Result, rule: _Rule, column: Column) -> bool:
+def _asked(result: Result, rule: KeyNumber, column: Column) -> bool:
     """Whether the study asked for a column: the rate of an output, or a goal with a weight."""
     if rule.column == "<output>_velocity" and "extremes" in result.tables:
         return column.name.removesuffix("_velocity") in result.tables["extremes"]["output"]
@@ -142,7 +92,7 @@ def _asked(result: Result, rule: _Rule, column: Column) -> bool:
     return True
 
 
-def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
+def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
     table = result.tables[rule.table.name]
     values = np.asarray(column.values, dtype=float)
     if rule.row == "size":
@@ -182,7 +132,7 @@ def _of(result: Result, rule: _Rule, column: Column) -> Iterator[Headline]:
             yield Headline(label, shown(value), unit, "; ".join(notes))
 
 
-def _between(rule: _Rule, table: Table, column: Column) -> tuple[float, str] | None:
+def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, str] | None:
     """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table."""
     if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
         return None
