@@ -114,7 +114,9 @@ def check_run(config: Path, folder: Path, invoke, *options: str) -> None:
 
 
 @pytest.mark.usefixtures("judged_pages")
-@pytest.mark.parametrize("name", ["wiper", "press_stiffness", "cheapest_tolerances"])
+@pytest.mark.parametrize(
+    "name", ["wiper", *(pytest.param(n, marks=pytest.mark.nightly) for n in ("press_stiffness", "cheapest_tolerances"))]
+)
 def test_pages_as_narrow_as_a_column_are_laid_out(name: str, tmp_path: Path, invoke) -> None:
     done = invoke("run", ROOT / "configs" / "gallery" / f"{name}.yaml", "--out", tmp_path, "--style", "paper")
     assert done.exit_code == 0, done.output

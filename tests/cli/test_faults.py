@@ -65,7 +65,9 @@ def alive(pid):
         return False
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, *(pytest.param(n, marks=pytest.mark.nightly) for n in (signal.SIGTERM, signal.SIGHUP))]
+)
 def test_workers_end_with_their_parent(here, number):
     command = [*COMMAND, "optimize", "arm.yaml", "--no-plots", "--jobs", "2", "--out", "out"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
@@ -180,7 +182,7 @@ def test_an_interrupt_at_a_bad_place_comes_a_little_later(here, where):
 BAD = ("closed", "full", "broken")
 
 
-@pytest.mark.parametrize("stream", [1, 2])
+@pytest.mark.parametrize("stream", [1, pytest.param(2, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("how", BAD)
 def test_a_stream_that_cannot_be_written(here, stream, how):
     """The run goes on; only a summary that was to be kept, and is not, changes its exit code."""

@@ -246,6 +246,7 @@ def test_curves_that_cross() -> None:
     assert sum(np.abs(np.diff(z)).sum() for z in found) == pytest.approx(2 * 2.05 * np.hypot(1, 0.25), rel=5e-2)
 
 
+@pytest.mark.nightly
 def test_parallel_singularities_of_a_platform_are_a_conic() -> None:
     """With the platform held the determinant of the legs' lines is quadratic: its six coefficients from six points."""
     limits = (

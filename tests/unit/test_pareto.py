@@ -145,6 +145,7 @@ def test_same_seed_same_bits():
     assert one["kinematics.P.x"].tobytes() != other["kinematics.P.x"].tobytes()
 
 
+@pytest.mark.nightly
 def test_a_front_that_still_grows_says_so_and_one_at_its_end_does_not():
     text = """\
 mechanism:
@@ -174,7 +175,7 @@ def hypervolume(values, corner):
     return float(np.sum(np.diff(np.append(x, corner)) * (corner - y)))
 
 
-@pytest.mark.parametrize("name", ["zdt1", "zdt3"])
+@pytest.mark.parametrize("name", ["zdt1", pytest.param("zdt3", marks=pytest.mark.nightly)])
 def test_the_default_front_has_nearly_all_of_the_hypervolume(name):
     whole = FRONTS[name].hypervolume
     result = mechdesign.optimize(FRONTS[name].study(5))
