@@ -6,10 +6,12 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.report.page.frames import frames
 from mechdesign.report.page.page import Answered, report
 from mechdesign.report.page.section import section
 from mechdesign.study import load
@@ -43,9 +45,11 @@ def browser():
 def answers():
     """Results of a few questions, by study."""
     found = {}
-    for name, command in (("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics),
-                          ("five_bar", workspace)):  # fmt: skip
-        study = load(CONFIGS / f"{name}.yaml")
+    for name, command, *overrides in (
+        ("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics), ("five_bar", workspace),
+        ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
+    ):  # fmt: skip
+        study = load(CONFIGS / f"{name}.yaml", overrides)
         found[Path(name).name] = study, command(study)
     return found
 
@@ -124,6 +128,38 @@ def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers
     assert page.locator(".moving svg path[d*='m']").last.is_visible()
 
 
+def test_between_poses_45_degrees_apart_the_crank_keeps_its_length_and_its_angle_is_that_in_words(opened):
+    page = opened("four_bar")
+    slider = page.get_by_role("slider")
+    angles = set()
+
+    def look():
+        # Words and drawing at one moment: a crank of length 1 about the origin.
+        at, text, x, y = page.evaluate("""() => {
+            const data = JSON.parse(document.querySelector(".moving script").textContent);
+            const pin = document.querySelector(".moving [data-at=A]:has(circle)").getAttribute("transform");
+            const [x, y] = pin.match(/[-.0-9]+/g).map(Number);
+            return [document.querySelector(".moving input").value, document.querySelector(".moving-words").textContent,
+                    data.corner[0] + x / data.scale, data.corner[1] - y / data.scale];
+        }""")
+        angle = float(re.search(r"crank\s=\s(\S+)\sdeg", text)[1])
+        assert abs(complex(x, y) - np.exp(1j * np.radians(angle))) < 0.005
+        angles.add(angle)
+        return int(at)
+
+    last = int(slider.get_attribute("max"))
+    assert last > 8
+    for pose in range(last, -1, -4):
+        slider.fill(str(pose))
+        assert look() == pose
+    count = len(angles)
+    page.get_by_label("Speed").select_option("4")
+    page.get_by_role("button", name="Play").click()
+    while look() < last // 2:
+        page.wait_for_timeout(20)
+    assert len(angles) > count + 5
+
+
 def test_it_plays_on_request_only_and_stops(opened):
     page = opened("slider_crank")
     slider, button = page.get_by_role("slider"), page.get_by_role("button", name="Play")
@@ -161,7 +197,9 @@ def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
 
 def test_poses_that_cannot_be_assembled_are_said_and_not_drawn(opened, answers):
     page, rows = opened("rrr_platform"), rows_of(answers, "rrr_platform")
-    bad = next(k for k, row in enumerate(rows) if not row["valid"])
+    _, result = answers["rrr_platform"]
+    drawn, _ = frames(result.drawn, result.tables["motion"], ())
+    bad = int(np.searchsorted(drawn.poses.numbers, next(k for k, row in enumerate(rows) if not row["valid"])))
     page.get_by_role("slider").fill(str(bad))
     assert "cannot be assembled here" in words(page)
     assert page.locator(".moving [data-at=P]:has(circle)").is_hidden()

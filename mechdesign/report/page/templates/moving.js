@@ -103,16 +103,16 @@
     };
   }
 
-  // The numbers beside the drawing: their texts at a pose.
+  // The numbers beside the drawing: their texts at a pose, or between two.
   function numbers(figure, data) {
     const tracks = data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
     const cells = [...figure.querySelectorAll("[data-number]")].map(cell => [cell, ...tracks[cell.dataset.number]]);
     const text = (decimals, value) => isFinite(value) ? value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "\u2013";
     return {
       tracks,
-      text: (which, at) => text(tracks[which][0], tracks[which][1][at]),
+      text: (which, at) => text(tracks[which][0], between(tracks[which][1], at)),
       show(at) {
-        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, values[at]);
+        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, between(values, at));
       },
     };
   }
@@ -208,9 +208,10 @@
 
     function show(pose) {
       at = pose;
-      const near = Math.round(pose) % data.poses, broken = gap(near);
-      moved.show(pose); told.show(near); rates.show(pose); point(Math.min(pose, last));
-      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, near), unit)).join(", ") +
+      // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
+      const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
+      moved.show(pose); told.show(counted); rates.show(pose); point(Math.min(pose, last));
+      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
