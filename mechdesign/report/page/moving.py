@@ -90,10 +90,11 @@ def _motion(
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
-    data["given"] = [
-        [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
-        for given in sweep.poses.values if given in table
-    ]  # fmt: skip
+    data["given"] = []
+    for given in [table.column(name) for name in sweep.poses.values if name in table]:
+        unit = numbers.cell(given).unit
+        which, _, power = numbers.scaled[given.name]
+        data["given"].append([given.name, unit, which, power])
     figure, beside = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
