@@ -263,6 +263,14 @@ def test_in_a_workspace_the_mechanism_follows_pointer_and_keys(opened):
     assert f"C.x = {after[0]:.1f}"[:-2] in words(page)
 
 
+def test_an_index_says_what_it_is(opened):
+    page = opened("five_bar")
+    meaning = "smallest over largest singular value of the Jacobian"
+    number = page.locator("dl.numbers div", has_text="mean inverse_condition")
+    assert f"mean over the region: {meaning}" in number.inner_text()
+    assert page.locator(".moving-numbers th", has_text="inverse_condition").get_attribute("title") == meaning
+
+
 @pytest.mark.parametrize("width", [400, 1400])
 def test_nothing_is_wider_than_the_screen(opened, width):
     for name in ("slider_crank", "five_bar"):

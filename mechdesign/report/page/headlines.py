@@ -46,6 +46,7 @@ class Headline:
     at: str = ""  # the words of the note that say the pose
     pose: Mapping[str, float] = field(default_factory=dict)  # by coordinate, in the study's units
     place: float | None = None  # of a number that occurs between the poses of the motion: where, in rows
+    meaning: str = ""  # of its column, where no unit tells it from others of its kind
 
 
 class _Pose(NamedTuple):
@@ -141,7 +142,9 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             if rule.several and len(finite) > 1:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
-            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.given, pose.place)
+            said = unit or rule.table is EXTREMES or column.meaning in label
+            meaning = "" if said else column.meaning
+            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.given, pose.place, meaning)
 
 
 def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pose] | None:

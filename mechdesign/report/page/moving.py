@@ -28,7 +28,7 @@ from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
+from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -101,7 +101,7 @@ def _motion(
         data["curves"] = _curves(study, sweep, figure, table, numbers)
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
-    return Moving(drawing, beside, data, sweep.words(begin), headings, rows)
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table))
 
 
 def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
