@@ -168,6 +168,9 @@ class Course(Spread, Protocol):
     def at(self, parts: Floats) -> Floats:
         """Values at parts of the way of each motion, shape (designs, parts); nan where it is not followed."""
 
+    def pose(self, place: float) -> Mapping[str, float]:
+        """What the poses give at a place of the first design's motion, in the study's units."""
+
     def shown(self, place: float) -> str:
         """A place of the first design's motion in words."""
 

@@ -73,7 +73,8 @@ class Poses:
     bends: Mapping[str, Floats] = field(default_factory=dict)
     # Of a grid of rays over a workspace: one a value of its held coordinates.
     regions: tuple[Sectors, ...] = ()
-    rows: Ints | None = None  # of some poses of a long motion or grid: their rows among all
+    # Of some poses of a motion or grid: their rows among all, or their places between these.
+    rows: Ints | Floats | None = None
 
     @classmethod
     def single(cls, values: Mapping[str, Floats], grid: tuple[int, ...] = ()) -> Poses:

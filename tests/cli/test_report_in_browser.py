@@ -6,10 +6,14 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.report.page.frames import frames
+from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.page import Answered, report
 from mechdesign.report.page.section import section
 from mechdesign.study import load
@@ -43,9 +47,11 @@ def browser():
 def answers():
     """Results of a few questions, by study."""
     found = {}
-    for name, command in (("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics),
-                          ("five_bar", workspace)):  # fmt: skip
-        study = load(CONFIGS / f"{name}.yaml")
+    for name, command, *overrides in (
+        ("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics), ("five_bar", workspace),
+        ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
+    ):  # fmt: skip
+        study = load(CONFIGS / f"{name}.yaml", overrides)
         found[Path(name).name] = study, command(study)
     return found
 
@@ -88,6 +94,14 @@ def rows_of(answers, name):
     return list(answers[name][1].tables["motion"])
 
 
+def poses_of(answers, name):
+    """Places of the poses that a page draws, in rows of the table of motion."""
+    result = answers[name][1]
+    marked = [number.place for number in headlines(result) if number.place is not None]
+    drawn, _ = frames(result.drawn, result.tables["motion"], marked)
+    return drawn.poses.numbers.tolist()
+
+
 def words(page):
     return page.locator(".moving-words").inner_text().replace("\N{NO-BREAK SPACE}", " ")
 
@@ -102,19 +116,19 @@ def place(page, point):
 
 
 def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers):
-    page, rows = opened("slider_crank"), rows_of(answers, "slider_crank")
+    page, rows, poses = opened("slider_crank"), rows_of(answers, "slider_crank"), poses_of(answers, "slider_crank")
     slider = page.get_by_role("slider", name="pose of the motion")
 
     def at(row):
         x, _, error = place(page, "B")
         assert x == pytest.approx(rows[row]["B.x"], abs=error)
-        assert slider.input_value() == str(row)
+        assert slider.input_value() == str(poses.index(row))
         assert f"crank = {rows[row]['crank']:.1f} deg" in words(page)
         assert float(page.locator("tr:has(th:text-is('B.x')) td span").first.inner_text()) == pytest.approx(
             rows[row]["B.x"], abs=1e-3)  # fmt: skip
 
     at(0)
-    slider.fill("20")
+    slider.fill(str(poses.index(20)))
     at(20)
     for key, row in (("ArrowRight", 21), ("End", len(rows) - 1), ("Home", 0)):
         slider.press(key)
@@ -122,6 +136,70 @@ def test_slider_and_keys_bring_the_pin_to_where_the_table_has_it(opened, answers
     assert page.get_by_label("Velocities").is_checked() is False
     page.get_by_label("Velocities").check()
     assert page.locator(".moving svg path[d*='m']").last.is_visible()
+
+
+def test_between_poses_45_degrees_apart_the_crank_keeps_its_length_and_its_angle_is_that_in_words(opened):
+    page = opened("four_bar")
+    slider = page.get_by_role("slider")
+    angles = set()
+
+    def look():
+        # Words and drawing at one moment: a crank of length 1 about the origin.
+        at, text, x, y = page.evaluate("""() => {
+            const data = JSON.parse(document.querySelector(".moving script").textContent);
+            const pin = document.querySelector(".moving [data-at=A]:has(circle)").getAttribute("transform");
+            const [x, y] = pin.match(/[-.0-9]+/g).map(Number);
+            return [document.querySelector(".moving input").value, document.querySelector(".moving-words").textContent,
+                    data.corner[0] + x / data.scale, data.corner[1] - y / data.scale];
+        }""")
+        angle = float(re.search(r"crank\s=\s(\S+)\sdeg", text)[1])
+        assert abs(complex(x, y) - np.exp(1j * np.radians(angle))) < 0.005
+        angles.add(angle)
+        return int(at)
+
+    last = int(slider.get_attribute("max"))
+    assert last > 8
+    for pose in range(last, -1, -4):
+        slider.fill(str(pose))
+        assert look() == pose
+    count = len(angles)
+    page.get_by_label("Speed").select_option("4")
+    page.get_by_role("button", name="Play").click()
+    while look() < last // 2:
+        page.wait_for_timeout(20)
+    assert len(angles) > count + 5
+
+
+def test_a_key_number_brings_the_mechanism_to_the_pose_where_it_occurs(opened, answers):
+    page, result = opened("four_bar"), answers["four_bar"][1]
+    number = next(number for number in headlines(result) if number.label == "largest velocity of C.x")
+    page.get_by_role("button", name="Play").click()
+    page.locator("dl.numbers div", has_text=number.label).get_by_role("link").click()
+    page.get_by_role("button", name="Play").wait_for()
+    assert page.locator(".moving svg").first.is_visible()
+    assert f"crank = {number.pose['crank']:.1f} deg" in words(page)
+    cells = page.locator(".moving-numbers tr:has(th:text-is('C.x')) td span").all_inner_texts()
+    assert abs(float(cells[1])) == pytest.approx(float(number.value), abs=2e-4)
+    # The crank is 1 long, and turns about the origin.
+    x, y, error = place(page, "A")
+    assert abs(complex(x, y) - np.exp(1j * np.radians(number.pose["crank"]))) < 2 * error
+
+
+@pytest.mark.parametrize("end", [40, 360])
+def test_a_pose_of_another_question_is_a_link_where_the_motion_passes_it(opened, reports, end):
+    sweep = f"kinematics.sweep={{crank: {{from: 0, to: {end}, step: 8}}}}"
+    study = load(CONFIGS / "gallery" / "slider_crank_tolerances.yaml", [sweep, "reliability.methods=[analytic]"])
+    parts = [section(study, ask(study), {}, "", (), plots=True)[0] for ask in (kinematics, reliability)]
+    told = [Answered(part["command"], "done", 0, section=part) for part in parts]
+    (reports / "both.html").write_bytes(report(study, told, below=True))
+    page = opened("both")
+    link = page.locator("dl.numbers div", has_text="failure probability").locator("a")
+    assert link.inner_text().replace("\N{NO-BREAK SPACE}", " ") == "at crank = 60 deg"
+    if end == 360:
+        link.click()
+        assert "crank = 60.0 deg" in words(page)
+    else:
+        assert link.get_attribute("href") is None
 
 
 def test_it_plays_on_request_only_and_stops(opened):
@@ -147,11 +225,11 @@ def test_who_wants_no_motion_sees_steps(opened):
 
 
 def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
-    page, rows = opened("slider_crank"), rows_of(answers, "slider_crank")
+    page, rows, poses = opened("slider_crank"), rows_of(answers, "slider_crank"), poses_of(answers, "slider_crank")
     curves = page.locator(".moving-curves")
     box = curves.bounding_box()
     curves.click(position={"x": 0.5 * box["width"], "y": 0.3 * box["height"]})
-    row = int(page.get_by_role("slider").input_value())
+    row = int(poses[int(page.get_by_role("slider").input_value())])
     cursor = float(page.locator(".moving-cursor").get_attribute("x1"))
     wide = float(curves.get_attribute("viewBox").split()[2])
     assert cursor == pytest.approx(0.5 * wide, abs=0.01 * wide)
@@ -161,7 +239,7 @@ def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
 
 def test_poses_that_cannot_be_assembled_are_said_and_not_drawn(opened, answers):
     page, rows = opened("rrr_platform"), rows_of(answers, "rrr_platform")
-    bad = next(k for k, row in enumerate(rows) if not row["valid"])
+    bad = poses_of(answers, "rrr_platform").index(next(k for k, row in enumerate(rows) if not row["valid"]))
     page.get_by_role("slider").fill(str(bad))
     assert "cannot be assembled here" in words(page)
     assert page.locator(".moving [data-at=P]:has(circle)").is_hidden()
@@ -183,6 +261,14 @@ def test_in_a_workspace_the_mechanism_follows_pointer_and_keys(opened):
     after = place(page, "C")
     assert after[0] < before[0]
     assert f"C.x = {after[0]:.1f}"[:-2] in words(page)
+
+
+def test_an_index_says_what_it_is(opened):
+    page = opened("five_bar")
+    meaning = "smallest over largest singular value of the Jacobian"
+    number = page.locator("dl.numbers div", has_text="mean inverse_condition")
+    assert f"mean over the region: {meaning}" in number.inner_text()
+    assert page.locator(".moving-numbers th", has_text="inverse_condition").get_attribute("title") == meaning
 
 
 @pytest.mark.parametrize("width", [400, 1400])

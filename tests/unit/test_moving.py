@@ -11,6 +11,7 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.report.page.frames import frames
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS
 from mechdesign.study import load
@@ -46,13 +47,48 @@ def test_points_are_where_the_table_of_motion_has_them_within_half_a_step(name):
     data, table = part.data, result.tables["motion"]
     error = 0.5 / PLACES / data["scale"]
     points = [column[:-2] for column in table.names if column.endswith(".x")]
+    drawn, _ = frames(result.drawn, table, ())
+    rows = np.searchsorted(drawn.poses.numbers, np.arange(len(table)))
     for point in points:
-        found = in_study(data, places(data, point))
+        found = in_study(data, places(data, point))[rows]
         for axis, values in (("x", found.real), ("y", found.imag)):
             valid = table["valid"] == 1
             assert np.abs(values - table[f"{point}.{axis}"])[valid].max() <= 1.001 * error
             assert np.isnan(values[~valid]).all()
     assert points
+
+
+def number(part, name):
+    """A number beside the drawing, pose by pose."""
+    decimals, steps = part.data["numbers"][dict(part.rows)[name][0].number]
+    return decoded(steps, part.data["poses"], 10**decimals), 0.51 * 10**-decimals
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank", "jansen", "whitworth"])
+def test_at_steps_of_45_degrees_pins_and_numbers_are_where_the_solver_has_them_between(name):
+    step = 45 / 32
+    part, _ = shown(name, "kinematics.sweep.crank.step=45")
+    _, fine = shown(name, f"kinematics.sweep.crank.step={step}")
+    table, data, size = fine.tables["motion"], part.data, study_named(name).mechanism.size
+    crank, rounding = number(part, "crank")
+    rows = np.round((crank - table["crank"][0]) / np.diff(table["crank"])[0]).astype(int)
+    assert table["crank"][rows] == pytest.approx(crank, abs=rounding)
+    outputs = [column for column in table.names if column[-2:] in (".x", ".y")]
+    assert outputs
+    for output in outputs:
+        # Straight from one pose to the next, as the script moves it.
+        place = in_study(data, places(data, output[:-2]))
+        drawn = np.interp(np.arange(len(table)), rows, place.real if output[-1] == "x" else place.imag)
+        assert np.abs(drawn - table[output]).max() < 1e-3 * size + 1 / PLACES / data["scale"]
+        values, rounding = number(part, output)
+        assert values == pytest.approx(table[output][rows], abs=rounding)
+
+
+@pytest.mark.slow
+def test_few_poses_become_no_more_than_a_drawing_needs():
+    part, _ = shown("four_bar", "kinematics.sweep.crank.step=45")
+    assert 9 < part.data["poses"] <= 73
 
 
 def moved(data, group, places_of_parts):
@@ -149,14 +185,15 @@ def test_time_goes_as_the_rates_have_it():
     assert leg.data["backwards"]
     assert "at the study's rates 1 s" in leg.data["pace"]
     for part in (crank, leg):
-        assert decoded(part.data["times"], part.data["poses"] + 1)[:-1] == pytest.approx(
-            np.linspace(0, 10000, part.data["poses"]), abs=1)  # fmt: skip
+        times, (turned, rounding) = decoded(part.data["times"], part.data["poses"] + 1)[:-1], number(part, "crank")
+        assert times / 10000 * 360 == pytest.approx(turned, abs=rounding + 0.02)
 
 
 def test_poses_that_cannot_be_assembled_are_said():
     part, result = shown("rrr_platform")
     bad = np.flatnonzero(result.tables["motion"]["valid"] == 0)
-    assert part.data["gaps"] == [(bad[0], bad[-1], "cannot be assembled here")]
+    first, last = np.searchsorted(frames(result.drawn, result.tables["motion"], ())[0].poses.numbers, bad[[0, -1]])
+    assert part.data["gaps"] == [(first, last, "cannot be assembled here")]
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.reliability.columns import RELIABILITY
 from mechdesign.questions.stiffness.columns import STIFFNESS
+from mechdesign.questions.workspace.columns import INDICES
 from mechdesign.report.figures import style
 from mechdesign.report.page import vector
 from mechdesign.report.page.headlines import headlines, shown
@@ -121,6 +122,20 @@ def test_what_stands_still_but_for_rounding_has_no_largest_velocity() -> None:
     ]
     result = Result("kinematics", {"motion": MOTION.table(columns)})
     assert [(each.label, each.value) for each in headlines(result)] == [("largest velocity of P.x", "0.3")]
+
+
+def test_a_number_without_a_unit_says_what_it_is() -> None:
+    motion = [
+        *MOTION.columns({"outputs": "C.x, C.y"}, conditioning=[0.9, 0.8], inverse_condition=[0.6, 0.5]),
+        MOTION["<output>_velocity"].column([0.1, -0.3], "m/s", output="P.x"),
+    ]
+    speed, conditioning = headlines(Result("kinematics", {"motion": MOTION.table(motion)}))
+    assert speed.meaning == ""
+    assert "sine of the angle between two links that meet" in conditioning.meaning
+    mean = Column("inverse_condition_mean", np.array([0.6]), "", "mean of sigma_min/sigma_max",
+                  INDICES["<index>_mean"])  # fmt: skip
+    (inverse,) = headlines(Result("workspace", {"indices": Table("indices", (mean,))}))
+    assert inverse.meaning == "mean of sigma_min/sigma_max"
 
 
 def test_headlines_of_every_method_with_the_interval_of_the_worst_pose() -> None:

@@ -52,12 +52,15 @@ class Followed:
         line, s = np.repeat(lines, len(parts)), np.tile(parts * curve.poses.end, len(lines))
         return self.along.functions.interpolated(self.name, line, s).reshape(-1, len(parts))
 
+    def pose(self, place: float) -> dict[str, float]:
+        """What the poses give at a place of the motion of the first design."""
+        given = self.along.question.poses.along(np.array([self.design or 0]), np.array([place])).values
+        return {name: float(value[0]) + 0.0 for name, value in given.items()}
+
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""
-        poses = self.along.question.poses
-        given = poses.along(np.array([self.design or 0]), np.array([place])).values
-        moving = [poses.swept] if poses.swept is not None else given
-        return ", ".join(f"{name} {float(given[name][0]) + 0.0:.6g}" for name in moving)
+        swept, given = self.along.question.poses.swept, self.pose(place)
+        return ", ".join(f"{name} {given[name]:.6g}" for name in (given if swept is None else [swept]))
 
     def end(self, sign: int) -> Floats:
         """The largest value, or with the sign -1 the smallest."""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,18 @@ class Headline:
     value: str
     unit: str = ""
     note: str = ""  # the pose where it occurs, or its bounds
+    at: str = ""  # the words of the note that say the pose
+    pose: Mapping[str, float] = field(default_factory=dict)  # by coordinate, in the study's units
+    place: float | None = None  # of a number that occurs between the poses of the motion: where, in rows
+    meaning: str = ""  # of its column, where no unit tells it from others of its kind
+
+
+class _Pose(NamedTuple):
+    """Where a number occurs: in words, by coordinate, and between the poses of a motion its place in rows."""
+
+    words: str = ""
+    given: Mapping[str, float] = {}
+    place: float | None = None
 
 
 def shown(value: float) -> str:
@@ -124,15 +136,18 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
             yield Headline(words["output"], shown(low), unit)
         else:
             notes = [rule.interval.format(low=shown(low), high=shown(high))] if low < high else []
-            value, place = between or (values[row], "" if rule.row in ("first", "each") else _pose(table, row))
-            notes += [f"at {place}"] * bool(place)
+            value, pose = between or (values[row], _Pose() if rule.row in ("first", "each") else _pose(table, row))
+            at = f"at {pose.words}" if pose.words else ""
+            notes += [at] * bool(at)
             if rule.several and len(finite) > 1:
                 least = shown(values[finite].min())
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
-            yield Headline(label, shown(value), unit, "; ".join(notes))
+            said = unit or rule.table is EXTREMES or column.meaning in label
+            meaning = "" if said else column.meaning
+            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.given, pose.place, meaning)
 
 
-def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, str] | None:
+def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pose] | None:
     """The extreme over the whole motion and where it occurs, if the motion is known between the rows of the table."""
     if table.scope is None or table.scope.course is None or rule.row in ("first", "each"):
         return None
@@ -140,7 +155,8 @@ def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, str]
     if course is None:
         return None
     value, place = course.worst(-1 if rule.row == "smallest" else 1, absolute=rule.row == "size")
-    return float(value[0]), course.shown(float(place[0]))
+    at = float(place[0])
+    return float(value[0]), _Pose(course.shown(at), course.pose(at), at)
 
 
 def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
@@ -150,10 +166,11 @@ def _scale(table: Table, unit: str, rows: NDArray[np.intp]) -> float:
     return max(float(size.max(initial=0.0, where=np.isfinite(size))) for size in sizes)
 
 
-def _pose(table: Table, row: int) -> str:
-    """The pose of a row, or its held coordinates, in words; empty where all rows agree."""
+def _pose(table: Table, row: int) -> _Pose:
+    """The pose of a row, or its held coordinates; nothing where all rows agree."""
     leading = [column for column in table.columns if column.kind in _POSE]
     if all(len(np.unique(column.values)) == 1 for column in leading):
-        return ""
+        return _Pose()
     values = (f"{column.name} = {shown(column.values[row])} {printed(column.unit)}" for column in leading)
-    return ", ".join(value.strip().replace(" ", _TOGETHER) for value in values)
+    words = ", ".join(value.strip().replace(" ", _TOGETHER) for value in values)
+    return _Pose(words, {column.name: float(column.values[row]) for column in leading})

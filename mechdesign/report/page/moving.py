@@ -20,20 +20,19 @@ from mechdesign.questions.kinematics.figures.paths import path_looks
 from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.questions.outputs import expand_outputs
-from mechdesign.questions.poses import Shown, SolvedPoses
+from mechdesign.questions.poses import SolvedPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
+from mechdesign.report.page.frames import frames
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, places
+from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
-# Of more poses evenly spread ones are taken.
-MAX_POSES = 721
 _COMMON = 0.9  # quantile of the speeds whose arrow has the usual length
 _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
 # Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
@@ -51,10 +50,13 @@ _WHY = {
 _RATES = ("velocity", "acceleration")
 
 
-def moving(study: Study, result: Result, before: Before | None = None) -> Moving | None:
+def moving(
+    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = ()
+) -> Moving | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
+    `marked` are places of the motion, in rows of its table, that are among the poses drawn.
     """
     name = f"{result.command}-curves"
     if isinstance(result.drawn, DrawnDesigns):
@@ -65,19 +67,19 @@ def moving(study: Study, result: Result, before: Before | None = None) -> Moving
         study, result = best.study, judged
     with style.context():
         if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
-            return _motion(study, result, result.drawn.shown, name, before)
+            return _motion(study, result, result.drawn, name, before, marked)
         return roaming(study, result) if "local" in result.tables else None
 
 
-def _motion(study: Study, result: Result, motion: Shown, name: str, before: Before | None) -> Moving | None:
+def _motion(
+    study: Study, result: Result, drawn: DrawnMotion, name: str, before: Before | None, marked: Sequence[float]
+) -> Moving | None:  # fmt: skip
     """The mechanism along its sweep or path, with the curves of its outputs."""
-    whole = Sweep.of(motion)
-    some = evenly(len(whole.rows), MAX_POSES)
-    shown = Shown(study, whole.poses, whole.rows[some], whole.configuration.take(some))
-    sweep = Sweep.of(shown)
+    whole = Sweep.of(drawn.shown)
+    sweep, table = frames(drawn, result.tables["motion"], marked)
     if not len(sweep.valid) or len(sweep.rows) < 2:
         return None
-    table, begin = result.tables["motion"], int(sweep.valid[0])
+    begin = int(sweep.valid[0])
     few = sweep.valid[evenly(len(sweep.valid), _FEW_POSES)]
     scenes = [scene for index in few.tolist() if (scene := pose(sweep.mechanism, sweep.configuration, index))]
     # Guides reach farther than points.
@@ -88,17 +90,18 @@ def _motion(study: Study, result: Result, motion: Shown, name: str, before: Befo
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
-    data["given"] = [
-        [given, numbers.cell(table.column(given)).unit, numbers.add(table.column(given))]
-        for given in sweep.poses.values if given in table
-    ]  # fmt: skip
-    figure, beside = curves_figure(study, result.tables, motion.poses, before), ""
+    data["given"] = []
+    for given in [table.column(name) for name in sweep.poses.values if name in table]:
+        unit = numbers.cell(given).unit
+        which, _, power = numbers.scaled[given.name]
+        data["given"].append([given.name, unit, which, power])
+    figure, beside = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
         data["curves"] = _curves(study, sweep, figure, table, numbers)
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
-    return Moving(drawing, beside, data, sweep.words(begin), headings, rows)
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table))
 
 
 def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:

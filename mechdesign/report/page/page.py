@@ -7,6 +7,7 @@ import hashlib
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from importlib.resources import files
 from itertools import zip_longest
@@ -92,6 +93,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         drawing=drawing or (_sketch(study) if plots else ""),
         plots=plots,
         answers=answers,
+        mover=partial(_mover, sections),
         questions=QUESTIONS,
         required=required,
         met=sum(each["met"] for each in required),
@@ -99,6 +101,16 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         below=below,
         made=computed_from(study, ""),
     )
+
+
+def _mover(sections: Iterable[Mapping[str, Any]], command: str, pose: Mapping[str, float]) -> str:
+    """The question whose mechanism moves through poses like one: its own, or kinematics; empty where there is none."""
+    given = {
+        section["command"]: {name for name, *_ in section["moving"]["data"].get("given", ())}
+        for section in sections
+        if section["moving"] is not None
+    }
+    return next((name for name in (command, "kinematics") if given.get(name) and given[name] <= pose.keys()), "")
 
 
 def index(entries: Sequence[Entry]) -> bytes:

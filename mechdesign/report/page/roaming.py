@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
@@ -24,7 +25,7 @@ from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
 from mechdesign.report.page.linkage import Sheet, Sketcher, add, dashed
-from mechdesign.report.page.tracks import Moving, Numbers, places
+from mechdesign.report.page.tracks import Moving, Numbers, meanings, places
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
@@ -84,7 +85,7 @@ def roaming(study: Study, result: Result) -> Moving | None:
     _legend(root, sheet, shown, shown[0].local.column(index) if index else None, norm)
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
     words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
-    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], entries)
+    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], entries, meanings(table))
 
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
@@ -113,7 +114,7 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
         values = np.asarray(in_study_units(study, drive, configuration.value(drive)))
         columns.append(Column(name, np.broadcast_to(values, len(rows)), study.units.label(drive.quantity)))
     indices = [region.local.column(name) for name in index_columns(region)]
-    columns += [Column(column.name, column.values[rows].astype(float), column.unit) for column in indices]
+    columns += [replace(column, values=column.values[rows].astype(float)) for column in indices]
     return Table("poses", tuple(columns))
 
 

@@ -48,10 +48,11 @@ def section(
     plots : bool
         Whether pictures are wanted; without them nothing moves.
     """
-    part, warnings = None, tuple(undrawn)
+    part, warnings, numbers = None, tuple(undrawn), headlines(result.seen)
     if plots and not result.interrupted:
         try:
-            part = moving(study, result.seen, before)
+            marked = [number.place for number in numbers if number.place is not None]
+            part = moving(study, result.seen, before, marked)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
@@ -59,7 +60,7 @@ def section(
     shown = {name: html for name, html in pictures.items() if name != doubled}
     return {
         "command": result.command,
-        "headlines": [dataclasses.asdict(headline) for headline in headlines(result.seen)],
+        "headlines": [dataclasses.asdict(number) for number in numbers],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),

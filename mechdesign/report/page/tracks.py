@@ -48,6 +48,7 @@ class Moving:
     words: str  # the pose drawn
     headings: Sequence[str]  # of the columns of numbers
     rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
+    meanings: Mapping[str, str]  # of these rows, where no unit tells what they are
 
 
 class Numbers:
@@ -95,6 +96,11 @@ class Numbers:
         value = float(column.values[self.rows[self.begin]])
         text = f"{value / 10.0**power:.{decimals}f}" if math.isfinite(value) else "\N{EN DASH}"
         return Cell(which, text, self.units[column.name])
+
+
+def meanings(table: Table) -> dict[str, str]:
+    """Meanings of the columns without a unit, such as indices."""
+    return {column.name: column.meaning for column in table.columns if not column.unit and column.meaning}
 
 
 def _size(values: Floats) -> float:

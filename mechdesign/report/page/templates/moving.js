@@ -3,6 +3,7 @@
   const SVG = "http://www.w3.org/2000/svg";
   const PLACES = 20, TURNS = 100, CURVES = 10, TIMES = 10000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
+  const NEAR = 0.005; // a motion passes a pose this near, as a part of the range of what it gives
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
   // A list of steps as values; null where there is none, the last value to the end.
@@ -103,16 +104,16 @@
     };
   }
 
-  // The numbers beside the drawing: their texts at a pose.
+  // The numbers beside the drawing: their texts at a pose, or between two.
   function numbers(figure, data) {
     const tracks = data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
     const cells = [...figure.querySelectorAll("[data-number]")].map(cell => [cell, ...tracks[cell.dataset.number]]);
     const text = (decimals, value) => isFinite(value) ? value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "\u2013";
     return {
       tracks,
-      text: (which, at) => text(tracks[which][0], tracks[which][1][at]),
+      text: (which, at) => text(tracks[which][0], between(tracks[which][1], at)),
       show(at) {
-        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, values[at]);
+        for (const [cell, decimals, values] of cells) cell.textContent = text(decimals, between(values, at));
       },
     };
   }
@@ -182,7 +183,7 @@
     return html("label", {}, box, text);
   }
 
-  // A motion: a slider, play and pause, speed, and what may be shown.
+  // A motion: a slider, play and pause, speed, and what may be shown. Links with a pose that it passes bring it there.
   function motion(figure, data) {
     const [drawing, other] = figure.querySelectorAll("svg");
     const moved = linkage(drawing, data), told = numbers(figure, data);
@@ -208,9 +209,10 @@
 
     function show(pose) {
       at = pose;
-      const near = Math.round(pose) % data.poses, broken = gap(near);
-      moved.show(pose); told.show(near); rates.show(pose); point(Math.min(pose, last));
-      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, near), unit)).join(", ") +
+      // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
+      const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
+      moved.show(pose); told.show(counted); rates.show(pose); point(Math.min(pose, last));
+      const text = data.given.map(([name, unit, which]) => said(name, told.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
       slider.value = near;
@@ -260,6 +262,28 @@
       playing = requestAnimationFrame(frame);
     }
 
+    // The place of the motion where it passes a pose, between two where it is between two; null where it does not.
+    function passing(wanted) {
+      const ways = data.given.map(([name, , which, power]) => {
+        const [decimals, values] = told.tracks[which], range = Math.max(...values) - Math.min(...values) || 1;
+        const value = Number((wanted[name] / 10 ** power).toFixed(decimals));
+        return values.map(each => (each - value) / range);
+      });
+      let best = null, least = NEAR;
+      for (let k = 0; k < last; k++) {
+        const steps = ways.map(way => way[k + 1] - way[k]), dot = (a, b) => a.reduce((sum, each, j) => sum + each * b[j], 0);
+        const length = dot(steps, steps), share = length && Math.min(1, Math.max(0, -dot(ways.map(way => way[k]), steps) / length));
+        const far = Math.hypot(...ways.map((way, j) => way[k] + share * steps[j]));
+        if (far < least) { least = far; best = k + share; }
+      }
+      return best;
+    }
+
+    for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
+      const place = passing(JSON.parse(link.dataset.pose));
+      if (place === null) link.removeAttribute("href");
+      else link.addEventListener("click", () => { stop(); show(place); });
+    }
     button.addEventListener("click", () => playing ? stop() : play());
     slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
     figure.addEventListener("keydown", event => {
