@@ -28,6 +28,7 @@ from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.cases import best_of
 from mechdesign.report.figures.before import Before
 from mechdesign.report.manifest import Extras
+from mechdesign.report.names import most_telling
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
@@ -73,6 +74,13 @@ class Outcome:
     shard: str = ""  # what became of the shard, with --shard
     left: bool = False  # whether the run ended before this question
     reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
+
+    @property
+    def picture(self) -> Path | None:
+        """The most telling of its pictures; None where there is none."""
+        content = manifest.read(self.directory) if self.written else None
+        name = most_telling(self.command, manifest.recorded_files(content)) if content is not None else ""
+        return self.directory / name if name else None
 
     @property
     def word(self) -> str:
@@ -376,4 +384,6 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
     assert outcome.table is not None
     terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv")
     tell(outcome, study, options)
+    first = directory / pages.REPORT if options.report else outcome.picture
+    terminal.suggest(first, quiet=options.quiet or options.json)
     return outcome

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -36,6 +37,16 @@ def say(text: str, *, quiet: bool = False) -> None:
         print(printable_lines(text), file=sys.stderr, flush=True)
 
 
+def _is_terminal() -> bool:
+    return sys.stdout.isatty()
+
+
+def suggest(path: Path | None, *, quiet: bool) -> None:
+    """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
+    if path is not None and _is_terminal():
+        say(f"open {shlex.quote(str(path))}", quiet=quiet)
+
+
 def emit(text: str) -> None:
     """Write data to stdout."""
     emit_all([text])
@@ -52,7 +63,7 @@ def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
     """Write a table to stdout: as JSON, as CSV in a pipe, or on a terminal what fits and the file of the `rest`."""
     if as_json:
         emit_all(json_blocks(table))
-    elif sys.stdout.isatty():
+    elif _is_terminal():
         _show_to_people(table, rest)
     elif rest is not None:
         with rest.open(encoding="utf-8", newline="") as stream:

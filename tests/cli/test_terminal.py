@@ -149,3 +149,24 @@ def test_a_great_job_is_announced_without_a_bar(folder, analysis, invoke):
     arguments = ("kinematics", "slider.yaml", "--no-plots")
     assert invoke(*arguments).stderr.splitlines()[0] == "3000000 designs to compute; Ctrl-C ends it"
     assert invoke(*arguments, "--quiet").stderr == ""
+
+
+def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeypatch):
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    (folder / "swing it.yaml").write_text(SLIDER)
+    swing = "results/swing it"
+    asked = {
+        ("kinematics", "swing it.yaml"): f"open '{swing}/kinematics/paths.png'",
+        ("kinematics", "swing it.yaml", "--format", "svg", "--out", "x"): "open x/paths.svg",
+        ("kinematics", "swing it.yaml", "--report", "--out", "x"): "open x/report.html",
+        ("run", "swing it.yaml"): f"open '{swing}/kinematics/paths.png'",
+        ("run", "swing it.yaml", "--resume"): f"open '{swing}/kinematics/paths.png'",
+        ("run", "swing it.yaml", "slider.yaml", "--report"): "open results/index.html",
+        ("check", "swing it.yaml"): f"open '{swing}/check/mechanism.png'",
+    }
+    for arguments, last in asked.items():
+        assert invoke(*arguments).stderr.splitlines()[-1] == last
+    for arguments in (("--no-plots",), ("--quiet",), ("--json",)):
+        assert "open " not in invoke("kinematics", "slider.yaml", *arguments).stderr
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: False)
+    assert "open " not in invoke("kinematics", "slider.yaml").stderr
