@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TextIO
 
 import numpy as np
 
@@ -28,13 +29,23 @@ _DIGITS = 6  # significant digits of its numbers
 _PIECE = 1 << 20  # characters copied at a time from a file
 _NAMES = 6  # most names listed of columns that do not fit
 _GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
+_VERDICT = re.compile(r"(?<=: )(met|NOT MET)(?=, worst )")
+_COLOURS = {"met": "\x1b[32m", "NOT MET": "\x1b[1;31m"}  # green, and bold red
+_PLAIN = "\x1b[0m"
 DELAY = 1.0  # seconds before progress is shown
 
 
 def say(text: str, *, quiet: bool = False) -> None:
     """Print a line to stderr, unless `quiet`."""
     if not quiet:
-        print(printable_lines(text), file=sys.stderr, flush=True)
+        print(coloured(printable_lines(text), sys.stderr), file=sys.stderr, flush=True)
+
+
+def coloured(text: str, stream: TextIO) -> str:
+    """A text, with its verdicts in colour where the stream is a terminal with colours and ``NO_COLOR`` is not set."""
+    if not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM", "dumb") == "dumb":
+        return text
+    return _VERDICT.sub(lambda verdict: f"{_COLOURS[verdict[0]]}{verdict[0]}{_PLAIN}", text)
 
 
 def _is_terminal() -> bool:

@@ -170,3 +170,32 @@ def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeyp
         assert "open " not in invoke("kinematics", "slider.yaml", *arguments).stderr
     monkeypatch.setattr(terminal, "_is_terminal", lambda: False)
     assert "open " not in invoke("kinematics", "slider.yaml").stderr
+
+
+class Screen(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    place = "a long place " * 10
+    words = f"s: run: requirement: range at least 65: NOT MET, worst 60.2 at {place}\ns: x at most 1: met, worst 0\n"
+    painted = words.replace("NOT MET", "\x1b[1;31mNOT MET\x1b[0m").replace(": met", ": \x1b[32mmet\x1b[0m")
+    live_table = LiveTable(quiet=False)
+    for stream, told in ((Screen(), painted), (io.StringIO(), words)):
+        live_table._stream = stream
+        live_table.say(words)
+        monkeypatch.setattr(sys, "stderr", stream)
+        terminal.say(words.rstrip("\n"))
+        assert stream.getvalue() == told * 2
+    live_table._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    live_table._stream = Screen()
+    live_table.say(words)
+    assert f"NOT MET, worst 60.2 at {place.rstrip()}" in live_table._live.console.file.getvalue()
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert terminal.coloured(words, Screen()) == words
