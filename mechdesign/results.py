@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 POSES_ONLY = "of the asked poses only"
 # Meaning of a column of what varies over the cases of a sweep.
 VARIED = "varied"
+# Meaning of a column of a result that a sweep was asked for.
+CHOSEN = "chosen result"
 # Number of columns that a table's repr names.
 MAX_SHOWN = 8
 

@@ -25,7 +25,7 @@ from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
 from mechdesign.questions.look import LONG
 from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.cases import best_of
+from mechdesign.report.cases import best_of, telling_columns
 from mechdesign.report.figures.before import Before
 from mechdesign.report.manifest import Extras
 from mechdesign.report.names import most_telling
@@ -382,8 +382,9 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
         tell(outcome, study, options)
         return outcome
     assert outcome.table is not None
-    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv")
+    first = telling_columns(outcome.table) if command == SWEEP.name else ()
+    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", first=first)
     tell(outcome, study, options)
-    first = directory / pages.REPORT if options.report else outcome.picture
-    terminal.suggest(first, quiet=options.quiet or options.json)
+    best_seen = directory / pages.REPORT if options.report else outcome.picture
+    terminal.suggest(best_seen, quiet=options.quiet or options.json)
     return outcome

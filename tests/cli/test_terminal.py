@@ -199,3 +199,29 @@ def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
     assert f"NOT MET, worst 60.2 at {place.rstrip()}" in live_table._live.console.file.getvalue()
     monkeypatch.setenv("NO_COLOR", "1")
     assert terminal.coloured(words, Screen()) == words
+
+
+def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    judged = SLIDER + "requirements: [{result: kinematics.extremes.B.x.max, at_most: 200}]\n"
+    (folder / "slider.yaml").write_text(judged.replace("step: 45}}", "step: 45}}\n  outputs: [B.x, rod.angle]"))
+    asked = "kinematics.extremes.B.x.range,kinematics.rod.angle.peak"
+    varied = ("--vary", "mechanism.parameters.r=38,40", "--vary", "mechanism.links.rod.2=110,120")
+    shown = invoke("sweep", "slider.yaml", *varied, "--results", asked, "--no-plots").stdout
+    table = shown.splitlines()[:8]
+    head = [line.split() for line in table]
+    assert max(map(len, table)) <= 80
+    assert head[:3] == [
+        ["mechanism.", "mechanism.links.", "kinematics.", "kinematics.rod."],
+        ["parameters.r", "rod.2", "extremes.B.x.range", "angle.peak"],
+        ["case", "[mm]", "[mm]", "[mm]", "[deg]"],
+    ]
+
+
+def test_what_does_not_fit_is_listed_without_a_break_in_a_word(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    rest = Path("a-folder-with-a-long-name") / "motion-of-the-crank-and-the-rod.csv"
+    terminal.show(summary([Outcome("s", "kinematics", Path(), 1, 0)]), as_json=False, rest=rest)
+    assert str(rest) in capsys.readouterr().out.splitlines()
