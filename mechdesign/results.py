@@ -273,6 +273,11 @@ class Table:
         shown = ", ".join(self.names[:MAX_SHOWN]) + ", ..." * (len(self.names) > MAX_SHOWN)
         return f"<Table {self.name}: {len(self)} rows of {shown}>"
 
+    def _repr_html_(self) -> str:
+        from mechdesign.table_html import table_html
+
+        return table_html(self)
+
 
 class LongTable(Table):
     """A table of so many rows that they are made block by block, where they are written or judged.
