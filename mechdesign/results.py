@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 POSES_ONLY = "of the asked poses only"
 # Meaning of a column of what varies over the cases of a sweep.
 VARIED = "varied"
+# Meaning of a column of a result that a sweep was asked for.
+CHOSEN = "chosen result"
 # Number of columns that a table's repr names.
 MAX_SHOWN = 8
 
@@ -270,6 +272,11 @@ class Table:
     def __repr__(self) -> str:
         shown = ", ".join(self.names[:MAX_SHOWN]) + ", ..." * (len(self.names) > MAX_SHOWN)
         return f"<Table {self.name}: {len(self)} rows of {shown}>"
+
+    def _repr_html_(self) -> str:
+        from mechdesign.table_html import table_html
+
+        return table_html(self)
 
 
 class LongTable(Table):

@@ -167,16 +167,27 @@ class BatchRecord:
         if self.several and any(outcome.written for outcome in outcomes):
             self._file(self._root / SUMMARY, to_csv(table).encode(), _HEADER)
         terminal.show(table, as_json=options.json)
+        first = self._first_to_open()
         if any(entry.link for entry in self._entries.values()):
             from mechdesign.report.page.page import index
 
             path = self._root / pages.INDEX
             if self._file(path, index([entry for _, entry in sorted(self._entries.items())]), PAGE):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
+                first = path
         told = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
         if len(table) > 1 and told:
             terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
+        terminal.suggest(first, quiet=options.quiet or options.json)
         return max(self._exit_code, *(outcome.exit_code for outcome in outcomes))
+
+    def _first_to_open(self) -> Path | None:
+        """Of a single study its report, else the most telling picture; None of several."""
+        if self.several:
+            return None
+        reports = [path for task in self._tasks if (path := task.root / pages.REPORT).exists() and self.options.report]
+        pictures = (outcome.picture for study in self._outcomes for outcome in study)
+        return next((path for path in (*reports, *pictures) if path is not None), None)
 
     def _with_left(self) -> Iterator[Outcome]:
         """Outcomes in the order of the studies, with those of questions that were not reached."""

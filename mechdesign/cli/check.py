@@ -18,6 +18,7 @@ from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
 from mechdesign.questions.reliability.schema.section import in_words
+from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import foresee, on_warnings
 from mechdesign.report.writer import write_sketch
 from mechdesign.study import Study
@@ -52,6 +53,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
                 directory = folder(study, "check", options, several=len(asked) > 1)
                 told = write_sketch(directory, study, extras("check", options))
                 terminal.say(f"{label}: {told}", quiet=options.quiet)
+                if len(asked) == 1:
+                    terminal.suggest(directory / f"{MECHANISM}.{options.kinds.split(',')[0]}", quiet=options.quiet)
         except Exception as error:
             code, message = explained(error)
             terminal.say(message)

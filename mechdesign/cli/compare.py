@@ -71,7 +71,10 @@ def compare(
     found = folders.compare(old, new, chosen)
     if out is not None:
         _write(out, found)
-    return _tell(found, "compare", junit, as_json=json, quiet=quiet)
+    code = _tell(found, "compare", junit, as_json=json, quiet=quiet)
+    if out is not None and found.moved:
+        terminal.suggest(out / _PICTURE, quiet=quiet or json)
+    return code
 
 
 @one_thread()

@@ -25,9 +25,10 @@ from mechdesign.files import owned, settle
 from mechdesign.progress import Progress
 from mechdesign.questions.look import LONG
 from mechdesign.report import manifest, requirements, writer
-from mechdesign.report.cases import best_of
+from mechdesign.report.cases import best_of, telling_columns
 from mechdesign.report.figures.before import Before
 from mechdesign.report.manifest import Extras
+from mechdesign.report.names import most_telling
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
@@ -73,6 +74,13 @@ class Outcome:
     shard: str = ""  # what became of the shard, with --shard
     left: bool = False  # whether the run ended before this question
     reached: bool = True  # False if an allocation did not reach its reliability although all poses assemble
+
+    @property
+    def picture(self) -> Path | None:
+        """The most telling of its pictures; None where there is none."""
+        content = manifest.read(self.directory) if self.written else None
+        name = most_telling(self.command, manifest.recorded_files(content)) if content is not None else ""
+        return self.directory / name if name else None
 
     @property
     def word(self) -> str:
@@ -374,6 +382,9 @@ def ask(command: str, path: Path | None, options: Options) -> Outcome:
         tell(outcome, study, options)
         return outcome
     assert outcome.table is not None
-    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv")
+    first = telling_columns(outcome.table) if command == SWEEP.name else ()
+    terminal.show(outcome.table, as_json=options.json, rest=directory / f"{outcome.table.name}.csv", first=first)
     tell(outcome, study, options)
+    best_seen = directory / pages.REPORT if options.report else outcome.picture
+    terminal.suggest(best_seen, quiet=options.quiet or options.json)
     return outcome

@@ -118,12 +118,13 @@ class LiveTable:
 
     def say(self, words: str) -> None:
         """Print messages above the table."""
+        words = terminal.coloured(words, self._stream)
         if self._live is None:
             print(words, end="", file=self._stream, flush=True)
         elif words:
             from rich.text import Text
 
-            self._live.console.print(Text(words.rstrip("\n")), soft_wrap=True)
+            self._live.console.print(Text.from_ansi(words.rstrip("\n")), soft_wrap=True)
 
     def show(self) -> None:
         """Update the table on the terminal."""

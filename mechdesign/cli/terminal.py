@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import sys
 import time
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from textwrap import wrap
+from typing import TYPE_CHECKING, Literal, TextIO
 
 import numpy as np
 
@@ -26,14 +29,36 @@ _ROWS = 24  # rows shown on a terminal
 _DIGITS = 6  # significant digits of its numbers
 _PIECE = 1 << 20  # characters copied at a time from a file
 _NAMES = 6  # most names listed of columns that do not fit
+_HEAD = 18  # characters in a line of a column's head, unless a word is longer
+_WORDS = re.compile(r"(?<= )(?=[^ ])|(?<=\.)(?=[^\W\d])")  # where the words of a column's name begin
 _GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
+_VERDICT = re.compile(r"(?<=: )(met|NOT MET)(?=, worst )")
+_COLOURS = {"met": "\x1b[32m", "NOT MET": "\x1b[1;31m"}  # green, and bold red
+_PLAIN = "\x1b[0m"
 DELAY = 1.0  # seconds before progress is shown
 
 
 def say(text: str, *, quiet: bool = False) -> None:
     """Print a line to stderr, unless `quiet`."""
     if not quiet:
-        print(printable_lines(text), file=sys.stderr, flush=True)
+        print(coloured(printable_lines(text), sys.stderr), file=sys.stderr, flush=True)
+
+
+def coloured(text: str, stream: TextIO) -> str:
+    """A text, with its verdicts in colour where the stream is a terminal with colours and ``NO_COLOR`` is not set."""
+    if not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM", "dumb") == "dumb":
+        return text
+    return _VERDICT.sub(lambda verdict: f"{_COLOURS[verdict[0]]}{verdict[0]}{_PLAIN}", text)
+
+
+def _is_terminal() -> bool:
+    return sys.stdout.isatty()
+
+
+def suggest(path: Path | None, *, quiet: bool) -> None:
+    """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
+    if path is not None and _is_terminal():
+        say(f"open {shlex.quote(str(path))}", quiet=quiet)
 
 
 def emit(text: str) -> None:
@@ -48,12 +73,15 @@ def emit_all(texts: Iterable[str]) -> None:
     sys.stdout.flush()
 
 
-def show(table: Table, *, as_json: bool, rest: Path | None = None) -> None:
-    """Write a table to stdout: as JSON, as CSV in a pipe, or on a terminal what fits and the file of the `rest`."""
+def show(table: Table, *, as_json: bool, rest: Path | None = None, first: Sequence[str] = ()) -> None:
+    """Write a table to stdout: as JSON, as CSV in a pipe, or on a terminal what fits and the file of the `rest`.
+
+    Where not all columns fit, those named `first` go before the others.
+    """
     if as_json:
         emit_all(json_blocks(table))
-    elif sys.stdout.isatty():
-        _show_to_people(table, rest)
+    elif _is_terminal():
+        _show_to_people(table, rest, first)
     elif rest is not None:
         with rest.open(encoding="utf-8", newline="") as stream:
             emit_all(iter(partial(stream.read, _PIECE), ""))
@@ -69,36 +97,55 @@ def show_lines(lines: Sequence[str]) -> None:
         emit(f"... {more} more; --out DIR writes all of them\n")
 
 
-def _show_to_people(table: Table, rest: Path | None) -> None:
+def _show_to_people(table: Table, rest: Path | None, first: Sequence[str]) -> None:
     from rich.console import Console
     from rich.table import Table as Grid
     from rich.text import Text
 
     console = Console()
     columns = cells(table.take(np.arange(min(len(table), _ROWS))), _DIGITS)
-    heads = [f"{column.name}\n[{column.unit}]" if column.unit else column.name for column in table.columns]
+    heads = [[*_in_lines(column.name), *([f"[{column.unit}]"] if column.unit else [])] for column in table.columns]
     grid = Grid(header_style="bold", box=None, pad_edge=False)
     # A long word leaves room for other columns.
     room, widest = console.width, console.width // 2
-    shown = 0
-    for head, column, texts in zip(heads, table.columns, columns, strict=True):
-        room -= 2 + min(widest, max(len(text) for text in (*head.splitlines(), *texts)))
+    shown: list[int] = []
+    for k in sorted(range(len(columns)), key=lambda k: _place(table.names[k], first)):
+        room -= 2 + min(widest, max(len(text) for text in (*heads[k], *columns[k])))
         if room < 0 and shown:
             break
-        justify: Literal["right", "left"] = "right" if column.numeric else "left"
-        grid.add_column(Text(head), justify=justify, no_wrap=True, max_width=widest)
-        shown += 1
-    for row in zip(*columns[:shown], strict=True):
+        shown.append(k)
+    shown.sort()
+    for k in shown:
+        justify: Literal["right", "left"] = "right" if table.columns[k].numeric else "left"
+        grid.add_column(Text("\n".join(heads[k])), justify=justify, no_wrap=True, max_width=widest)
+    for row in zip(*(columns[k] for k in shown), strict=True):
         grid.add_row(*(Text(text) for text in row))
     console.print(grid)
     left = []
     if len(table) > _ROWS:
         left.append(f"{len(table) - _ROWS} more rows")
-    if shown < len(columns):
-        names = [*table.names[shown : shown + _NAMES], *(["..."] if len(columns) > shown + _NAMES else [])]
-        left.append(f"{len(columns) - shown} more columns ({', '.join(names)})")
+    if hidden := [name for k, name in enumerate(table.names) if k not in shown]:
+        names = [*hidden[:_NAMES], *(["..."] if len(hidden) > _NAMES else [])]
+        left.append(f"{len(hidden)} more columns ({', '.join(names)})")
     if left:
-        console.print(Text(f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"), style="dim")
+        words = f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"
+        lines = wrap(words, console.width, break_long_words=False, break_on_hyphens=False)
+        console.print(Text("\n".join(lines)), style="dim", soft_wrap=True)
+
+
+def _place(name: str, first: Sequence[str]) -> int:
+    """Place of a column among those that go first; all others have the last place."""
+    return first.index(name) if name in first else len(first)
+
+
+def _in_lines(name: str) -> list[str]:
+    """The name of a column in lines of a head: broken behind dots and blanks, never inside a word."""
+    lines = [""]
+    for word in _WORDS.split(name):
+        if lines[-1] and len(lines[-1]) + len(word.rstrip()) > _HEAD:
+            lines.append("")
+        lines[-1] += word
+    return [line.rstrip() for line in lines]
 
 
 def lively() -> bool:

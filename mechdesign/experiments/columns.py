@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mechdesign.results import VARIED, KeyNumber, TableKind
+from mechdesign.results import CHOSEN, VARIED, KeyNumber, TableKind
 
 SUMMARY = TableKind.of("summary", "what became of each question",
     ("study", "the study"), ("command", "the question"), ("outcome", "what became of it"),
@@ -13,7 +13,7 @@ SWEEP = TableKind.of("sweep", "what becomes of each case of the matrix",
     ("case", "number of the case"),
     ("exit_code", "0 done, 1 a requirement not met, 3 impossible, 4 a numerical failure"),
     ("<entry>", VARIED, "as the entry"), ("<requirement>", "worst row; required is <limit>", "as the result"),
-    ("<requirement>_met", "1 where the requirement is met"), ("<result>", "chosen result", "as the result"),
+    ("<requirement>_met", "1 where the requirement is met"), ("<result>", CHOSEN, "as the result"),
     ("warnings", "number of warnings"), ("reason", "why the case failed"),
     ("rank", "1 the best of the cases that meet every requirement; nan of others"),
     ("front", "1 where none of these cases is as good in every goal and better in one"))  # fmt: skip
@@ -30,4 +30,4 @@ SENSITIVITIES = TableKind.of("sensitivities", "derivatives of results with respe
     ("at_unit", "unit of the parameter; empty where the study does not tell it"),
     ("settled", "1 where the differences agree"))  # fmt: skip
 KEY_NUMBERS: tuple[KeyNumber, ...] = ()
-PICTURES = {"sweep": "main_effects scatter response", "sensitivities": "sensitivities"}
+PICTURES = {"sweep": "response main_effects scatter", "sensitivities": "sensitivities"}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mechdesign.errors import counted
-from mechdesign.results import VARIED, Table
+from mechdesign.results import CHOSEN, VARIED, Table
 from mechdesign.study.text.document import in_yaml
 
 RANK, FRONT = "rank", "front"
@@ -61,6 +61,14 @@ class Best:
     def __str__(self) -> str:
         front = f"; {self.front} of them are on the Pareto front" if self.front > self.equals else ""
         return f"best of {counted(self.ranked, 'ranked case')} is {self.words}{front}"
+
+
+def telling_columns(table: Table) -> list[str]:
+    """Columns of a sweep that are shown first: the case, the results asked for, what varies, and what is required."""
+    chosen = [column.name for column in table.columns if column.meaning == CHOSEN]
+    varied = [column.name for column in table.columns if column.meaning == VARIED]
+    required = [name for name in table.names if f"{name}_met" in table]
+    return ["case", *chosen, *varied, *required]
 
 
 def best_of(table: Table) -> Best | None:

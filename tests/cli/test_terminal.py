@@ -149,3 +149,79 @@ def test_a_great_job_is_announced_without_a_bar(folder, analysis, invoke):
     arguments = ("kinematics", "slider.yaml", "--no-plots")
     assert invoke(*arguments).stderr.splitlines()[0] == "3000000 designs to compute; Ctrl-C ends it"
     assert invoke(*arguments, "--quiet").stderr == ""
+
+
+def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeypatch):
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    (folder / "swing it.yaml").write_text(SLIDER)
+    swing = "results/swing it"
+    asked = {
+        ("kinematics", "swing it.yaml"): f"open '{swing}/kinematics/paths.png'",
+        ("kinematics", "swing it.yaml", "--format", "svg", "--out", "x"): "open x/paths.svg",
+        ("kinematics", "swing it.yaml", "--report", "--out", "x"): "open x/report.html",
+        ("run", "swing it.yaml"): f"open '{swing}/kinematics/paths.png'",
+        ("run", "swing it.yaml", "--resume"): f"open '{swing}/kinematics/paths.png'",
+        ("run", "swing it.yaml", "slider.yaml", "--report"): "open results/index.html",
+        ("check", "swing it.yaml"): f"open '{swing}/check/mechanism.png'",
+    }
+    for arguments, last in asked.items():
+        assert invoke(*arguments).stderr.splitlines()[-1] == last
+    for arguments in (("--no-plots",), ("--quiet",), ("--json",)):
+        assert "open " not in invoke("kinematics", "slider.yaml", *arguments).stderr
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: False)
+    assert "open " not in invoke("kinematics", "slider.yaml").stderr
+
+
+class Screen(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    place = "a long place " * 10
+    words = f"s: run: requirement: range at least 65: NOT MET, worst 60.2 at {place}\ns: x at most 1: met, worst 0\n"
+    painted = words.replace("NOT MET", "\x1b[1;31mNOT MET\x1b[0m").replace(": met", ": \x1b[32mmet\x1b[0m")
+    live_table = LiveTable(quiet=False)
+    for stream, told in ((Screen(), painted), (io.StringIO(), words)):
+        live_table._stream = stream
+        live_table.say(words)
+        monkeypatch.setattr(sys, "stderr", stream)
+        terminal.say(words.rstrip("\n"))
+        assert stream.getvalue() == told * 2
+    live_table._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    live_table._stream = Screen()
+    live_table.say(words)
+    assert f"NOT MET, worst 60.2 at {place.rstrip()}" in live_table._live.console.file.getvalue()
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert terminal.coloured(words, Screen()) == words
+
+
+def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    judged = SLIDER + "requirements: [{result: kinematics.extremes.B.x.max, at_most: 200}]\n"
+    (folder / "slider.yaml").write_text(judged.replace("step: 45}}", "step: 45}}\n  outputs: [B.x, rod.angle]"))
+    asked = "kinematics.extremes.B.x.range,kinematics.rod.angle.peak"
+    varied = ("--vary", "mechanism.parameters.r=38,40", "--vary", "mechanism.links.rod.2=110,120")
+    shown = invoke("sweep", "slider.yaml", *varied, "--results", asked, "--no-plots").stdout
+    table = shown.splitlines()[:8]
+    head = [line.split() for line in table]
+    assert max(map(len, table)) <= 80
+    assert head[:3] == [
+        ["mechanism.", "mechanism.links.", "kinematics.", "kinematics.rod."],
+        ["parameters.r", "rod.2", "extremes.B.x.range", "angle.peak"],
+        ["case", "[mm]", "[mm]", "[mm]", "[deg]"],
+    ]
+
+
+def test_what_does_not_fit_is_listed_without_a_break_in_a_word(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
+    rest = Path("a-folder-with-a-long-name") / "motion-of-the-crank-and-the-rod.csv"
+    terminal.show(summary([Outcome("s", "kinematics", Path(), 1, 0)]), as_json=False, rest=rest)
+    assert str(rest) in capsys.readouterr().out.splitlines()

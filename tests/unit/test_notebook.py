@@ -25,7 +25,7 @@ from mechdesign.cli.app import app
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted
 from mechdesign.mechanism import Mechanism
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Column, LongTable, Result, Table
 from mechdesign.study import Study, template, template_path
 from mechdesign.study import load as load_plain
 
@@ -342,3 +342,20 @@ def test_the_readme_says_what_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     exec(blocks["python"].replace(".to_pandas()", ""), names)
     assert isinstance(names["result"], Answer)
     assert Path("results/study/kinematics/manifest.json").exists()
+
+
+def test_a_table_shows_its_first_rows_with_units():
+    columns = (
+        Column("B.x", np.arange(30) / 7, "mm", "place of <B>"),
+        Column("valid", np.arange(30) > 0),
+        Column("reason", np.array(["<script>"] * 30)),
+    )
+    html = Table("motion", columns, "one row a pose")._repr_html_()
+    text = Page(html).text
+    assert all(words in text for words in ("motion: one row a pose", "B.x", "[mm]", "0.142857", "and 6 more rows"))
+    assert html.count("<tr>") == 25
+    assert "<script>" not in html
+    assert "more row" not in Table("motion", columns).take(np.arange(24))._repr_html_()
+    some = Table("motion", columns).take(np.arange(10))
+    long = LongTable(some, 30, lambda: iter([Table("motion", columns, "one row a pose")]))
+    assert long._repr_html_().replace("motion<", "motion: one row a pose<") == html

@@ -73,4 +73,4 @@ KEY_NUMBERS = (
     KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
     KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
 )  # fmt: skip
-PICTURES = "motion paths poses transmission modes"
+PICTURES = "paths motion poses transmission modes"
