@@ -338,3 +338,12 @@ def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
     study = study_of(FOUR_BAR.replace("  drives:", f"  targets: {{C: {wanted}}}\n  drives:"))
     (axes,) = drawn(study)["paths"].axes
     assert any(np.array_equal(line.get_xydata(), wanted) for line in axes.lines)
+
+
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_a_large_effort_has_its_power_of_ten_with_its_unit(look):
+    study = study_of(FOUR_BAR, "kinematics.loads=[{link: rocker, moment: 2e7}]")
+    with style.context(look):
+        axes = drawn(study)["motion"].axes[-1]
+    assert axes.get_ylabel() == "effort\n[10\N{SUPERSCRIPT SIX} N\N{MIDDLE DOT}mm]"
+    assert not axes.yaxis.offsetText.get_visible()

@@ -201,7 +201,6 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
         title = kinds.get(first.column.unit, "value")
     title = title.replace("inverse ", "inverse\n")
     axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    axis.ticklabel_format(axis="y", scilimits=(-4, 4))
     known = np.concatenate([values[np.isfinite(values)] for values in shown])
     if _still(known, 1.0):
         # What stands still is drawn straight, not by its rounding.

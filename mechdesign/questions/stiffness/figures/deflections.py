@@ -66,7 +66,7 @@ def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure |
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
     where = pose_in_words(study, poses, drawn.row)
     figure, panels = _panels(study, places, len(loads), f"deflections, enlarged, at {where}")
-    length = study.units.label("length")
+    length = style.printed(study.units.label("length"))
     for k, (axes, lines, load, scale) in enumerate(zip(panels, bent, loads.tolist(), scales, strict=True)):
         draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
         for line in lines:
