@@ -338,3 +338,44 @@ def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
     study = study_of(FOUR_BAR.replace("  drives:", f"  targets: {{C: {wanted}}}\n  drives:"))
     (axes,) = drawn(study)["paths"].axes
     assert any(np.array_equal(line.get_xydata(), wanted) for line in axes.lines)
+
+
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_a_large_effort_has_its_power_of_ten_with_its_unit(look):
+    study = study_of(FOUR_BAR, "kinematics.loads=[{link: rocker, moment: 2e7}]")
+    with style.context(look):
+        axes = drawn(study)["motion"].axes[-1]
+    assert axes.get_ylabel() == "effort\n[10\N{SUPERSCRIPT SIX} N\N{MIDDLE DOT}mm]"
+    assert not axes.yaxis.offsetText.get_visible()
+
+
+STROKES = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: [O, A, 40]
+    rod: {from: A, to: B, length: 2070, points: {P: [1000, 10], Q: [900, 20], R: [500, 300], S: [400, 60]}}
+    slider: {B: [0, 0]}
+  joints: {guide: {prismatic: [ground, slider], through: O}}
+  drives: {theta: {angle: crank}}
+  sketch: {A: [30, 20], B: [2100, 0]}
+kinematics:
+  sweep: {theta: {from: 0, to: 360, step: 6}}
+  outputs: [B.x, P, Q, R, S]
+"""
+
+
+def test_every_curve_is_drawn_and_none_is_flattened_by_the_others():
+    figure = drawn(study_of(STROKES))["motion"]
+    names = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
+    assert sorted(names) == sorted(["B.x", *(f"{point}.{c}" for point in "PQRS" for c in "xy")])
+    for axes in figure.axes:
+        assert not axes.get_legend().get_title().get_text()
+        for line in axes.lines:
+            assert np.ptp(line.get_ydata()) > 0.045 * np.ptp(axes.get_ylim())
+
+
+def test_a_curve_of_two_names_is_drawn_once():
+    study = study_of(FOUR_BAR.replace("C: [45, 40]", "E: [90, 0]"), "kinematics.outputs=[B, E]")
+    labels = [line.get_label() for axes in drawn(study)["motion"].axes for line in axes.lines]
+    assert {"B.x, E.x", "B.y, E.y"} <= set(labels)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from helpers.studies import study_of
@@ -128,10 +130,34 @@ def test_the_front_is_drawn_with_its_knee() -> None:
     with style.context():
         axes = front_figure(designs, front).axes[0]
     labels = {line.get_label(): line.get_xydata().tolist() for line in axes.lines}
-    assert labels["A: best cost, a = 0.1, b = 0.1, c = 0.5"] == [[0.2, 1.4]]
-    assert labels["knee, a = 0.2, b = 0.1, c = 0.5"] == [[0.3, 0.9]]
-    assert labels["B: best mass, a = 0.3, b = 0.1, c = 0.5"] == [[0.4, 0.8]]
+    assert labels["A: best cost, a = 0.1 mm, b = 0.1 mm, c = 0.5 mm"] == [[0.2, 1.4]]
+    assert labels["knee, a = 0.2 mm, b = 0.1 mm, c = 0.5 mm"] == [[0.3, 0.9]]
+    assert labels["B: best mass, a = 0.3 mm, b = 0.1 mm, c = 0.5 mm"] == [[0.4, 0.8]]
     assert "less is better" in axes.get_xlabel()
+    # A corner of the staircase is as bad in each goal as the worse of the two designs beside it.
+    (stairs,) = (line for line in axes.lines if line.get_label().startswith("front"))
+    assert stairs.get_drawstyle() == "steps-post"
+    inside = [(axes.viewLim.contains(*place)) for place in designs.values[designs.feasible]]
+    assert axes.get_title(loc="right") == f"{inside.count(False)} worse designs outside"
+
+
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_labels_of_a_front_of_three_goals_lie_apart(look: str) -> None:
+    x, y, z = np.random.default_rng(0).random((3, 200))
+    names = "kinematics.max_theta_effort", "workspace.largest_radius", "stiffness.min_k_min"
+    goals = tuple(Goal(name, "", "", smallest=True) for name in names)
+    values = dict(zip(goals, (x, y, z), strict=True))
+    designs = Designs(designed(), {"a": x, "b": y, "c": z}, goals, (), values, {}, np.zeros(200, dtype=np.int32), [""],
+                      np.full(200, np.nan), np.ones((1, 3)), {})  # fmt: skip
+    front = table(a=x[:3], b=y[:3], c=z[:3], knee=[False, True, False],
+                  **{name: values[:3] for name, values in zip(names, (x, y, z), strict=True)})  # fmt: skip
+    with style.context(look):
+        figure = front_figure(designs, front)
+        figure.canvas.draw()
+        texts = [axes.xaxis.label for axes in figure.axes] + [axes.yaxis.label for axes in figure.axes]
+        boxes = [text.get_window_extent() for text in [*texts, figure._suptitle]]
+        assert not [pair for pair in combinations(boxes, 2) if pair[0].overlaps(pair[1])]
+        assert all(box.y0 >= 0 and box.y1 <= figure.bbox.height and box.x0 >= 0 for box in boxes)
 
 
 @pytest.mark.nightly

@@ -506,3 +506,16 @@ def test_allocation_shows_given_beside_allocated_and_how_often_either_fails() ->
 @pytest.mark.parametrize(("value", "text"), [(1.6566e-9, "1.66·10⁻⁹"), (0.0277, "0.0277"), (0.0, "0")])
 def test_probabilities_in_three_digits(value: float, text: str) -> None:
     assert number(value) == text
+
+
+def test_powers_of_ten_stand_with_the_unit() -> None:
+    made, _ = drawn(SLIDER, "units.length=um", "reliability.dimensions.r=0.0001", "reliability.dimensions.l=0.0001",
+                 "reliability.limits={B.x: 0.0002}",
+                 "kinematics={sweep: {crank: {from: 0, to: 360, step: 15}}}")  # fmt: skip
+    for name, label in (("deviations", "position"), ("bands", "error")):
+        (axes,) = made[name].axes
+        assert axes.get_ylabel() == f"{label} [10\N{SUPERSCRIPT MINUS}\N{SUPERSCRIPT SIX} \N{MICRO SIGN}m]"
+        made[name].canvas.draw()
+        assert not axes.yaxis.offsetText.get_visible()
+        numbers = [float(text.get_text().replace("\N{MINUS SIGN}", "-")) for text in axes.get_yticklabels()]
+        np.testing.assert_allclose(numbers, 1e6 * axes.get_yticks(), atol=1e-9)

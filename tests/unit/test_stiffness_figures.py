@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -215,3 +216,17 @@ def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
         assert np.abs(np.abs(ends - hand)[:, None] - (10, 70)).min(axis=1) == pytest.approx(0, abs=1e-3)
         # Finer than the poses are.
         assert len(ends) > 2 * sum(patch.rays.stop - patch.rays.start for patch in sectors.patches)
+
+
+@pytest.mark.slow
+def test_deflections_of_all_loads_have_one_magnification() -> None:
+    study = mechdesign.load(Path(__file__).parents[2] / "configs/planar_2rpr_rp.yaml")
+    result = mechdesign.stiffness(study)
+    with style.context():
+        figure = figures(study, result)["deflections"]
+    (scale,) = re.findall(r"drawn (\S+) times as large", " ".join(text.get_text() for text in figure.texts))
+    moves = result.tables["deflections"]
+    for k, axes in enumerate(figure.axes):
+        (dotted,) = (line for line in axes.lines if line.get_linestyle() == ":")
+        size = float(np.hypot(*np.diff(dotted.get_xydata(), axis=0)[0]))
+        assert size == pytest.approx(float(scale) * np.hypot(moves["dx"][k], moves["dy"][k]), rel=1e-6)

@@ -118,6 +118,7 @@ def stack(
 
 def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
     """Make room at the left so that no label of an axis lies over the numbers of its ticks; once all is drawn."""
+    style.name_powers(axes)
     numbers = [
         text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
     ]

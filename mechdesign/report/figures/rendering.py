@@ -11,6 +11,7 @@ from typing import ParamSpec
 from matplotlib.figure import Figure
 
 from mechdesign.errors import explain
+from mechdesign.report.figures import style
 from mechdesign.work.chunks import map_chunks, worker_count
 from mechdesign.work.pool import LostWorkerError
 
@@ -39,13 +40,13 @@ class Gallery(dict[str, Figure]):
         """Add the figure that a function makes under this name, or several figures under their own names, or none."""
         try:
             made = make(*arguments, **options)
+            drawn = {name: made} if isinstance(made, Figure) else made or {}
+            for figure in drawn.values():
+                style.name_powers(figure.axes)
         except Exception as error:
             self.failed[name] = explain(error)[1]
             return
-        if isinstance(made, Figure):
-            self[name] = made
-        elif made is not None:
-            self.update(made)
+        self.update(drawn)
         if isinstance(made, Gallery):
             self.failed |= made.failed
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple, cast
 
@@ -59,7 +59,10 @@ HATCHES = ("", "////", "....", "xxxx")
 INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
+# Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
+_PLAIN = 1e-3, 2e4
 
+_MICROMETRES = re.compile(r"\bum\b")
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
 
 _RAISED = str.maketrans("0123456789-", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079\u207b")
@@ -75,6 +78,7 @@ _SETTINGS: dict[Any, Any] = {
     "axes.edgecolor": INK,
     "axes.labelcolor": INK,
     "axes.prop_cycle": cycler(color=PALETTE),
+    "axes.formatter.useoffset": False,
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.spines.top": False,
@@ -229,8 +233,35 @@ def axis_label(name: str, unit: str = "") -> str:
     return f"{name} [{printed(unit)}]" if unit else name
 
 
+def name_powers(panels: Iterable[Axes]) -> None:
+    """Write the power of ten of an axis into its label, ``force [10\N{SUPERSCRIPT THREE} N]``, once all is drawn.
+
+    At the end of the axis, where Matplotlib writes it, it would lie over titles and legends. An axis without a label,
+    such as that of a bar of colours below a title, keeps it there.
+    """
+    for axes in panels:
+        for axis in (axes.xaxis, axes.yaxis):
+            formatter, label = axis.get_major_formatter(), axis.get_label_text()
+            if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
+                continue
+            axis.offsetText.set_visible(False)
+            power = _power(float(np.abs(axis.get_view_interval()).max()))
+            formatter.set_scientific(power != 0)
+            if power:
+                formatter.set_powerlimits((power, power))
+                name, bracket, unit = label.rpartition("[")
+                ten = f"10{raised(power)}"
+                axis.set_label_text(f"{name}[{ten} {unit}" if bracket else f"{label} [{ten}]")
+
+
+def _power(largest: float) -> int:
+    """Power of ten, a multiple of three, of which the numbers up to a largest one are written as multiples."""
+    return 0 if _PLAIN[0] <= largest < _PLAIN[1] or largest == 0 else 3 * int(np.floor(np.log10(largest) / 3))
+
+
 def printed(unit: str) -> str:
-    """A unit with powers and products as they are set in print."""
+    """A unit with powers, products and micrometres as they are set in print."""
+    unit = _MICROMETRES.sub("\N{MICRO SIGN}m", unit)
     for plain, sign in _PRINTED.items():
         unit = unit.replace(plain, sign)
     return unit

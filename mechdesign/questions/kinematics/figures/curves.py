@@ -34,6 +34,7 @@ _ORDERS = ("velocity", "acceleration", "error", "effort")
 _RANKS = ("position", *_ORDERS, "det_J", "inverse_condition")
 _OF_ONE_COLOR = ("position", "velocity", "acceleration", "error")
 _STILL = 1e-9  # part of its size by which a column changes that does not change
+_FLAT = 0.05  # part of the range of a panel below which a curve that moves has another panel
 _HIDDEN = 0.015  # part of its range by which a curve differs from one that covers it
 _TAIL_PERCENT = 4  # of the poses, left out at both ends to find peaks
 _PEAK_RATIO = 6  # of the whole range to that of the other poses
@@ -49,6 +50,7 @@ class _Curve(NamedTuple):
     column: Column
     of: str
     order: str
+    same: tuple[str, ...] = ()  # other names of the same curve
 
     @property
     def color_key(self) -> tuple[str, str]:
@@ -58,14 +60,15 @@ class _Curve(NamedTuple):
     @property
     def label(self) -> str:
         """Its name in a legend."""
-        name = self.of
+        name = ", ".join((self.of, *self.same))
         return name if len(name) <= _LEGEND_LETTERS else f"{name[: _LEGEND_LETTERS - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
 class _Panel(NamedTuple):
-    """Curves of one kind and unit, and how many more there would be."""
+    """Curves of one kind and unit, how many of them other panels have, and how many none has."""
 
     curves: list[_Curve]
+    before: int
     left_out: int
 
     @property
@@ -148,12 +151,57 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
             continue
         groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
     rank = ranks(study)
-    panels = []
-    for curves in sorted(groups.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]:
+    kinds = sorted(groups.values(), key=lambda curves: _RANKS.index(curves[0].order))[:MAX_PANELS]
+    parts = []
+    for curves in map(_distinct, kinds):
         if len(curves) > MAX_CURVES:
             curves.sort(key=lambda curve: -rank.get(curve.of.rpartition(".")[0], 1))
-        panels.append(_Panel(curves[:MAX_CURVES], max(len(curves) - MAX_CURVES, 0)))
+        parts.append(_legible(curves))
+    # Each kind has a panel before another has its second.
+    turns = sorted((turn, kind) for kind, own in enumerate(parts) for turn in range(len(own)))
+    shown = [sum(kind == other for _, other in turns[:MAX_PANELS]) for kind in range(len(parts))]
+    panels = []
+    for own, count in zip(parts, shown, strict=True):
+        for k, curves in enumerate(own[:count]):
+            more = sum(map(len, own[count:])) if k == count - 1 else 0
+            panels.append(_Panel(curves, sum(map(len, own[:k])), more))
     return panels
+
+
+def _distinct(curves: Sequence[_Curve]) -> list[_Curve]:
+    """Each curve once, under all of its names."""
+    distinct: list[_Curve] = []
+    for curve in curves:
+        values = curve.column.values
+        size = _STILL * float(np.nanmax(np.abs(values)))
+        for k, other in enumerate(distinct):
+            if np.allclose(values, other.column.values, rtol=0.0, atol=size, equal_nan=True):
+                distinct[k] = other._replace(same=(*other.same, curve.of))
+                break
+        else:
+            distinct.append(curve)
+    return distinct
+
+
+def _legible(curves: Sequence[_Curve]) -> list[list[_Curve]]:
+    """Curves in panels of at most `MAX_CURVES`, so that none that moves is flat beside the others of its panel."""
+    panels: list[list[_Curve]] = []
+    for curve in curves:
+        for panel in panels:
+            if len(panel) < MAX_CURVES and not _flattened([*panel, curve]):
+                panel.append(curve)
+                break
+        else:
+            panels.append([curve])
+    return panels
+
+
+def _flattened(curves: Sequence[_Curve]) -> bool:
+    """Whether a curve that moves would be a flat line on one axis with the others; rare peaks are left aside."""
+    ends = np.array([np.nanpercentile(curve.column.values, (_TAIL_PERCENT, 100 - _TAIL_PERCENT)) for curve in curves])
+    spans = ends[:, 1] - ends[:, 0]
+    moving = spans > _STILL * np.abs(ends).max()
+    return bool((spans[moving] < _FLAT * (ends[:, 1].max() - ends[:, 0].min())).any())
 
 
 def _still(values: Floats, size: float) -> bool:
@@ -184,9 +232,14 @@ def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]
 def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple[str, str], str]) -> None:
     """Draw the curves of a panel, and note the colour of each."""
     shown: list[Floats] = []
+    used: list[str] = []
     for curve in panel.curves:
         values = curve.column.values
-        color = colors.setdefault(curve.color_key, _COLORS[len(shown)])
+        color = colors.get(curve.color_key, _COLORS[(panel.before + len(shown)) % len(_COLORS)])
+        if color in used:
+            color = next(other for other in _COLORS if other not in used)
+        used.append(color)
+        colors[curve.color_key] = color
         hidden = any(_coincide(values, other) for other in shown)
         # In grey the markers tell what the colours tell.
         which, every = _COLORS.index(color), max(len(x) // _MARKS, 1)
@@ -201,7 +254,6 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
         title = kinds.get(first.column.unit, "value")
     title = title.replace("inverse ", "inverse\n")
     axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    axis.ticklabel_format(axis="y", scilimits=(-4, 4))
     known = np.concatenate([values[np.isfinite(values)] for values in shown])
     if _still(known, 1.0):
         # What stands still is drawn straight, not by its rounding.

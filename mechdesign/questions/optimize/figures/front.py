@@ -9,23 +9,30 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.questions.optimize.figures.designs import head, label, listed, value_text
+from mechdesign.questions.optimize.figures.designs import head, value_text
+from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import fitting
 from mechdesign.results import Table
 
 _FRONT_MARKS = "so^DvPX"
+_LONGEST_NAME = 22  # letters of a goal in one line along an axis of several panels
+_ROW = 3.2  # inches
 
 
 def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
     pairs = list(combinations(range(len(designs.goals)), 2))
-    columns = 1 if style.narrow() else min(len(pairs), 3)
+    columns = 1 if style.narrow() else min(len(pairs), 2)
     rows = -(-len(pairs) // columns)
-    figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + 2.9 * rows)
+    figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + _ROW * rows)
     for number, pair in enumerate(pairs):
-        _front(figure.add_subplot(rows, columns, number + 1), designs, front, pair)
+        axes = figure.add_subplot(rows, columns, number + 1)
+        _front(axes, designs, front, pair)
+        low = style.narrow() or len(pairs) > 1
+        for axis, goal in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+            axis.set_label_text(_goal_label(designs, designs.goals[goal], folded=low))
     handles, labels = figure.axes[0].get_legend_handles_labels()
     labels = [style.folded(words, 9.0, style.width() - 0.6) for words in labels]
     figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else fitting(labels))
@@ -40,26 +47,37 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
     axes.plot(x, y, ".", color=style.FAINT, markersize=3, alpha=0.5, markeredgewidth=0, label="feasible designs")
     along, up = (np.asarray(front[goal.name], dtype=float) for goal in goals)
     order = np.argsort(along, kind="stable")
+    # Between two designs of the front nothing is known to be better than the worse of the two.
     axes.plot(along[order], up[order], "o-" if len(designs.goals) == 2 else "o", color=style.BLUE, linewidth=1.2,
               markersize=4.0 if len(front) < 200 else 2.2,
+              drawstyle="steps-post" if goals[0].smallest else "steps-pre",
               label="front: no other is better in every goal")  # fmt: skip
     for (name, row), marker in zip(marked(designs, front), _FRONT_MARKS, strict=False):
         knee = name == "knee"
-        words = listed(chosen(designs, front, row))
+        words = ", ".join(_values(designs, front, row))
         axes.plot(along[row], up[row], "*" if knee else marker, color=style.VERMILION, markeredgecolor="white",
                   markersize=15 if knee else 9, linestyle="none", label=f"{name}, {words}", zorder=5,
                   clip_on=False)  # fmt: skip
-    across, upwards = (f"{label(designs, g.name)}, {'less' if g.smallest else 'more'} is better" for g in goals)
-    axes.set_xlabel(across)
-    axes.set_ylabel(style.folded(upwards, 10.0, 2.8) if style.narrow() else upwards)
     if style.narrow():
         axes.locator_params(axis="x", nbins=4)
     # Designs far worse than the front would press it into a corner.
+    inside = np.ones(len(x), dtype=bool)
     for values, every, limit in ((along, x, axes.set_xlim), (up, y, axes.set_ylim)):
         low, high = float(values.min()), float(values.max())
         span = (high - low) or abs(high) or 1.0
-        limit(max(float(every.min()), low - 0.6 * span) - 0.04 * span,
-              min(float(every.max()), high + 0.6 * span) + 0.04 * span)  # fmt: skip
+        start, end = max(float(every.min()), low - 0.6 * span), min(float(every.max()), high + 0.6 * span)
+        limit(start - 0.04 * span, end + 0.04 * span)
+        inside &= (start - 0.04 * span <= every) & (every <= end + 0.04 * span)
+    if outside := int(np.sum(~inside)):
+        axes.set_title(f"{outside} worse designs outside", loc="right", fontsize=8.5)
+
+
+def _goal_label(designs: Designs, goal: Goal, *, folded: bool) -> str:
+    """Name, unit and sense of a goal, in a line each where they are `folded`; a long name is broken after its dot."""
+    name = goal.name.replace(".", ".\n", 1) if folded and len(goal.name) > _LONGEST_NAME else goal.name
+    words = style.axis_label(name, designs.unit_of(goal.name))
+    sense = f"{'less' if goal.smallest else 'more'} is better"
+    return (",\n" if folded else ", ").join((words, sense))
 
 
 def growth_figure(growth: Table) -> Figure:
@@ -93,6 +111,13 @@ def chosen(designs: Designs, front: Table, row: int) -> dict[str, float | str]:
 
 def described(designs: Designs, front: Table, name: str, row: int) -> str:
     """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
-    lines = [f"{variable} = {value_text(value)}" for variable, value in chosen(designs, front, row).items()]
-    lines += [f"{goal.column} = {front[goal.name][row]:.3g} {designs.unit_of(goal.name)}" for goal in designs.goals]
+    lines = _values(designs, front, row)
+    lines += [f"{goal.column} = {front[goal.name][row]:.3g} {style.printed(designs.unit_of(goal.name))}"
+              for goal in designs.goals]  # fmt: skip
     return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])
+
+
+def _values(designs: Designs, front: Table, row: int) -> list[str]:
+    """``l_a = 1 mm`` for each variable of a design of a front."""
+    return [f"{name} = {value_text(value)} {style.printed(designs.unit_of(name))}".rstrip()
+            for name, value in chosen(designs, front, row).items()]  # fmt: skip

@@ -223,7 +223,6 @@ def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
             axes.plot(over.values, each.error, color=style.BLUE, **look)
             axes.set_title(titles[each.output], loc="left", fontsize=9.5)
             axes.set_ylabel(style.axis_label("error", each.unit))
-            axes.ticklabel_format(axis="y", scilimits=(-3, 4))
         axes.locator_params(axis="y", nbins=5)
         tick_abscissa(axes, over)
         axes.margins(x=0.02)

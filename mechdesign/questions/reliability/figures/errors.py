@@ -107,7 +107,7 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
             elif len(beyond := limit[np.isfinite(limit)]):
                 far.append(" to ".join(dict.fromkeys(f"{end:+g}" for end in (beyond.min(), beyond.max()))))
         if far:
-            words = f"limit {', '.join(far)} {unit}, outside"
+            words = f"limit {', '.join(far)} {style.printed(unit)}, outside"
             axis.set_title(words, loc="right", fontsize=8, color=style.VERMILION)
         axis.set_ylabel(style.axis_label("error", unit))
         axis.set_title(heading(output, order), loc="left", fontsize=9.5)

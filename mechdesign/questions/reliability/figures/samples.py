@@ -156,7 +156,6 @@ def convergence_figure(given: Sampled) -> Figure:
         axis.plot(samples, mean, color=style.BLUE, marker="." if len(samples) == 1 else "", label="mean")
         axis.axhline(moments["nominal"][row], color=style.INK, linestyle="--", linewidth=1.0, label="nominal")
         axis.set_ylabel(style.axis_label(output if order == "position" else f"{output}\n{order}", unit))
-        axis.ticklabel_format(axis="y", useOffset=False)
     _sample_axis(axes[-1], table["samples"])
     legend_below(figure, *axes[0].get_legend_handles_labels())
     clear_of_ticks(figure, axes)

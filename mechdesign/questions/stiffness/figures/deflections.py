@@ -32,6 +32,7 @@ from mechdesign.study import Poses, Study
 
 MAX_LOADS = 4
 MAX_DIRECTIONS = 4  # poses
+_MAX_TICKS = 6  # below a panel
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 _LETTERS_AN_INCH = 14.5  # of a panel's title
@@ -52,7 +53,7 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
 
 
 def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
-    """The whole mechanism where each load moves it, a panel a load, each with its own magnification."""
+    """The whole mechanism where each load moves it, a panel a load, all with one magnification."""
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
@@ -61,13 +62,16 @@ def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure |
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
         return None
-    scales = [round_down(LARGEST_MOVE * scene.span / max(size, 1e-300)) for size in sizes]
-    bent = [[rest + scale * move[:, k] for rest, move in shapes] for k, scale in enumerate(scales)]
+    scale = round_down(LARGEST_MOVE * scene.span / max(*sizes, 1e-300))
+    bent = [[rest + scale * move[:, k] for rest, move in shapes] for k in range(len(loads))]
     places = np.concatenate([[*scene.points.values()], *(line for lines in bent for line in lines)])
     where = pose_in_words(study, poses, drawn.row)
-    figure, panels = _panels(study, places, len(loads), f"deflections, enlarged, at {where}")
-    length = study.units.label("length")
-    for k, (axes, lines, load, scale) in enumerate(zip(panels, bent, loads.tolist(), scales, strict=True)):
+    figure, panels = _panels(
+        study, places, len(loads), f"deflections, drawn {scale:g} times as large, at {where}", lines=2
+    )
+    length = style.printed(study.units.label("length"))
+    for k, (axes, lines, load) in enumerate(zip(panels, bent, loads.tolist(), strict=True)):
+        axes.locator_params(axis="x", nbins=_MAX_TICKS)
         draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
         for line in lines:
             axes.plot(line.real, line.imag, color=style.INK, linewidth=1.8, zorder=5)
@@ -81,8 +85,8 @@ def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure |
             sweep = np.copysign(1.5 * np.pi, load[2])
             draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
         size, name = abs(shapes[0][1][0, k]), asked.section.at
-        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {size:.3g} {length}\n"
-                       f"drawn {scale:g} times as large", loc="left", fontsize=9)  # fmt: skip
+        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {size:.3g} {length}",
+                       loc="left", fontsize=9)  # fmt: skip
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
                                            (style.VERMILION, 1.8, "load"))]  # fmt: skip

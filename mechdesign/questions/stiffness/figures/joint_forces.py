@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -141,7 +140,7 @@ def _curves(study: Study, kinds: Mapping[str, Sequence[Joint]], loads: Sequence[
         worst = _mark_worst(study, axes, [joint.name for joint in joints], np.array(values), unit, over)
         if kind == "force":
             axes.set_ylim(bottom=0)
-        _in_powers(axes.yaxis, kind, unit, max(map(abs, axes.get_ylim())))
+        axes.set_ylabel(style.axis_label(kind, unit))
         title = f"{loads[number]}: {kind} {worst}"
         size = 6.5 if style.narrow() else 9.5
         axes.set_title(style.folded(title, size, style.width() - 1.0), loc="left", fontsize=size)
@@ -150,13 +149,6 @@ def _curves(study: Study, kinds: Mapping[str, Sequence[Joint]], loads: Sequence[
     clear_of_ticks(figure, panels)
     legend_below(figure, handles, labels)
     return figure
-
-
-def _in_powers(axis: Axis, name: str, unit: str, most: float) -> None:
-    """Ticks of an axis as multiples of a power of ten that stands with its unit, where its numbers are long."""
-    power = 0 if 1e-2 <= most < 2e4 else 3 * int(np.floor(np.log10(most) / 3))
-    axis.set_major_formatter(lambda value, _: f"{value / 10.0**power:.4g}")
-    axis.set_label_text(style.axis_label(name, f"10$^{{{power}}}$ {unit}" if power else unit))
 
 
 def _mark_worst(
@@ -198,7 +190,7 @@ def _hodographs(study: Study, joints: Sequence[Joint], loads: Sequence[str], ove
                                    for color, dashes in zip(_COLORS, _DASHES, strict=True)]  # fmt: skip
     for axes, number in zip(panels, some, strict=True):
         for axis, name in ((axes.xaxis, "fx"), (axes.yaxis, "fy")):
-            _in_powers(axis, name, unit, float(np.abs(places).max()))
+            axis.set_label_text(style.axis_label(name, unit))
         axes.axhline(0, color=style.FAINT, linewidth=0.9, zorder=1.5)
         axes.axvline(0, color=style.FAINT, linewidth=0.9, zorder=1.5)
         for forces, look in zip(shown[:, :, number], looks, strict=False):
