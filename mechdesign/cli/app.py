@@ -268,7 +268,7 @@ def schema() -> None:
         import json
 
         from mechdesign.cli.terminal import emit
-        from mechdesign.study import schema as study_schema
+        from mechdesign.study.schema.study_file import schema as study_schema
 
         emit(json.dumps(study_schema(), indent=2, ensure_ascii=False) + "\n")
 

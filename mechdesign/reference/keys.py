@@ -12,8 +12,8 @@ from pydantic_core import PydanticUndefined
 
 from mechdesign.indices import INDEX_NAMES
 from mechdesign.reference.entries import Entry
-from mechdesign.study import Units, schema
-from mechdesign.study.schema.study_file import StudyFile
+from mechdesign.study import Units
+from mechdesign.study.schema.study_file import StudyFile, schema
 from mechdesign.study.text import fields
 from mechdesign.study.text.fields import Model, Read, meaning
 from mechdesign.study.text.forms import properties

@@ -1,11 +1,36 @@
-"""The study file: reading, validation, and the mechanism and questions it describes."""
+"""The study file: reading, validation, and the mechanism and questions it describes.
 
-from mechdesign.study.loading import Study, load
-from mechdesign.study.poses import PoseGroup, Poses
-from mechdesign.study.schema.study_file import schema
-from mechdesign.study.templates import template, template_path, templates
-from mechdesign.study.text.units import Units
+The names below are imported when they are first used: a section of a study needs the readers of its fields, which stand
+in this package, and reading a whole study needs every section.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mechdesign.study.loading import Study as Study
+    from mechdesign.study.loading import load as load
+    from mechdesign.study.poses import PoseGroup as PoseGroup
+    from mechdesign.study.poses import Poses as Poses
+    from mechdesign.study.templates import template as template
+    from mechdesign.study.templates import template_path as template_path
+    from mechdesign.study.text.units import Units as Units
 
 HELP_PAGE = "reference/study/index"
 
-__all__ = ["PoseGroup", "Poses", "Study", "Units", "load", "schema", "template", "template_path", "templates"]
+_HOMES = {
+    **dict.fromkeys(("Study", "load"), "loading"),
+    **dict.fromkeys(("PoseGroup", "Poses"), "poses"),
+    **dict.fromkeys(("template", "template_path"), "templates"),
+    "Units": "text.units",
+}
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
+    if name in _HOMES:
+        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -18,7 +18,8 @@ from mechdesign.cli.batch import questions
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import MechdesignError
 from mechdesign.report.figures import style
-from mechdesign.study import load, template_path, templates
+from mechdesign.study import load, template_path
+from mechdesign.study.templates import templates
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = sorted((ROOT / "configs").rglob("*.yaml"))

@@ -27,7 +27,8 @@ from mechdesign.cli.app import app
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import StudyError
 from mechdesign.questions.optimize import variables
-from mechdesign.study import load, poses, template, templates
+from mechdesign.study import load, poses, template
+from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
 
 CONFIGS = Path(__file__).parents[2] / "configs"

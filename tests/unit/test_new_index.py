@@ -11,7 +11,7 @@ from mechdesign.errors import StudyError
 from mechdesign.questions.workspace import indices
 from mechdesign.questions.workspace.figures import figures
 from mechdesign.report.tables import to_csv
-from mechdesign.study import schema
+from mechdesign.study.schema.study_file import schema
 
 FILE = '''
 """Reach: distance of the point from the place where its leg begins."""

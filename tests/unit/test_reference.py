@@ -9,7 +9,7 @@ from mechdesign.questions.workspace import quadrature, question
 from mechdesign.reference import below, entries, find, near, place
 from mechdesign.reference.keys import Key, keys
 from mechdesign.region import regions
-from mechdesign.study import schema
+from mechdesign.study.schema.study_file import schema
 from mechdesign.study.text.document import read
 from mechdesign.study.text.fields import Context
 from mechdesign.study.text.forms import properties

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import mechdesign
 from mechdesign.errors import StudyError
-from mechdesign.study import template, templates
+from mechdesign.study import template
+from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
 
 STUDIES = [read(template(name).encode(), name).data for name in templates()]

@@ -9,7 +9,9 @@ import pytest
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.questions.poses import study_poses
-from mechdesign.study import schema, template, template_path, templates
+from mechdesign.study import template, template_path
+from mechdesign.study.schema.study_file import schema
+from mechdesign.study.templates import templates
 from mechdesign.study.text.document import read
 
 
