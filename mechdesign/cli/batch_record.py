@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import redirect_stderr
 from dataclasses import dataclass
@@ -185,7 +186,9 @@ class BatchRecord:
         """Of a single study its report, else the most telling picture; None of several."""
         if self.several:
             return None
-        reports = [path for task in self._tasks if (path := task.root / pages.REPORT).exists() and self.options.report]
+        # A folder that could not be made may have a name that no file can have.
+        paths = [task.root / pages.REPORT for task in self._tasks] if self.options.report else []
+        reports = [path for path in paths if os.path.exists(path)]
         pictures = (outcome.picture for study in self._outcomes for outcome in study)
         return next((path for path in (*reports, *pictures) if path is not None), None)
 

@@ -60,7 +60,7 @@ INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
 # Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
-_PLAIN = 1e-3, 2e4
+_PLAIN = 5e-3, 2e4
 
 _MICROMETRES = re.compile(r"\bum\b")
 _PRINTED = {"^2": "\N{SUPERSCRIPT TWO}", "^3": "\N{SUPERSCRIPT THREE}", "*": "\N{MIDDLE DOT}"}
