@@ -20,21 +20,24 @@ class Command:
     section: str = ""  # of the study; empty: that of its name
 
     @property
+    def package(self) -> str:
+        """The folder of the question."""
+        return f"mechdesign.{self.room or f'questions.{self.name}'}"
+
+    @property
     def module(self) -> str:
         """Where the function of its name is; imported when it is asked, for `--help` loads no numerics."""
-        return f"mechdesign.{self.room}.{self.name}" if self.room else f"mechdesign.questions.{self.name}.analysis"
+        return f"{self.package}.{self.name if self.room else 'analysis'}"
 
     @property
     def columns(self) -> str:
         """Where its columns and the numbers at the top of its report are declared."""
-        return f"mechdesign.{self.room or f'questions.{self.name}'}.columns"
+        return f"{self.package}.columns"
 
     @property
     def figures(self) -> str:
         """Where the function `figures` gathers its pictures."""
-        return (
-            f"mechdesign.{self.room}.figures.{self.name}" if self.room else f"mechdesign.questions.{self.name}.figures"
-        )
+        return f"{self.package}.figures{self.room and f'.{self.name}'}"
 
 
 # Each has a section of its name in the study file.
