@@ -1,0 +1,38 @@
+"""The dynamics section of the study file."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Self
+
+from pydantic import Field
+
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.loads import Load, check_loads
+from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text import fields
+
+HELP_PAGE = "theory/dynamics"
+
+
+class DynamicsSection(MotionSection):
+    """The motion whose drive efforts and joint forces are asked, and what acts on the mechanism."""
+
+    command: ClassVar[str] = "dynamics"
+    gravity: Annotated[tuple[fields.Acceleration, fields.Acceleration], fields.pair_of("[gx, gy]")] = (0.0, 0.0)
+    """Acceleration of free fall along the world's axes. Left out: none. Example: [0, -9.81 m/s^2]"""
+    loads: tuple[Load, ...] = Field(default_factory=tuple)
+    """Forces and moments that act on the mechanism beside weights, inertia and springs. Example: [{at: T, force: [0,
+    -20]}, {link: rocker, moment: "-0.1*rocker.angle_velocity"}]
+    """
+
+    def checked(self, checker: Checker) -> Self:
+        """Also check the loads."""
+        section = self if self.moves else checker.parts.get("kinematics") or self
+        moving = bool(section.rates or section.accelerations or section.speed)
+        check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=False)
+        return super().checked(checker)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it gives poses or rates of its own; else those of kinematics count."""
+        return self.source is not None or bool(self.rates or self.accelerations or self.speed)

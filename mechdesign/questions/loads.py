@@ -1,0 +1,72 @@
+"""The loads of a question at solved poses, as forces on its mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.forces import Forces, Motion
+from mechdesign.mechanism.outputs import first
+from mechdesign.questions.poses import in_study_units
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.loads import TIME, VELOCITY, Load, Quantity
+from mechdesign.study.text.units import Amount
+
+import numpy as np
+
+
+def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
+    """Coordinates in the expressions of loads, also those whose velocities stand there."""
+    names = {name.removesuffix(VELOCITY): name for load in loads for _, quantity, _ in load.numbers
+             if isinstance(quantity, Expression) for name in quantity.names}  # fmt: skip
+    return [study.mechanism.coordinate(name) for name in names if name != TIME and name not in study.parameters.nominal]
+
+
+class Loading:
+    """Loads at some poses; `time` is that of each, nan without one."""
+
+    def __init__(
+        self, study: Study, loads: Sequence[Load], poses: Poses, rows: object, time: Value = np.nan
+    ) -> None:
+        self.study, self.loads, self.poses, self.rows, self.time = study, loads, poses, rows, time
+
+    @quiet
+    def add(self, forces: Forces, motion: Motion) -> Value:
+        """Add the loads to forces; the power that they put in (0 without velocities)."""
+        configuration, power = forces.configuration, 0.0
+        for load in self.loads:
+            given = [self._value(part, forces, motion) for _, part, _ in load.numbers]
+            if load.at is not None:
+                force = given[0] + 1j * given[1]
+                if load.in_ is not None:
+                    force = force * configuration.body_rotation(load.in_)
+                forces.at(load.at, force)
+            elif load.between is not None:
+                ends = [configuration.graph.node(point) for point in load.between]
+                span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
+                pull = given[0] * span / np.sqrt(norm2(span))
+                forces.at(load.between[0], pull)
+                forces.at(load.between[1], -1.0 * pull)
+            if load.link is not None:
+                forces.on_body(load.link, 0.0, given[-1])
+        return power
+
+    def _value(self, quantity: Quantity, forces: Forces, motion: Motion) -> Number:
+        if isinstance(quantity, Expression):
+            return quantity.evaluate({name: self._variable(name, forces, motion) for name in quantity.names})
+        return quantity
+
+    def _variable(self, name: str, forces: Forces, motion: Motion) -> Number:
+        study, configuration = self.study, forces.configuration
+        if name in study.parameters.nominal:
+            return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
+        if name == TIME:
+            return self.time
+        coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
+        if coordinate.name == name:
+            return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)))
+        assert motion.velocity is not None
+        return np.asarray(in_study_units(study, coordinate, first(configuration, coordinate, motion.velocity)))
