@@ -9,6 +9,7 @@ from pydantic import model_validator
 
 from mechdesign.questions.reliability.laws import FITS, LAWS
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
+from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.questions.reliability.schema.variation import Dimension, Tolerance, millimetre
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
@@ -23,6 +24,9 @@ PIN_MODELS = {
     "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
     "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
 }
+# Methods by the pin model that they take.
+BY_MOMENTS = ", ".join(method.name for method in METHODS.values() if method.pin == "analytic")
+BY_PLACES = ", ".join(method.name for method in METHODS.values() if method.pin == "monte_carlo")
 _EFFECTS = {
     "offset": "moves the joint's point in the link's frame, by x and y",
     "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
@@ -70,9 +74,9 @@ class PinModel(fields.Model):
 
     short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
     analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that compute: analytic, second_order."""
+    """Model of the methods that compute with its moments: |BY_MOMENTS|."""
     monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that sample, and of form."""
+    """Model of the methods that place each pin: |BY_PLACES|."""
 
     @model_validator(mode="before")
     @classmethod
