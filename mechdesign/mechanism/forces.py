@@ -14,7 +14,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.graph import GROUND, Graph, rod_of
+from mechdesign.mechanism.graph import Graph, rod_of
 from mechdesign.mechanism.model import Mass, Spring
 from mechdesign.mechanism.outputs import Rates
 
@@ -83,7 +83,7 @@ class Forces:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Moving:
     """Velocities and accelerations of a mechanism; None where it stands still."""
 
     velocity: Rates | None = None
@@ -104,7 +104,7 @@ class Energy:
 
 @quiet
 def inertia(
-    forces: Forces, geometry: Geometry, masses: Mapping[str, Mass], motion: Motion, gravity: complex, factor: float
+    forces: Forces, geometry: Geometry, masses: Mapping[str, Mass], moving: Moving, gravity: complex, factor: float
 ) -> Energy:
     """Add weights and inertia forces of bodies.
 
@@ -128,13 +128,13 @@ def inertia(
         frame = configuration.graph.bodies[body][0]
         force: Vector = mass * gravity
         turning: Value = 0.0
-        if motion.velocity is not None:
-            omega = motion.velocity.angles[frame]
-            speed = motion.velocity.nodes[base] + 1j * omega * arm
+        if moving.velocity is not None:
+            omega = moving.velocity.angles[frame]
+            speed = moving.velocity.nodes[base] + 1j * omega * arm
             kinetic = kinetic + 0.5 * (mass * norm2(speed) + moment * omega * omega)
-            if motion.acceleration is not None:
-                alpha = motion.acceleration.angles[frame]
-                force = force - mass * (motion.acceleration.nodes[base] + (1j * alpha - omega * omega) * arm)
+            if moving.acceleration is not None:
+                alpha = moving.acceleration.angles[frame]
+                force = force - mass * (moving.acceleration.nodes[base] + (1j * alpha - omega * omega) * arm)
                 turning = -1.0 * moment * alpha
         forces.on_body(body, force, turning, arm)
         potential = potential - mass * dot(gravity, configuration.nodes[base] + arm)
@@ -155,7 +155,7 @@ def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
 
 
 @quiet
-def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], motion: Motion) -> Energy:
+def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moving: Moving) -> Energy:
     """Add the forces of springs and dampers; those of no length pull in no direction.
 
     The angle between two links counts within half a turn of the spring's free angle.
@@ -174,20 +174,20 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moti
             one, other = spring.between
             turn = configuration.body_rotation(other) * np.conj(configuration.body_rotation(one))
             stretch = wrap(np.angle(turn) - free)
-            if motion.velocity is not None:
-                frames = [motion.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
+            if moving.velocity is not None:
+                frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
                 rate = frames[0] - frames[1]
             moment = constant + stiffness * stretch + damping * rate
             forces.on_body(other, 0.0, -1.0 * moment)
-                    forces.on_body(one, 0.0, moment)
+            forces.on_body(one, 0.0, moment)
         else:
             ends = [configuration.graph.node(point) for point in spring.between]
             span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
             length = np.sqrt(norm2(span))
             stretch = length - free
             along = np.where(length > 0, span / np.where(length > 0, length, 1.0), 0.0)
-            if motion.velocity is not None:
-                rate = dot(along, motion.velocity.nodes[ends[1]] - motion.velocity.nodes[ends[0]])
+            if moving.velocity is not None:
+                rate = dot(along, moving.velocity.nodes[ends[1]] - moving.velocity.nodes[ends[0]])
             # Of a free length 0 the pull is the span itself, also where it has no direction.
             pull = stiffness * span + (constant - stiffness * free + damping * rate) * along
             forces.at(spring.between[0], pull)

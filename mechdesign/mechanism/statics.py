@@ -222,8 +222,17 @@ class Joints:
             # The pin that a ground's origin would be bears nothing.
             if len(free) < 2 or ":" in point:
                 continue
-            if len(free) == 2 and node not in self.loaded:
-                by, on = sorted(free, key=lambda member: (not member.slot, member.name != GROUND))
+            ground = next((member for member in free if member.name == GROUND and not member.slot), None)
+            if ground is not None:
+                # The pin is fixed in the ground, and so is what acts on it.
+                for member in free:
+                    if member is not ground:
+                        contacts.append(
+                            Contact(member.slot, GROUND, member.name, node, member.edges)
+                            if member.slot else _borne(point, member, GROUND, node)
+                        )  # fmt: skip
+            elif len(free) == 2 and node not in self.loaded:
+                by, on = sorted(free, key=lambda member: not member.slot)
                 contacts.append(_borne(by.slot or point, on, by.name, node))
             else:
                 pin = f"{PIN}{point}"

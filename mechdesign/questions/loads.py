@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from mechdesign.expressions import Expression, Number
-from mechdesign.mechanism.algebra import Value, dot, norm2, quiet
+from mechdesign.mechanism.algebra import Value, norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
-from mechdesign.mechanism.forces import Forces, Motion
+from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.poses import in_study_units
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import TIME, VELOCITY, Load, Quantity
 from mechdesign.study.text.units import Amount
-
-import numpy as np
 
 
 def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
@@ -28,17 +29,15 @@ def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
 class Loading:
     """Loads at some poses; `time` is that of each, nan without one."""
 
-    def __init__(
-        self, study: Study, loads: Sequence[Load], poses: Poses, rows: object, time: Value = np.nan
-    ) -> None:
+    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints, time: Value = np.nan) -> None:
         self.study, self.loads, self.poses, self.rows, self.time = study, loads, poses, rows, time
 
     @quiet
-    def add(self, forces: Forces, motion: Motion) -> Value:
-        """Add the loads to forces; the power that they put in (0 without velocities)."""
-        configuration, power = forces.configuration, 0.0
+    def add(self, forces: Forces, moving: Moving) -> None:
+        """Add the loads to forces."""
+        configuration = forces.configuration
         for load in self.loads:
-            given = [self._value(part, forces, motion) for _, part, _ in load.numbers]
+            given = [self._value(part, forces, moving) for _, part, _ in load.numbers]
             if load.at is not None:
                 force = given[0] + 1j * given[1]
                 if load.in_ is not None:
@@ -52,14 +51,13 @@ class Loading:
                 forces.at(load.between[1], -1.0 * pull)
             if load.link is not None:
                 forces.on_body(load.link, 0.0, given[-1])
-        return power
 
-    def _value(self, quantity: Quantity, forces: Forces, motion: Motion) -> Number:
+    def _value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
         if isinstance(quantity, Expression):
-            return quantity.evaluate({name: self._variable(name, forces, motion) for name in quantity.names})
+            return quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
         return quantity
 
-    def _variable(self, name: str, forces: Forces, motion: Motion) -> Number:
+    def _variable(self, name: str, forces: Forces, moving: Moving) -> Number:
         study, configuration = self.study, forces.configuration
         if name in study.parameters.nominal:
             return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
@@ -67,6 +65,7 @@ class Loading:
             return self.time
         coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
         if coordinate.name == name:
-            return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)))
-        assert motion.velocity is not None
-        return np.asarray(in_study_units(study, coordinate, first(configuration, coordinate, motion.velocity)))
+            return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)
+        assert moving.velocity is not None
+        rate = first(configuration, coordinate, moving.velocity)
+        return np.asarray(in_study_units(study, coordinate, rate), dtype=np.float64)

@@ -1,24 +1,46 @@
-"""What drives it, what does it bear? Efforts, joint forces, shaking forces and energies of a motion."""
+"""What drives it, what does it bear? Efforts of the drives, joint forces, shaking forces and energies of a motion.
+
+The motion is that of `mechdesign.questions.kinematics`, whose passage over the poses, and whose functions between them,
+carry the forces along.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 
 from mechdesign.cautions import Caution
-from mechdesign.curve.functions import Functions
-from mechdesign.mechanism.derivatives import STALLED
-from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.errors import AssemblyError
+from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
-from mechdesign.questions.dynamics.question import Borne, ForceQuestion, bear, force_question
-from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table
-from mechdesign.questions.poses import Keeper, Shown, SolvedPoses, judge_failures, solve_poses, study_poses
-from mechdesign.results import Drawn, Result
+from mechdesign.questions.dynamics.question import force_question
+from mechdesign.questions.dynamics.tables import asked_of, dynamics_table, extremes_table, joint_table
+from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.courses import Followed, course_of
+from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.passage import Passage, pass_over
+from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.together import Answers, End, Group
+from mechdesign.results import Drawn, Result, Scope
+from mechdesign.statistics import Asked
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.work.threads import one_thread
+
+# Tables with a row a pose, or several.
+A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnForces(Drawn):
+    """The solved poses of a motion, and its columns at each pose."""
+
+    shown: Shown
+    motion: Motion
 
 
 @one_thread()
@@ -26,7 +48,78 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     """Efforts and forces at every pose of the study's dynamics; see `mechdesign.dynamics`."""
     poses = study_poses(study, "dynamics")
     progress.start(poses.count, "poses")
-    question = force_question(study, poses)
-    answer = _answered(question, progress, jobs)
-    warnings, failed = judge_failures(study, poses, answer.reason, table="dynamics")
-    ...
+    passage = pass_over(force_question(study, poses), _marks, progress, jobs)
+    result = _group(passage).of(0)
+    if isinstance(result, Exception):
+        raise result
+    if not passage.long:
+        return result
+    long = {
+        name: passage.table(make, jobs, result.tables[name].scope)
+        for name, make in A_ROW_A_POSE.items() if name == "dynamics"
+    }  # fmt: skip
+    return replace(result, tables={**result.tables, **long})
+
+
+@one_thread()
+def answers(study: Study, poses: Poses) -> Answers:
+    """Answer `dynamics` for the poses of several designs, each as if it were asked alone, without pictures."""
+    return Answers([_group(pass_over(force_question(study, poses), _marks, NULL, 1))])
+
+
+def _marks(motion: Motion) -> Mapping[str, Flags]:
+    """Poses of which something is to be said: those that assemble where the drives hold the mechanism no longer."""
+    (effort, *_) = (static.name for static in asked_of(motion).statics)
+    return {"singular": motion.valid & ~np.isfinite(motion.arrays[effort])}
+
+
+def _group(passage: Passage) -> Group:
+    """The answers of all designs."""
+    question, motion, poses = passage.question, passage.motion, passage.question.poses
+    statics = asked_of(motion).statics
+    along = along_of(question, asked=[Asked(static.name, integral=True) for static in statics])
+    tables = {name: make(motion) for name, make in A_ROW_A_POSE.items()} | {"extremes": extremes_table(motion, along)}
+    closely = along is not None and not along.functions.unresolved.any()
+    ends = [_end(passage, along, k) for k in range(poses.designs)]
+    whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
+    a_pose = replace(whole, course=cache(partial(_follow, question)))
+    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in tables.items()}
+    result = Result("dynamics", scoped)
+    if poses.designs == 1:
+        (end,) = ends
+        drawn = DrawnForces(passage.shown, motion)
+        result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
+    return Group(np.arange(poses.designs), result, ends)
+
+
+def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
+    """A column along the motions of all designs."""
+    along = along_of(question, (), asked=[asked])
+    return None if along is None else course_of(along, asked)
+
+
+def _end(passage: Passage, along: Along | None, k: int) -> End:
+    """How design `k` was answered."""
+    poses, study = passage.question.poses, passage.question.study
+    count = poses.count // poses.designs
+    reason = passage.reason.reshape(poses.designs, -1)[k]
+    counts = {"poses": count, "invalid": int(np.count_nonzero(reason))}
+    try:
+        warnings, failed = judge_failures(study, poses, reason, k * count, "dynamics")
+    except AssemblyError as error:
+        return End(counts=counts, error=error)
+    mark = passage.marks[k]["singular"]
+    if mark.number:
+        warnings.append(Caution(
+            "singular", f"{mark.number} of {count} poses are singular: the drives hold the mechanism no longer, and "
+            "efforts and joint forces are nan there", "dynamics", mark.first,
+        ))  # fmt: skip
+    missing = [invalid_in_words(reason)]
+    if along is not None and not along.whole[k]:
+        missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
+    if open_ties := sorted(asked_of(passage.motion).joints.open):
+        warnings.append(Caution(
+            "undefined", f"the moments of {', '.join(open_ties)} are nan: slides and clamps of a closed chain share them in a "
+            "way that equilibrium leaves open", "joint_forces",
+        ))  # fmt: skip
+    return End(warnings, failed, " and ".join(filter(None, missing)), counts)

@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import counted
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import mixes
+from mechdesign.mechanism.derivatives import Linearization, mixes
+from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
+from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.rates import of_given
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.kinematics.targets import followed, needed
+from mechdesign.questions.loads import coordinates_in
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import followed_angles
 from mechdesign.study import Study
@@ -42,6 +47,19 @@ class Static:
     words: Mapping[str, str]  # at the places of the kind
 
 
+class Borne(Protocol):
+    """What is computed of the forces of a motion, besides: its columns, and their values at solved poses."""
+
+    @property
+    def statics(self) -> list[Static]:
+        """The columns."""
+        ...
+
+    def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
+        """Values by their columns; `rows` are those of the poses."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class MotionQuestion:
     """What a study asks of every pose.
@@ -62,6 +80,8 @@ class MotionQuestion:
         Coordinates whose values the errors need.
     errors : mapping of str to Quantity
         Columns of errors that have values between the poses, too.
+    borne : Borne or None
+        What else is computed of the forces.
     """
 
     study: Study
@@ -74,6 +94,7 @@ class MotionQuestion:
     of_given: bool
     targeted: tuple[str, ...]
     errors: Mapping[str, Quantity]
+    borne: Borne | None = None
 
     @property
     def drives(self) -> list[Coordinate]:
@@ -103,7 +124,7 @@ class MotionQuestion:
             unit = "" if above == below else above or f"1/{below}"
             words = {"output": name, "input": given}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
-        return statics
+        return [*statics, *(self.borne.statics if self.borne is not None else ())]
 
     @property
     def orders(self) -> dict[str, tuple[Quantity, int]]:
@@ -153,7 +174,8 @@ class MotionQuestion:
             pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
         ]
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        if not rates:
+        borne = self.borne if self.borne is not None and any(s.name in names for s in self.borne.statics) else None
+        if not rates and borne is None and not coordinates_in(self.study, section.loads):
             unasked |= {"rates": {}, "accelerations": {}, "speed": None}
         if not any(static.name in names for static in self.statics):
             unasked |= {"loads": (), "mechanical_advantage": {}}
@@ -162,8 +184,8 @@ class MotionQuestion:
         values = {*names, *(self.targeted if errors else ())}
         return replace(
             self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
-            watched=[coordinate for coordinate in self.watched if coordinate.name in values],
-            of_given=self.of_given and rates,
+            watched=[coordinate for coordinate in self.watched if borne is not None or coordinate.name in values],
+            of_given=self.of_given and (rates or borne is not None), borne=borne,
         )  # fmt: skip
 
     @property
@@ -208,7 +230,8 @@ def motion_question(study: Study, poses: Poses) -> MotionQuestion:
     for target in study.targets.values():
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     between, targeted = dict(followed(study, poses)), needed(study, poses)
-    names = dict.fromkeys([*mechanism.drives, *shown, *targeted])
+    loads = [coordinate.name for coordinate in coordinates_in(study, section.loads)]
+    names = dict.fromkeys([*mechanism.drives, *shown, *targeted, *loads])
     watched = {name: mechanism.coordinate(name) for name in names}
     return MotionQuestion(
         study,

@@ -46,9 +46,7 @@ class Load(fields.Model):
 
     at: fields.EndName | None = None
     """Point that the force acts at: its pin, or as rod.B link rod alone. Example: T"""
-    between: Annotated[
-        tuple[fields.EndName, fields.EndName] | None, fields.pair_of("a list of two points")
-    ] = None
+    between: Annotated[tuple[fields.EndName, fields.EndName] | None, fields.pair_of("a list of two points")] = None
     """Two points that a force pulls together. Example: [P, Q]"""
     force: Annotated[tuple[Quantity, ...] | None, fields.Read(_read_force, _FORCE)] = None
     """Force [fx, fy] along the world's axes; between two points one number. Expressions of coordinates, their

@@ -59,7 +59,7 @@ A mass is a force over an acceleration; what has mass in it is told in the study
 
 _PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance", "damping")))
 
-_FACTOR = r"\(?[A-Za-zµμ°]+(?:\s*(?:\^|\*\*)\s*-?\d)?\)?"
+_FACTOR = r"\(?[A-Za-zµμ°]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
     rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
@@ -377,7 +377,8 @@ def _common(unit: str) -> tuple[Powers, float] | None:
 def _unit(unit: str) -> tuple[Powers, float]:
     registry = _registry()
     try:
-        parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
+        power = re.sub(r"([^\W\d_])(\d)", r"\1**\2", unit)  # m/s2
+        parsed = registry.parse_units(power.replace("^", "**").replace("·", "*"))
         base = registry.Quantity(1.0, parsed).to_base_units()
     except Exception:  # pint raises errors of many classes
         known = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
