@@ -9,7 +9,7 @@ from helpers.studies import study_of
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.questions.workspace import indices
-from mechdesign.questions.workspace.figures import figures
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.study_file import schema
 
