@@ -107,22 +107,25 @@ def wall(names: Iterable[str], moving: Container[str], folder: str = "") -> str:
     return "\n\n".join((":::{container} wall", *lines, ":::"))
 
 
-def pages() -> dict[str, str]:
-    """The texts of all pages, of their list and of their thumbnails, by their paths in the folder of the site."""
-    found = studies()
-    moving: dict[str, str] = {}
-    for name, path in found.items():
-        with step(f"thumbnail of {name}"):
-            svg = thumbnail(path)
-        if svg is not None:
-            moving[name] = svg
+def pages(moving: Container[str] = ()) -> dict[str, str]:
+    """The texts of all pages and of their list by their paths in the site; studies in `moving` have a moving thumbnail."""
     parts = ["# Gallery", "Every study here is in the repository, runs as it is, and is tested against its source."]
     for group, names in GROUPS.items():
         listed = "\n".join(names)
         parts.append(f"## {group}\n\n{wall(names, moving)}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```")
     return {
         "gallery/index.md": "\n\n".join(parts) + "\n",
-        "gallery/_home.md": wall(HOME, moving, "gallery/") + "\n",
-        **{f"gallery/{name}.md": page(path) for name, path in found.items()},
-        **{f"gallery/{name}.svg": svg for name, svg in moving.items()},
+        **{f"gallery/{name}.md": page(path) for name, path in studies().items()},
     }
+
+
+def with_thumbnails() -> dict[str, str]:
+    """All pages, the thumbnails that move, and the wall of the home page, by their paths in the folder of the site."""
+    moving: dict[str, str] = {}
+    for name, path in studies().items():
+        with step(f"thumbnail of {name}"):
+            svg = thumbnail(path)
+        if svg is not None:
+            moving[name] = svg
+    thumbnails = {f"gallery/{name}.svg": svg for name, svg in moving.items()}
+    return pages(moving) | thumbnails | {"gallery/_home.md": wall(HOME, moving, "gallery/") + "\n"}

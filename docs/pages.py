@@ -15,8 +15,8 @@ from sphinx.util.typing import ExtensionMetadata
 from steps import step
 
 ROOT = Path(__file__).parent
-# What makes pages: modules whose function `pages` gives their texts by their paths.
-MAKERS = (gallery, lists, papers)
+# What makes pages: functions that give their texts by their paths.
+MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages)
 # Reports that pages show, by their names in the folder `_static`: what an example has written.
 REPORTS = {"first_four_bar.html": "tutorials/first_four_bar/results/study/kinematics/report.html"}
 
@@ -30,8 +30,8 @@ def write(app: Sphinx) -> None:
         If an example does not do what its page says.
     """
     for maker in MAKERS:
-        with step(f"pages of {maker.__name__}"):
-            texts = maker.pages()
+        with step(f"pages of {maker.__module__}"):
+            texts = maker()
         for name, text in texts.items():
             path = ROOT / name
             path.parent.mkdir(parents=True, exist_ok=True)
