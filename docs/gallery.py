@@ -108,7 +108,7 @@ def wall(names: Iterable[str], moving: Container[str], folder: str = "") -> str:
 
 
 def pages(moving: Container[str] = ()) -> dict[str, str]:
-    """The texts of all pages and of their list by their paths in the site; studies in `moving` have a moving thumbnail."""
+    """The texts of all pages and of their list, by their paths in the site; thumbnails of `moving` studies move."""
     parts = ["# Gallery", "Every study here is in the repository, runs as it is, and is tested against its source."]
     for group, names in GROUPS.items():
         listed = "\n".join(names)
