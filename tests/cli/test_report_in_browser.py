@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -19,28 +18,14 @@ from mechdesign.report.page.section import section
 from mechdesign.study import load
 
 try:
-    from playwright.sync_api import expect, sync_playwright
+    from playwright.sync_api import expect
 except ImportError:
-    sync_playwright = None
+    expect = None
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 PIXELS = 0.2  # of the drawing: a step of the places and of the angles that the page has
-ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the reports"
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """One browser for all."""
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None or sync_playwright is None:
-        pytest.skip(ABSENT)
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")

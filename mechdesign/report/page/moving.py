@@ -39,7 +39,7 @@ _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid th
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
-_TIMES = 10_000  # integers in the time of a motion
+TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",
@@ -158,7 +158,7 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
         seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
         note = ", as at the study's rates" if seconds == own else f"; at the study's rates {own:.3g} {unit}".rstrip()
     pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
-    return {"times": deltas(times / times[-1], _TIMES), "seconds": round(seconds, 3), "pace": pace,
+    return {"times": deltas(times / times[-1], TIMES), "seconds": round(seconds, 3), "pace": pace,
             "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
 
 
