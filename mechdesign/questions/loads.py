@@ -62,7 +62,7 @@ class Loading:
         if name in study.parameters.nominal:
             return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
         if name == TIME:
-            return self.time
+            return np.asarray(self.time, dtype=np.float64)
         coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
         if coordinate.name == name:
             return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)

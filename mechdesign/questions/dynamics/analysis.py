@@ -119,7 +119,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
     if open_ties := sorted(asked_of(passage.motion).joints.open):
         warnings.append(Caution(
-            "undefined", f"the moments of {', '.join(open_ties)} are nan: slides and clamps of a closed chain share them in a "
-            "way that equilibrium leaves open", "joint_forces",
+            "undefined", f"the moments of {', '.join(open_ties)} are nan: equilibrium leaves open how slides and clamps of a "
+            "closed chain share them", "joint_forces",
         ))  # fmt: skip
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)

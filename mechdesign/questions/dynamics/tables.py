@@ -90,7 +90,8 @@ def _of_poses(values: Floats, at: Floats) -> Floats:
         values[lanes, low], at[lanes, low], values[lanes, high], at[lanes, high], np.abs(values[lanes, peak]),
         at[lanes, peak], safe.sum(axis=1) / count, np.sqrt((safe**2).sum(axis=1) / count),
     ]  # fmt: skip
-    return np.where(known.any(axis=1)[:, None], np.stack(numbers, axis=1), np.nan)
+    some = np.asarray(known.any(axis=1))
+    return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
 
 
 def _between(along: Along, name: str, poses: Floats) -> Floats:
