@@ -117,9 +117,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     missing = [invalid_in_words(reason)]
     if along is not None and not along.whole[k]:
         missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
-    if open_ties := sorted(asked_of(passage.motion).joints.open):
-        warnings.append(Caution(
-            "undefined", f"the moments of {', '.join(open_ties)} are nan: equilibrium leaves open how slides and clamps of a "
-            "closed chain share them", "joint_forces",
-        ))  # fmt: skip
+    if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
+        message = f"the moments of {chains} are nan: equilibrium leaves open how slides and clamps of a chain share them"
+        warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
