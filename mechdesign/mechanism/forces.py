@@ -141,6 +141,12 @@ def inertia(
     return Energy(kinetic, potential)
 
 
+def center(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
+    """Place of a body's centre of mass."""
+    arm = _arm(forces, geometry, body, given) * forces.configuration.body_rotation(body)
+    return forces.configuration.nodes[forces.bases[body]] + arm
+
+
 def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
     """From the base of a body to its centre of mass, in its frame."""
     places = forces.configuration.places

@@ -172,8 +172,8 @@ def quantity(value: float, unit: str) -> str:
     """A value with three digits and its unit, ``3.74e+07 N/m`` as 3.74·10⁷ N/m; an infinite stiffness in a word."""
     if np.isinf(value):
         return "rigid"
-    if 1e-2 <= value < 1e5:
-        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
+    if value == 0 or 1e-2 <= abs(value) < 1e5:
+        return f"{value:.3g} {style.printed(unit)}" if abs(value) < 1e3 else f"{value:.0f} {style.printed(unit)}"
     return f"{style.in_powers(value)} {style.printed(unit)}"
 
 

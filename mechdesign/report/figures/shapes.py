@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -371,6 +371,18 @@ def arc(place: complex, start: float, sweep: float, radius: float, color: str) -
 def force(place: complex, direction: complex, color: str) -> list[Shape]:
     """A force: an arrow that ends at the place where it acts."""
     return _arrow(place, (complex(-FORCE - PIN), complex(-PIN - 6)), complex(-PIN), 1.0, 9.0, color, direction)
+
+
+def arrow(place: complex, tail: complex, tip: complex, color: str, dashes: Dashes = "-") -> list[Shape]:
+    """A straight arrow from and to points on paper beside a place."""
+    way = tip - tail
+    if not way:
+        return []
+    along, head = way / abs(way), min(8.0, 0.7 * abs(way))
+    stem = (tail, tip - 0.6 * head * along)
+    line, *rest = _arrow(place, stem, tip, along, head, color)
+    assert isinstance(line, Symbol)
+    return [replace(line, dashes=dashes), *rest]
 
 
 def _arrow(
