@@ -167,7 +167,7 @@ def joint_hodographs(
     rows = -(-len(labels) // fitting(labels))
     words = f"Way of the tip of each joint's {what} over {over.name or 'the path'}; dot: first pose, ring: largest"
     size = 8.0 if style.narrow() else 11.0
-    words = style.folded(words, size, style.width() - LEFT)
+    words = style.folded(words, size, style.width() - LEFT - RIGHT)
     figure, panels = windows(window, "", len(some), columns, above=0.28 if columns > 1 else 0.75, top=0.34,
                              below=BELOW + 0.1 + _LEGEND_LINE * rows)  # fmt: skip
     looks: list[dict[str, Any]] = [{"color": color, "linestyle": dashes}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,12 +24,12 @@ from mechdesign.report.figures.panels import (
 from mechdesign.report.figures.pictures import picture
 
 _FEW_PANELS = 4  # more of them are lower
-_LOW = 1.3  # inches
+_TALL, _LOW = 1.75, 1.3  # inches
 # A peak beyond so many times the root mean square, near a singularity, leaves the axis.
 _BEYOND = 6.0
 _CURVES = {"effort": style.BLUE, "power": style.GREEN}
-_RMS = {"color": style.VERMILION, "linestyle": (0, (6, 2)), "linewidth": 1.3}
-_MEAN = {"color": style.INK, "linestyle": (0, (1.5, 1.5)), "linewidth": 1.3}
+_RMS: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (6, 2)), "linewidth": 1.3}
+_MEAN: dict[str, Any] = {"color": style.INK, "linestyle": (0, (1.5, 1.5)), "linewidth": 1.3}
 
 
 @picture(DynamicsView, "efforts", order=20)
@@ -41,8 +43,8 @@ def efforts_figure(view: DynamicsView) -> Figure | None:
     if not any(np.nanmax(np.abs(view.column(name))) > _rounding(view, name) for name in names):
         return None
     names = names[:MAX_PANELS]
-    figure, panels = stack(len(names), "Efforts of the drives", over.label,
-                           **{"tall": _LOW} if len(names) > _FEW_PANELS else {})  # fmt: skip
+    tall = _LOW if len(names) > _FEW_PANELS else _TALL
+    figure, panels = stack(len(names), "Efforts of the drives", over.label, tall=tall)
     for axes, name in zip(panels, names, strict=True):
         _panel(view, axes, name, over)
     tick_abscissa(panels[-1], over)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -12,8 +14,8 @@ from mechdesign.report.figures.panels import clear_of_ticks, legend_below, quant
 from mechdesign.report.figures.pictures import picture
 
 _TALL = 2.6  # inches
-_LOOKS = {"kinetic": (style.BLUE, "-"), "potential": (style.VERMILION, (0, (6, 2)))}
-_SUM = (style.INK, (0, (1.5, 1.2)))
+_LOOKS: dict[str, tuple[str, Any]] = {"kinetic": (style.BLUE, "-"), "potential": (style.VERMILION, (0, (6, 2)))}
+_SUM: tuple[str, Any] = (style.INK, (0, (1.5, 1.2)))
 
 
 @picture(DynamicsView, "energies", order=60)
@@ -31,7 +33,7 @@ def energies_figure(view: DynamicsView) -> Figure | None:
              for kind, values in curves.items()]  # fmt: skip
     looks = {kind: _LOOKS[kind] for kind in curves}
     if len(curves) > 1:
-        curves["sum"], looks["sum"] = sum(curves.values()), _SUM
+        curves["sum"], looks["sum"] = np.sum([*curves.values()], axis=0), _SUM
     figure, (axes,) = stack(1, "Energies", over.label, note=", ".join(notes), tall=_TALL)
     handles = []
     for kind, values in curves.items():

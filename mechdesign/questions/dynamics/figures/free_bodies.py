@@ -77,7 +77,7 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     words = f"Forces on the links [{style.printed(unit)}] at {where}, where a joint bears most"
     words = style.folded(words, 11.0, style.width() - 2 * _EDGE)
     figure, panels = style.page(count, columns, _TALL, left=_EDGE, right=_EDGE, top=_TOP + 0.18 * words.count("\n"),
-                                bottom=_BOTTOM, down=_TITLE)  # fmt: skip
+                                bottom=_bottom(), down=_TITLE)  # fmt: skip
     figure.text(_EDGE / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=11)
     colors = shapes.link_colors(mechanism)
     whole = shapes.mechanism_shapes(scene, colors, {})
@@ -191,16 +191,22 @@ def _key(figure: Figure, acting: Sequence[Action], largest: float, unit: str) ->
     kinds = [kind for kind in LOOKS if any(action.kind == kind for action in acting)]
     handles = [Line2D([], [], color=LOOKS[kind].color, linestyle=LOOKS[kind].dashes, linewidth=1.8,
                       label=LOOKS[kind].words) for kind in kinds]  # fmt: skip
-    figure.legend(handles=handles, loc="lower left", ncols=len(handles), borderaxespad=0.2, columnspacing=1.2,
+    columns = 3 if style.narrow() else len(handles)
+    figure.legend(handles=handles, loc="lower left", ncols=columns, borderaxespad=0.2, columnspacing=1.2,
                   handlelength=1.8)  # fmt: skip
     force = round_down(largest)
-    right, length, low = style.width() - _EDGE, _LONGEST * force / largest, 0.16
-    key = figure.add_axes((0, 0, 1, _BOTTOM / figure.get_figheight()))
+    right, length, low = style.width() - _EDGE, _LONGEST * force / largest, _bottom() - 0.39
+    key = figure.add_axes((0, 0, 1, _bottom() / figure.get_figheight()))
     key.set_xlim(0, style.width())
-    key.set_ylim(0, _BOTTOM)
+    key.set_ylim(0, _bottom())
     _bare(key)
     draw(key, shapes.arrow(complex(right - length, low), 0j, complex(72 * length), style.INK))
     key.text(right - length - 0.08, low, quantity(force, unit), ha="right", va="center", fontsize=9)
+
+
+def _bottom() -> float:
+    """Inches for the legend and the arrow, which stands above it on a narrow page."""
+    return _BOTTOM + 0.35 * style.narrow()
 
 
 def _bare(axes: Axes) -> None:
