@@ -359,3 +359,15 @@ def test_a_table_shows_its_first_rows_with_units():
     some = Table("motion", columns).take(np.arange(10))
     long = LongTable(some, 30, lambda: iter([Table("motion", columns, "one row a pose")]))
     assert long._repr_html_().replace("motion<", "motion: one row a pose<") == html
+
+
+def test_a_table_shows_no_rounding_error():
+    columns = (
+        Column("x", np.array([1.0, 6.1e-17, np.nan]), "mm"),
+        Column("y", np.array([-3e-16, 2.0, np.inf]), "mm"),
+        Column("part", np.array([1.0, 6.1e-17, 0.5])),
+    )
+    rows = Page(Table("motion", columns)._repr_html_()).all("tr")
+    assert len(rows) == 4
+    text = Page(Table("motion", columns)._repr_html_()).text
+    assert text.endswith("part101026.1e-17\N{EN DASH}\N{INFINITY}0.5")

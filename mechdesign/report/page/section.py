@@ -13,9 +13,10 @@ from mechdesign.errors import explain
 from mechdesign.report.figures.before import Before
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
-from mechdesign.report.tables import cells, json_text, plain
+from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
+from mechdesign.table_text import readable
 
 HELP_PAGE = "howto/report"
 
@@ -27,8 +28,6 @@ FIRST_ROWS = 8
 # A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
-_DIGITS = 6
-_NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIGN}\N{INFINITY}"}
 
 
 def section(
@@ -81,7 +80,7 @@ def _table(table: Table) -> dict[str, Any]:
     count = len(table)
     turned = 0 < count <= FEW_ROWS and len(table.columns) >= MANY_COLUMNS
     first = table.take(np.arange(count if count <= MOST_ROWS else FIRST_ROWS))
-    texts = [[_NO_NUMBER.get(text, text) for text in column] for column in cells(first, _DIGITS)]
+    texts = readable(table, first)
     return {
         "name": table.name,
         "meaning": table.meaning,
