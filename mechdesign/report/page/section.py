@@ -10,9 +10,13 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import explain
+from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
+from mechdesign.report.page.front import front
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
+from mechdesign.report.page.tracks import Moving
 from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -20,8 +24,8 @@ from mechdesign.table_text import readable
 
 HELP_PAGE = "howto/report"
 
-# Beside a moving mechanism this picture of the same curves is left out.
-CURVES = "motion"
+# Pictures that are left out where the same stands beside a moving mechanism: of a motion its curves, and the front.
+BESIDE = {"motion", "pareto"}
 # Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
@@ -51,12 +55,12 @@ def section(
     if plots and not result.interrupted:
         try:
             marked = [number.place for number in numbers if number.place is not None]
-            part = moving(study, result.seen, before, marked)
+            part = _moving(study, result.seen, before, marked)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
-    doubled = CURVES if part is not None and part.beside else ""
-    shown = {name: html for name, html in pictures.items() if name != doubled}
+    doubled = BESIDE if part is not None and part.beside else ()
+    shown = {name: html for name, html in pictures.items() if name not in doubled}
     return {
         "command": result.command,
         "headlines": [dataclasses.asdict(number) for number in numbers],
@@ -69,6 +73,16 @@ def section(
         "warnings": [*map(str, (*result.warnings, *warnings))],
         "interrupted": result.interrupted,
     }, warnings
+
+
+def _moving(study: Study, result: Result, before: Before | None, marked: Sequence[float]) -> Moving | None:
+    """The mechanism of a result moving; of a front any of its designs, where these have a motion."""
+    part = None
+    if isinstance(result.drawn, DrawnDesigns) and "pareto" in result.tables:
+        # In the width of half a page the texts of the picture are large enough.
+        with style.context("paper"):
+            part = front(result.drawn.designs, result.tables["pareto"], f"{result.command}-front")
+    return part or moving(study, result, before, marked)
 
 
 def encoded(part: Mapping[str, Any]) -> bytes:
