@@ -13,10 +13,12 @@ from mechdesign.errors import explain
 from mechdesign.questions.optimize.analysis import DrawnDesigns
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
+from mechdesign.report.page.cases import gates, telling_rows
 from mechdesign.report.page.front import front
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import Moving
+from mechdesign.report.requirements import DrawnCases
 from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -61,13 +63,15 @@ def section(
             warnings = (*warnings, Caution("undrawn", still))
     doubled = BESIDE if part is not None and part.beside else ()
     shown = {name: html for name, html in pictures.items() if name not in doubled}
+    swept = isinstance(result.drawn, DrawnCases)
     return {
         "command": result.command,
         "headlines": [dataclasses.asdict(number) for number in numbers],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
-        "tables": [_table(table) for table in result.tables.values()],
+        "gates": gates(result) if swept else None,
+        "tables": [_cases(table) if swept else _table(table) for table in result.tables.values()],
         "files": list(result.files),
         "counts": plain(dict(result.counts)),
         "warnings": [*map(str, (*result.warnings, *warnings))],
@@ -91,18 +95,34 @@ def encoded(part: Mapping[str, Any]) -> bytes:
 
 
 def _table(table: Table) -> dict[str, Any]:
+    """A table that is folded; where it is long its first rows alone."""
     count = len(table)
     turned = 0 < count <= FEW_ROWS and len(table.columns) >= MANY_COLUMNS
-    first = table.take(np.arange(count if count <= MOST_ROWS else FIRST_ROWS))
-    texts = readable(table, first)
+    first = count if count <= MOST_ROWS else FIRST_ROWS
+    which = "all" if first == count else f"the first {first} of"
+    return _part(table, table.take(np.arange(first)), which, turned=turned)
+
+
+def _cases(table: Table) -> dict[str, Any]:
+    """The table of a sweep, open."""
+    some, which = telling_rows(table)
+    return _part(table, some, which, turned=False, opened=True)
+
+
+def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool = False) -> dict[str, Any]:
+    """Some rows of a table; `which`, in words. All rows and those of an open table can be sorted."""
+    texts = readable(table, some)
     return {
         "name": table.name,
         "meaning": table.meaning,
-        "rows": count,
+        "rows": len(table),
+        "which": which,
         "turned": turned,
+        "open": opened,
+        "sorted": not turned and len(some) > 1 and (opened or len(some) == len(table)),
         "columns": [
             {"name": column.name, "unit": column.unit, "meaning": column.meaning, "numeric": column.numeric}
-            for column in table.columns
+            for column in some.columns
         ],
         "cells": texts if turned else [list(row) for row in zip(*texts, strict=True)],
     }

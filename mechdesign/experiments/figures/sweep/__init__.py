@@ -12,13 +12,13 @@ from mechdesign.study import Study
 
 
 def figures(study: Study, result: Result) -> Gallery:
-    """``main_effects`` and ``scatter``; of two numbers that vary or more ``response``."""
+    """``main_effects`` and ``scatter``; of two numbers that vary or more ``response`` between them."""
     table, gallery, drawn = result.main, Gallery(), DrawnCases.of(result)
     entries = [Axis.of(table.column(name)) for name in drawn.entries]
     entries = [entry for entry in entries if len(entry.distinct) > 1]
     results = [Axis.of(table.column(name), *limits, varied=False) for name, limits in drawn.results.items()]
     if entries and results:
         gallery.add("main_effects", main_effects, entries, results, len(table))
-        gallery.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
         gallery.add("response", response, entries, results, table, drawn.goals)
+        gallery.add("scatter", scatter, entries, results, table, required=bool(study.requirements))
     return gallery
