@@ -34,7 +34,7 @@ from mechdesign.study import designs as study_designs
 from mechdesign.study.poses import Poses
 
 # Designs whose poses are solved, and bytes of the drawings and poses that a page has of them.
-MOST_DESIGNS = 200
+MOST_DESIGNS = 60
 BUDGET = 160_000
 MAX_POSES = 73  # of a design
 _NAMED_POSES = 4  # in which names keep off the links
@@ -55,6 +55,8 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     name : str
         Begins the ids inside its picture.
     """
+    if drawn.study.kinematics is not None and drawn.study.kinematics.at_nodes:
+        return None
     names = {row: words for words, row in marked(drawn, table)}
     order = _spread(drawn, table, [*names])[:MOST_DESIGNS]
     sweeps = {row: sweep for row, sweep in _sweeps(drawn, table, order) if len(sweep.valid) > 1}
@@ -87,7 +89,9 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     sketcher.names(scenes, links=False)
     sketcher.ruler(drawn.study.units.label("length"))
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
-    pace = f"{count} designs of the front are in this page: a click on the front shows the nearest, arrow keys the next."
+    pace = (
+        f"{count} designs of the front are in this page: a click on the front shows the nearest, arrow keys the next."
+    )
     data = {"poses": len(rows), "first": knee, "choices": [choices[row] for row in rows.tolist()], "given": given,
             "front": _points(figure, drawn, table, rows), "numbers": numbers.tracks, "pace": pace}  # fmt: skip
     words = choices[int(rows[knee])]["title"]
@@ -136,6 +140,8 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     places = evenly(poses.line, MAX_POSES).astype(float)
     if not curve.spent.any():
         places = near_the_paths(curve, study.mechanism.points, places, MAX_POSES)
+    if poses.closed:
+        places = np.append(places, poses.end)
     _, configuration = curve.solve(*curve.grid(places), turning=False)
     sweeps = []
     for k in range(curve.lines):
