@@ -86,7 +86,7 @@ def test_the_answers_name_the_knee_and_the_ends_with_their_values_and_units(aske
         *(f"best {g}" for g in goals),
     ]
     assert {number.unit for number in told} == {"cm"}
-    assert told[0].pose == {name: optimum[name][0] for name in ("l1", "l3", "speed")}
+    assert told[0].pose == {name: optimum[name][0] for name in ("l1", "l3", "speed", *goals)}
     assert f"l3 = {optimum['l3'][1]:.4g} cm" in told[2].note.replace("\N{NO-BREAK SPACE}", " ")
     assert f"there {goals[1]} = " in told[2].note.replace("\N{NO-BREAK SPACE}", " ")
 

@@ -21,7 +21,7 @@ from mechdesign.questions.optimize.figures.front import front_figure, marked, pa
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import parted
-from mechdesign.report.figures.scene import Scene, Sweep, pose
+from mechdesign.report.figures.scene import Sweep, pose
 from mechdesign.report.page.frames import near_the_paths
 from mechdesign.report.page.linkage import Sheet, Sketcher, add
 from mechdesign.report.page.moving import gaps
@@ -57,45 +57,63 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     """
     if drawn.study.kinematics is not None and drawn.study.kinematics.at_nodes:
         return None
-    names = {row: words for words, row in marked(drawn, table)}
-    order = _spread(drawn, table, [*names])[:MOST_DESIGNS]
+    marks = {row: mark for mark, row in marked(drawn, table)}
+    order = _spread(drawn, table, [*marks])[:MOST_DESIGNS]
     sweeps = {row: sweep for row, sweep in _sweeps(drawn, table, order) if len(sweep.valid) > 1}
     if not sweeps:
         return None
     sheet = Sheet.around(np.concatenate([sweep.extent for sweep in sweeps.values()]))
-    choices: dict[int, dict[str, Any]] = {}
-    size, alike = 0, None
-    for row in filter(sweeps.__contains__, order.tolist()):
-        choice, alike = _choice(sheet, sweeps[row], alike)
-        size += len(json_text(choice))
-        if choices and size > BUDGET:
-            break
-        words = f"design {row + 1} of {len(table)} on the front" + f", {names.get(row)}" * (row in names)
-        choices[row] = choice | {"title": words, "number": row + 1, "mark": names.get(row, "")}
+    fitting = _fitting(sheet, [(row, sweeps[row]) for row in order.tolist() if row in sweeps])
     # Along the first goal, as the front runs.
-    rows = np.array(sorted(choices, key=lambda row: (table[drawn.goals[0].name][row], row)))
-    knee = next((k for k, row in enumerate(rows.tolist()) if names.get(row) == "knee"), 0)
+    rows = np.array(sorted(fitting, key=lambda row: (table[drawn.goals[0].name][row], row)))
+    choices = [fitting[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
+    knee = next((k for k, choice in enumerate(choices) if choice["mark"] == "knee"), 0)
     numbers, entries, given = _numbers(drawn, table, rows, knee)
     figure = front_figure(drawn, table)
     for line in figure.findobj(Line2D):
         assert isinstance(line, Line2D)
         line.set_rasterized(len(np.asarray(line.get_xdata())) > _CLOUD and line.get_linestyle() == "None")
     beside = inline(figure, name, described(figure))
-    root = sheet.root("the mechanism of a design of the front")
-    sweep = sweeps[int(rows[knee])]
-    _draw(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
-    scenes = _scenes(sweep)
-    sketcher = Sketcher(root, sheet, sweep.mechanism, scenes[0], sweep.travel)
-    sketcher.names(scenes, links=False)
-    sketcher.ruler(drawn.study.units.label("length"))
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
     pace = (
-        f"{count} designs of the front are in this page: a click on the front shows the nearest, arrow keys the next."
+        f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
     )
-    data = {"poses": len(rows), "first": knee, "choices": [choices[row] for row in rows.tolist()], "given": given,
-            "front": _points(figure, drawn, table, rows), "numbers": numbers.tracks, "pace": pace}  # fmt: skip
-    words = choices[int(rows[knee])]["title"]
-    return Moving(tostring(root, encoding="unicode"), beside, data, words, ["value"], entries, {})
+    data = {"poses": len(rows), "first": knee, "choices": choices, "given": given, "numbers": numbers.tracks,
+            "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
+    drawing = _drawing(sheet, sweeps[int(rows[knee])])
+    return Moving(drawing, beside, data, choices[knee]["title"], ["value"], entries, {})
+
+
+def _fitting(sheet: Sheet, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:
+    """The first designs, by their rows, as the script draws them: as many as fit into the budget, and always one."""
+    found: dict[int, dict[str, Any]] = {}
+    size, alike = 0, None
+    for row, sweep in sweeps:
+        choice, alike = _choice(sheet, sweep, alike)
+        size += len(json_text(choice))
+        if found and size > BUDGET:
+            break
+        found[row] = choice
+    return found
+
+
+def _named(drawn: Designs, table: Table, row: int, mark: str) -> dict[str, Any]:
+    """What a design of a front is called, with those of its variables that are words."""
+    words = [f"{name} = {table[name][row]}" for name in drawn.variables if not table.column(name).numeric]
+    title = ", ".join([f"design {row + 1} of {len(table)} on the front", *([mark] if mark else []), *words])
+    return {"title": title, "number": row + 1, "mark": mark}
+
+
+def _drawing(sheet: Sheet, sweep: Sweep) -> str:
+    """The drawing in which the script changes the design; the names of the points stay."""
+    root = sheet.root("the mechanism of a design of the front")
+    _draw(add(root, "g", **{"class": "moving-design"}), sheet, sweep)
+    few = sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()
+    scenes = [scene for k in few if (scene := pose(sweep.mechanism, sweep.configuration, k)) is not None]
+    sketcher = Sketcher(root, sheet, sweep.mechanism, scenes[0], sweep.travel)
+    sketcher.names(scenes, links=False)
+    sketcher.ruler(sweep.study.units.label("length"))
+    return tostring(root, encoding="unicode")
 
 
 def _spread(drawn: Designs, table: Table, first: Sequence[int]) -> Ints:
@@ -179,14 +197,8 @@ def _draw(layer: Element, sheet: Sheet, sweep: Sweep) -> None:
     sketcher.draw()
 
 
-def _scenes(sweep: Sweep) -> list[Scene]:
-    """A few poses, of which the first is the first valid one."""
-    few = sweep.valid[evenly(len(sweep.valid), _NAMED_POSES)].tolist()
-    return [scene for k in few if (scene := pose(sweep.mechanism, sweep.configuration, k)) is not None]
-
-
 def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[Numbers, list[Entry], list[list[Any]]]:
-    """Variables and goals of the designs of a page: their numbers, a row each, and what tells one from another."""
+    """Variables and goals of the designs of a page: their numbers, a row each, and how the script names them."""
     names = [*drawn.variables, *(goal.name for goal in drawn.goals if goal.name not in drawn.variables)]
     columns = [table.column(name) for name in names if table.column(name).numeric]
     columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in columns]
@@ -194,8 +206,6 @@ def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[Numb
     entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
     given = []
     for column in columns:
-        if column.name not in drawn.variables:
-            continue
         which, _, power = numbers.scaled[column.name]
         given.append([column.name, numbers.units[column.name], which, power])
     return numbers, entries, given

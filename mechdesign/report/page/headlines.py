@@ -111,12 +111,13 @@ def _of_cases(result: Result) -> Iterator[Headline]:
 
 
 def _of_front(table: Table) -> Iterator[Headline]:
-    """The knee of a front with each goal, and the best of each goal; links to the designs by their variables."""
+    """The knee of a front with each goal, and the best of each goal, and which designs these are."""
     goals = [name.removeprefix("w_") for name in table.names if name.startswith("w_")]
     variables = [column for column in table.columns if column.kind == OPTIMUM["<variable>"]]
     for row, what in enumerate(table["what"].tolist()):
         design = _in_words(variables, row)
-        given = {column.name: float(column.values[row]) for column in variables if column.numeric}
+        known = [column for column in (*variables, *map(table.column, goals)) if column.numeric]
+        given = {column.name: float(column.values[row]) for column in known}
         for goal in goals:
             own, others = table.column(goal), [table.column(name) for name in goals if name != goal]
             if what == "knee":
