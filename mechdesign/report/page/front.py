@@ -75,9 +75,7 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
         line.set_rasterized(len(np.asarray(line.get_xdata())) > _CLOUD and line.get_linestyle() == "None")
     beside = inline(figure, name, described(figure))
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
-    pace = (
-        f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
-    )
+    pace = f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
     data = {"poses": len(rows), "first": knee, "choices": choices, "given": given, "numbers": numbers.tracks,
             "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
     drawing = _drawing(sheet, sweeps[int(rows[knee])])
