@@ -189,7 +189,7 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     check(page)
     rows = [" ".join(text.split()) for text in page.said("tr")][1:]
     assert "stiffness: ✗ cannot be assembled" in rows[0]
-    assert "✗ cannot be assembled0 of 2 requirements met" in rows[0]
+    assert "✗ NOT MET0 of 2 requirements met" in rows[0]
     assert "wrong study" in rows[1]
     assert "mechanism.links.crank" in rows[1]
     assert "kinematics: ✓ doneno warnings" in rows[2]
