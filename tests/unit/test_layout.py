@@ -26,6 +26,7 @@ ORDER = (
     ("mechdesign.curve",),
     ("mechdesign.questions", "mechdesign.region"),
     ("mechdesign.questions.kinematics",),
+    ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.stiffness",),
     ("mechdesign.questions.reliability",),
     ("mechdesign.questions.workspace",),
