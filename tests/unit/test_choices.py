@@ -10,10 +10,10 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.questions.optimize.figures import figures
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.optimize.variables import choice_problems, from_cube, grid
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Result
 from mechdesign.study import Study
 
