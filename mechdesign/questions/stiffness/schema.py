@@ -44,6 +44,8 @@ class Profile(fields.Model):
     """Area of any other section. Example: 800 mm^2"""
     inertia: fields.PositiveInertia | None = None
     """Second moment of area for bending in the plane. Example: 1e5 mm^4"""
+    density: fields.PositiveDensity | None = None
+    """Mass per volume: a link that bends and has no ``mass`` has that of its beams in dynamics. Example: 7850 kg/m^3"""
     shear: bool = False
     """Whether shear gives too (Timoshenko's beam)."""
     shear_factor: fields.Positive | None = None
