@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +15,9 @@ from matplotlib.figure import Figure
 from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Flags, Ints
+from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.centrodes import leaps
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -105,7 +106,7 @@ def paths_figure(
     middle, *sides = extent(sweep.extent)
     near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
     places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
-    steps = _steps(sweep)
+    steps = steps_of(sweep)
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
     words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
              for link in centrodes]  # fmt: skip
@@ -113,7 +114,7 @@ def paths_figure(
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
     for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
-        path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
+        path = np.where(leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
         axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
                   label=label)  # fmt: skip
     for kind in kinds:
@@ -159,22 +160,15 @@ def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
     return centrodes
 
 
-def _leaps(path: Complexes, side: float) -> Flags:
-    """Points after which a path passes through infinity; `path` is relative to the mechanism's middle."""
-    far = np.abs(path) > side
-    turned = (np.conj(path[:-1]) * path[1:]).real < 0
-    return np.append(far[:-1] & far[1:] & turned, False)
-
-
-class _Steps(NamedTuple):
-    """Poses at equal steps of what is swept, the step in words, and those of them whose value is written."""
+class Steps(NamedTuple):
+    """Poses at equal steps of what is swept, the step in words, and the values that are written beside some."""
 
     rows: Ints
     words: str
-    written: Ints
+    written: Mapping[int, str]
 
 
-def _steps(sweep: Sweep) -> _Steps | None:
+def steps_of(sweep: Sweep) -> Steps | None:
     """Steps of a sweep of one coordinate, with their time where it has a constant rate; None of other motions."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
@@ -199,16 +193,16 @@ def _steps(sweep: Sweep) -> _Steps | None:
     each = -(-len(rows) // most)
     if unit == "deg":
         each = next((k for k in range(each, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), each)
-    return _Steps(rows, f"ticks every {words}", rows[::each])
+    degree = "\N{DEGREE SIGN}" * (unit == "deg")
+    written = {k: f"{values[k]:.4g}{degree}" for k in rows[::each].tolist()}
+    return Steps(rows, f"every {words}; numbers: {name}", written)
 
 
-def _draw_steps(axes: Axes, sweep: Sweep, steps: _Steps) -> list[Label]:
+def _draw_steps(axes: Axes, sweep: Sweep, steps: Steps) -> list[Label]:
     """Short lines across the boldest paths, of a length on paper; returns the numbers to be written beside some."""
     ranked, looks = ranks(sweep.study), {look.point: look for look in path_looks(sweep)}
     shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
     half, lines, numbers = _TICK / 2 / (shown[1, 0] - shown[0, 0]), [], []
-    (name,) = moving_names(sweep.poses)
-    values, degrees = sweep.poses.values[name][sweep.rows], sweep.study.units.label(sweep.mechanism.quantity(name))
     for point, path in sweep.places.items():
         if ranked[point] < max(ranked.values()):
             continue
@@ -223,14 +217,11 @@ def _draw_steps(axes: Axes, sweep: Sweep, steps: _Steps) -> list[Label]:
         color = darker(looks[point].color)
         for row, toward in zip(rows.tolist(), across.tolist(), strict=True):
             if row in steps.written and np.isfinite(toward):
-                text = f"{values[row]:.4g}" + "\N{DEGREE SIGN}" * (degrees == "deg")
-                heading = float(np.angle(toward))
-                numbers.append(
-                    Label(text, (complex(path[row]),), color, _TICK / 2 + 1, heading, _NUMBER, optional=True)
-                )
+                numbers.append(Label(steps.written[row], (complex(path[row]),), color, _TICK / 2 + 1,
+                                     float(np.angle(toward)), _NUMBER, optional=True))  # fmt: skip
     axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
-    words = steps.words + f"; numbers: {name}" * bool(numbers)
-    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2, label=words)
+    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2,
+              label=f"ticks {steps.words}")  # fmt: skip
     return numbers
 
 
