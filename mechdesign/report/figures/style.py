@@ -122,7 +122,7 @@ def width() -> float:
 
 def tallest() -> float:
     """Greatest height of the page, inches of its layout."""
-    return next(look.height for look in LOOKS.values() if look.width == width())
+    return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
 
 
 def narrow() -> bool:

@@ -274,9 +274,9 @@ def _path_names(sweep: Sweep) -> list[Label]:
     labels = []
     for look in looks:
         far = np.nan_to_num(np.abs(look.path - look.path[np.isfinite(look.path)][0]))
-        anchors = look.path[np.argsort(-far)[: len(far) // 3 : max(len(far) // 12, 1)]]
-        if look.point in several and len(anchors):
-            labels.append(Label(look.point, tuple(anchors.tolist()), darker(look.color), 6.0, size=9.5))
+        anchors = look.path[np.argsort(-far)[: len(far) // 3 : max(len(far) // 12, 1)]].tolist()
+        if look.point in several and anchors:
+            labels.append(Label(f"path of {look.point}", anchors, darker(look.color), 6.0, size=9.0, optional=True))
     return labels
 
 

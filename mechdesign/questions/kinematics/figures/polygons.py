@@ -10,13 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.figures.poses import KINDS, arrow, place_of, rates_of
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.special_poses import SpecialPose
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import fit
 from mechdesign.report.figures.labels import Label, covered, place_labels
-from mechdesign.report.figures.panels import legend_at_left
+from mechdesign.report.figures.panels import fitting, legend_at_left
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import hull, link_points
 from mechdesign.report.figures.shapes import link_colors
@@ -24,8 +25,9 @@ from mechdesign.report.figures.shapes import link_colors
 MOST_POSES = 3
 POLE = "p"
 MOST_TICKS = 6
-_TALL = 2.7  # inches, a panel
+_TALL, _WIDE = 2.7, 3.0  # inches, a panel and its title
 _LEFT, _RIGHT, _TOP, _BELOW, _BETWEEN, _DOWN = 0.85, 0.15, 0.95, 0.95, 0.85, 0.75
+_LEGEND_ROW = 0.19
 _PAD = 0.32  # inches around a polygon
 _SAME = 1e-6  # of the largest rate: tips as near as this are one
 _NAME = 9.0  # points
@@ -51,13 +53,15 @@ def polygons_figure(view: MotionView) -> Figure | None:
         for order, kind in enumerate(KINDS):
             axes = panels[2 * k + order]
             unit = view.study.units.label(kind.name)
-            axes.set_title(style.folded(f"{kind.name} at {each.where}", 9, 3.4), loc="left", fontsize=9)
+            axes.set_title(style.folded(f"{kind.name} at {each.where}", 9, _WIDE), loc="left", fontsize=9)
             axes.set_xlabel(style.axis_label(f"{kind.name} x", unit))
             axes.set_ylabel(style.axis_label(f"{kind.name} y", unit))
             _draw(view, axes, each, order)
     colors = link_colors(view.study.mechanism)
     handles = [Line2D([], [], color=colors[link], linewidth=1.8, label=link) for link in images(view, shown[0], 0)]
-    legend_at_left(figure, handles, max(len(handles), 1))
+    names = [str(handle.get_label()) for handle in handles]
+    style.grow(figure, below=_LEGEND_ROW * (-(-len(names) // fitting(names)) - 1))
+    legend_at_left(figure, handles, fitting(names))
     return figure
 
 
@@ -76,7 +80,8 @@ def _draw(view: MotionView, axes: Axes, each: SpecialPose, order: int) -> None:
     colors, tips = link_colors(mechanism), dict[str, complex]()
     for points in (links := images(view, each, order)).values():
         tips |= points
-    places = np.array([0j, *tips.values()])
+    parts = _parts(view, each, links) if order else {}
+    places = np.array([0j, *tips.values(), *(path[1] for path in parts.values())])
     largest = float(np.abs(places).max())
     box, figure = axes.get_position(), axes.get_figure(root=True)
     assert figure is not None
@@ -97,20 +102,23 @@ def _draw(view: MotionView, axes: Axes, each: SpecialPose, order: int) -> None:
         outline = hull(list(points.values()))
         outline = [*outline, outline[0]] if len(outline) > 2 else outline
         axes.plot(np.real(outline), np.imag(outline), color=colors[link], linewidth=1.8, zorder=4.9)
-        if order and not mechanism.description.links[link].telescopic:
-            _draw_parts(axes, each, points, colors[link])
+    for link, path in parts.items():
+        axes.plot(path.real, path.imag, color=colors[link], linewidth=1.0, linestyle=(0, (4, 2)), zorder=4.7)
     axes.plot([0], [0], "+", color=style.INK, markersize=11, markeredgewidth=1.6, zorder=5)
     labels = [Label(", ".join(names), (tip,), style.INK, 6.0, float(np.angle(tip - window.middle)), _NAME)
               for tip, names in named.items()]  # fmt: skip
     place_labels(axes, labels, covered(axes), order=5.2)
 
 
-def _draw_parts(axes: Axes, each: SpecialPose, points: Mapping[str, complex], color: str) -> None:
-    """Of a link's first two points, the acceleration of one about the other: -omega^2 r, and alpha across r."""
-    one, other, *_ = points
-    corner = points[one] + centripetal(each, one, other)
-    path = np.array([points[one], corner, points[other]])
-    axes.plot(path.real, path.imag, color=color, linewidth=1.0, linestyle=(0, (4, 2)), zorder=4.7)
+def _parts(view: MotionView, each: SpecialPose, links: Mapping[str, dict[str, complex]]) -> dict[str, Complexes]:
+    """By link, the acceleration of its second point from that of its first, over -omega^2 r; of links of one length."""
+    described, parts = view.study.mechanism.description.links, {}
+    for link, points in links.items():
+        one, other, *_ = points
+        if not described[link].telescopic:
+            corner = points[one] + centripetal(each, one, other)
+            parts[link] = np.array([points[one], corner, points[other]])
+    return parts
 
 
 def centripetal(each: SpecialPose, one: str, other: str) -> complex:
