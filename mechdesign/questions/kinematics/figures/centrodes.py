@@ -74,7 +74,7 @@ def centrodes_figure(view: MotionView) -> Figure | None:
         axes.plot([pair.centre.real], [pair.centre.imag], **centre_look(), label="instant centre")
         draw_mechanism(axes, sweep.mechanism, sweep.configuration, pair.pose, travel=sweep.travel, drives=False,
                        size=1.0 if columns == 1 else 0.7)  # fmt: skip
-    handles, _ = panels[0].get_legend_handles_labels()
+    handles = [line for line in panels[0].lines if not str(line.get_label()).startswith("_")]
     legend_at_left(figure, handles, len(handles))
     return figure
 

@@ -53,7 +53,7 @@ def hodographs_figure(view: MotionView) -> Figure | None:
     figure.text(_LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=9)
     for axes, order in zip(panels, ("velocity", "acceleration"), strict=True):
         _draw(axes, table, points, order, steps)
-    handles, _ = panels[0].get_legend_handles_labels()
+    handles = [line for line in panels[0].lines if not str(line.get_label()).startswith("_")]
     legend_at_left(figure, handles, len(handles))
     return figure
 
