@@ -1,4 +1,4 @@
-"""Paths of a mechanism's points along its motion, with ticks of time and centrodes, and the mechanism on its way."""
+"""Paths of a mechanism's points along its motion, with ticks and crank angles, and the mechanism on its way."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.questions.kinematics.figures.centrodes import leaps
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, framed, tiled, windows
 from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
@@ -34,6 +32,7 @@ from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 _LEGEND_LINE = 0.19  # inches
+_TICKS = 0.4  # inches, the word before those of ticks
 _LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
@@ -54,10 +53,6 @@ _NUMBER = 8.0  # points, the type of a number
 _ROUND_ANGLES = (15, 30, 45, 60, 90, 120, 180)  # steps of numbers, degrees
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
-# Of centrodes.
-_CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
-_NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
-_STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is fixed
 # Of the panels of assemblies.
 _MAX_COLUMNS = 4
 _PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
@@ -76,7 +71,7 @@ def motion_paths_figure(view: MotionView) -> Figure | None:
         return None
     tables = view.result.tables
     kinds = _kinds(view.study, tables["loops"]) if "loops" in tables else []
-    return paths_figure(view.sweep, centres=tables.get("instant_centres"), kinds=kinds, before=view.before)
+    return paths_figure(view.sweep, kinds=kinds, before=view.before)
 
 
 def _kinds(study: Study, table: Table) -> list[str]:
@@ -87,14 +82,13 @@ def _kinds(study: Study, table: Table) -> list[str]:
 
 
 def paths_figure(
-    sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None, kinds: Sequence[str] = (),
+    sweep: Sweep, *, above: float = ABOVE, kinds: Sequence[str] = (),
     before: Before | None = None,
 ) -> Figure:  # fmt: skip
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `centres` are the
-    instant centres, of which those against the ground have a path, too; `kinds` are words about its loops. A study
-    before it lies under it in grey dashes. `above` it, inches are left for a title.
+    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `kinds` are words
+    about its loops. A study before it lies under it in grey dashes. `above` it, inches are left for a title.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
@@ -102,21 +96,15 @@ def paths_figure(
         if target.table is not None and len(target.coordinates) == 2
     ]
     earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
-    centrodes = _centrodes(sweep, centres)
-    middle, *sides = extent(sweep.extent)
-    near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
-    places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
+    places = np.concatenate([sweep.extent, *wanted, *([earlier.extent] if earlier is not None else [])])
     steps = steps_of(sweep)
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
-    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
-             for link in centrodes]  # fmt: skip
-    if rows := sum(label.count("\n") + 1 for label in words) + (steps is not None) + len(kinds):
+    kinds = [style.folded(kind, 9, room) for kind in kinds]
+    if steps is not None:
+        steps = steps._replace(words=style.folded(steps.words, 9, room - _TICKS))
+    if rows := sum(label.count("\n") + 1 for label in (*kinds, *([steps.words] if steps is not None else []))):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
-        path = np.where(leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
-        axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
-                  label=label)  # fmt: skip
     for kind in kinds:
         axes.plot([], [], " ", label=kind)
     numbers = _draw_steps(axes, sweep, steps) if steps is not None else []
@@ -141,23 +129,6 @@ def paths_figure(
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
     name_both(figure, before)
     return figure
-
-
-def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
-    """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
-    if centres is None:
-        return {}
-    centrodes = {}
-    for name in centres.names:
-        pair, _, column = name.rpartition(".")
-        links = pair.split(".")
-        if column == "x" and GROUND in links and len(links) == 2:
-            path = vector(centres[name], centres[f"{pair}.y"])[sweep.rows]
-            path[~np.isfinite(path)] = complex(np.nan, np.nan)
-            known = path[np.isfinite(path)]
-            if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
-                centrodes[next(link for link in links if link != GROUND)] = path
-    return centrodes
 
 
 class Steps(NamedTuple):

@@ -60,7 +60,8 @@ def polygons_figure(view: MotionView) -> Figure | None:
     colors = link_colors(view.study.mechanism)
     handles = [Line2D([], [], color=colors[link], linewidth=1.8, label=link) for link in images(view, shown[0], 0)]
     names = [str(handle.get_label()) for handle in handles]
-    style.grow(figure, below=_LEGEND_ROW * (-(-len(names) // fitting(names)) - 1))
+    rows = -(-len(names) // fitting(names, style.LOOKS["screen"].width))
+    style.grow(figure, below=_LEGEND_ROW * (rows - 1))
     legend_at_left(figure, handles, fitting(names))
     return figure
 
