@@ -107,7 +107,7 @@ def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> N
     top = max(page.axes[1].get_yticks())
     assert top < np.nanmax(result.tables["local"]["resistivity"]) / 10
     # An arrow instead of a flat end.
-    assert page.axes[0].collections[0].extend == "max"
+    assert page.axes[1]._colorbar.extend == "max"
 
 
 @pytest.mark.slow
