@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
@@ -21,7 +22,7 @@ def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     # Tick labels beyond the limits of their axis are there, but not drawn.
     hidden: set[Text] = set()
-    for axis in (axis for axes in figure.axes for axis in axes._axis_map.values()):
+    for axis in (axis for axes in figure.findobj(Axes) for axis in axes._axis_map.values()):  # type: ignore[attr-defined]
         # In space Matplotlib moves the labels of ticks as it draws them, and back.
         seen = set(axis._update_ticks()) if axis.axes.get_visible() and axis.axes.name != "3d" else set()
         ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
