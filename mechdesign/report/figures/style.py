@@ -84,6 +84,7 @@ _EQUATION = re.compile(r"\S+ = [^\s,]+( [^\s,=]+(?=,|$))?")
 # What a long word may be broken into.
 _PARTS = re.compile(r"[^._]+[._]*|[._]+")
 NO_BREAK = "\N{NO-BREAK SPACE}"
+_MINUS = "\N{MINUS SIGN}"
 
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -285,7 +286,8 @@ class _Multiples(ScalarFormatter):
     """Numbers as multiples of a power of ten, which stands at the end of the axis in plain type."""
 
     def get_offset(self) -> str:
-        return f"\N{MULTIPLICATION SIGN}10{raised(self.orderOfMagnitude)}" if self.orderOfMagnitude else ""
+        _, ten, power = super().get_offset().partition("1e")
+        return f"\N{MULTIPLICATION SIGN}10{raised(int(power.replace(_MINUS, '-')))}" if ten else ""
 
 
 class _Powers(LogFormatter):
