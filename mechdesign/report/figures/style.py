@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.path import Path
 from matplotlib.textpath import text_to_path
-from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
+from matplotlib.ticker import LogFormatter, MaxNLocator, NullLocator, ScalarFormatter
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
@@ -69,6 +69,7 @@ HATCHES = ("", "////", "....", "xxxx")
 INK = "#222222"
 FAINT = "#9A9A9A"
 COLORMAP = "cividis"
+_DECADES = 100.0  # ratio of the ends of a logarithmic axis beyond which powers of ten alone have ticks
 # A value beyond all levels.
 _BEYOND = 1e250
 # Numbers of ticks whose largest is outside of this range are multiples of a power of ten.
@@ -312,6 +313,10 @@ def name_powers(panels: Iterable[Axes]) -> None:
             if isinstance(formatter, LogFormatter):
                 axis.set_major_formatter(_Powers())
                 axis.set_minor_formatter(_Powers())
+                low, high = axis.get_view_interval()
+                if high > _DECADES * low:
+                    # Each of its ticks costs as much as a line.
+                    axis.set_minor_locator(NullLocator())
             if not isinstance(formatter, ScalarFormatter) or not label or not axis.offsetText.get_visible():
                 continue
             axis.offsetText.set_visible(False)

@@ -29,6 +29,7 @@ from mechdesign.questions.workspace.figures.regions import (
     some,
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
+from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -40,8 +41,6 @@ from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 
-CIRCLE = ("circle_x", "circle_y", "circle_radius")
-RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
 SIDES = ("inner", "outer")
 # Of the drives.
 LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
@@ -129,11 +128,11 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
 def inscribed_figure(view: WorkspaceView) -> Figure | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
     study, table = view.study, view.result.tables["indices"]
-    if not view.regions or not any(name in table for name in (*CIRCLE, *RECTANGLE)):
+    if not view.regions or INSCRIBED[0] not in table:
         return None
     shown, unit = some(view.regions), study.units.label("length")
     places = np.concatenate([region.places() for region in shown])
-    found = [_inscribed(table, region.row, unit) for region in shown]
+    found = [_inscribed(table, region, unit) for region in shown]
     # In small panels the sizes would lie over each other.
     titles = [region.title for region in shown]
     if len(shown) > 1:
@@ -153,18 +152,25 @@ def inscribed_figure(view: WorkspaceView) -> Figure | None:
     return page.figure
 
 
-def _inscribed(table: Table, row: int, unit: str) -> list[tuple[Patch, tuple[float, float], str, str]]:
-    """The shapes of a row of indices that were found: each with a place in it, its colour and its size in words."""
-    shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
-    if CIRCLE[0] in table:
-        x, y, radius = (float(table[name][row]) for name in CIRCLE)
-        shapes.append((Circle((x, y), radius), (x, y), style.BLUE, f"r = {radius:.4g} {unit}".strip()))
-    if RECTANGLE[0] in table:
-        x, y, width, height = (float(table[name][row]) for name in RECTANGLE)
-        corner = (x - width / 2, y - height / 2)
-        size = f"{width:.4g} x {height:.4g} {unit}".strip()
-        shapes.append((Rectangle(corner, width, height), corner, style.GREEN, size))
-    return [shape for shape in shapes if np.isfinite(shape[1]).all()]
+def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, tuple[float, float], str, str]]:
+    """The shapes of a region that were found: each with a place in it, its colour and its size in words.
+
+    Those that a singularity crosses are dotted.
+    """
+    x, y, radius, middle_x, middle_y, width, height = (float(table[name][region.row]) for name in INSCRIBED)
+    corner = (middle_x - width / 2, middle_y - height / 2)
+    shapes: dict[str, tuple[Patch, tuple[float, float], str, str]] = {
+        "circle": (Circle((x, y), radius), (x, y), style.BLUE, f"r = {radius:.4g} {unit}"),
+        "rectangle": (Rectangle(corner, width, height), corner, style.GREEN, f"{width:.4g} x {height:.4g} {unit}"),
+    }
+    singular = places(region.singularities) if region.singularities is not None else np.zeros(0, dtype=complex)
+    cut = crossed(np.array([x, y, radius, middle_x, middle_y, width, height]), singular)
+    made = []
+    for name, (shape, place, color, words) in shapes.items():
+        if np.isfinite(place).all():
+            shape.set_linestyle(":" if name in cut else "-")
+            made.append((shape, place, color, words.strip() + ", a singularity inside" * (name in cut)))
+    return made
 
 
 @picture(WorkspaceView, "drives", order=60)
