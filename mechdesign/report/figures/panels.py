@@ -17,7 +17,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, Sector, Sectors
+from mechdesign.study.poses import Poses, Sector, Sectors, with_length
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
@@ -65,12 +65,22 @@ def along(study: Study, poses: Poses) -> Along | None:
     return None if poses.listed or len(poses.grid) != 1 or poses.count < 3 else abscissa(study, poses)
 
 
-def abscissa(study: Study, poses: Poses) -> Along:
-    """The one coordinate that moves, always the same way, or else the number of the pose."""
+def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
+    """The one coordinate that moves, always the same way, or else the number of the pose; the time at a given speed."""
+    if speed is not None:
+        return Along(
+            times(poses, poses.numbers.astype(float), speed), style.axis_label("time", study.units.label("time"))
+        )
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(poses.numbers + 1, "pose along the path")
     return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0])
+
+
+def times(poses: Poses, rows: Floats, speed: float) -> Floats:
+    """When a point that passes its path at a speed is at places of it, in rows; in the study's units."""
+    ((_, path),) = with_length(poses.paths)
+    return path.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
 
 
 def moving_names(poses: Poses) -> list[str]:
@@ -103,7 +113,7 @@ def stack(
 ) -> tuple[Figure, list[Axes]]:
     """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
     top = _TOP + 0.1 * bool(note)
-    tall = min(tall, (style.TALLEST - top - bottom - _LEGEND_ROOM + _GAP) / panels - _GAP)
+    tall = min(tall, (style.tallest() - top - bottom - _LEGEND_ROOM + _GAP) / panels - _GAP)
     figure, axes = style.page(panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_GAP, sharex=True)
     title(figure, heading, note)
     for axis in axes:
@@ -244,7 +254,7 @@ def map_sheet(
     lines = -(-len(panels) // columns)
     wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
     tall = min(_MAX_MAP_HEIGHT / min(lines, 2), wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
-    tall = max(tall, 1.2)
+    tall = max(min(tall, (style.tallest() - _MAP_TOP - _MAP_BELOW) / lines - _MAP_BELOW - _MAP_GAP), 1.2)
     # Of equal scales the height decides: the bar stands beside the map.
     slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0
     wide -= slack

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain, pairwise, starmap
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -16,7 +17,6 @@ from cycler import cycler
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import Op, PdfFile, PdfPages
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.colorbar import Colorbar
@@ -43,22 +43,22 @@ class Look(NamedTuple):
     """A page and how finely it is drawn: laid out with type of 10 points on so many inches, and then reduced."""
 
     width: float
+    height: float  # at most
     dots: int  # an inch of the layout
     reduction: float
 
 
-_COLUMN = 88 / 25.4  # inches, of a journal
+# Inches, of a journal's column.
+_COLUMN = 88 / 25.4
+_TALLEST = 230 / 25.4
 _REDUCTION = 0.8  # to type of 8 points
 _NARROW = 6.0  # inches
 LOOKS = {
     # 960 pixels, which a README shows at about 800.
-    "screen": Look(8.0, DPI, 1.0),
+    "screen": Look(8.0, math.inf, DPI, 1.0),
     # 300 dots an inch of paper.
-    "paper": Look(_COLUMN / _REDUCTION, 240, _REDUCTION),
+    "paper": Look(_COLUMN / _REDUCTION, _TALLEST / _REDUCTION, 240, _REDUCTION),
 }
-
-# Inches of the layout: of a column's picture 230 mm, which a page of a journal holds.
-TALLEST = 230 / 25.4 / _REDUCTION
 
 # Okabe and Ito: told apart with every kind of colour vision, and in grey by their order of brightness.
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#F0E442")
@@ -91,7 +91,7 @@ _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 10,
     "axes.titlesize": 11,
-    # A given place: to find one clear of ticks takes as long as to draw them.
+    # Given: to find it from all that stands above the axes takes as long as a tenth of the picture.
     "axes.titley": 1.0,
     "axes.labelsize": 10,
     "axes.edgecolor": INK,
@@ -121,7 +121,7 @@ _SETTINGS: dict[Any, Any] = {
 @contextmanager
 def context(look: str = "screen") -> Iterator[None]:
     """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again."""
-    wide, dots, reduction = LOOKS[look]
+    wide, _, dots, reduction = LOOKS[look]
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
@@ -132,6 +132,11 @@ def context(look: str = "screen") -> Iterator[None]:
 def width() -> float:
     """Width of the page, inches of its layout."""
     return float(matplotlib.rcParams["figure.figsize"][0])
+
+
+def tallest() -> float:
+    """Greatest height of the page, inches of its layout."""
+    return next(look.height for look in LOOKS.values() if look.width == width())
 
 
 def narrow() -> bool:
@@ -363,11 +368,10 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
         figure.savefig(stream, format=kind, metadata={"Date": None} | ({"Creator": creator} if creator else {}))
         return _reduced(stream.getvalue(), _reduction())
     if kind == "pdf":
-        pages, reduced = cast(Any, PdfPages(stream)), cast(Any, _Reduced)
-        pages._file = reduced(stream, {"CreationDate": None, "Creator": creator, "Producer": None})
-        with pages:
-            figure.savefig(pages, format=kind)
-        return stream.getvalue()
+        # Its modules take a fifth of a second to import.
+        from mechdesign.report.figures.reduced_pdf import pdf
+
+        return pdf(figure, creator, _reduction())
     pixels = io.BytesIO()
     figure.savefig(pixels, format="rgba", dpi=figure.dpi)
     picture = Image.frombytes("RGBA", figure.canvas.get_width_height(), pixels.getvalue()).convert("RGB")
@@ -383,17 +387,6 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
 def _reduction() -> float:
     """Inches of paper over those of the layout."""
     return float(matplotlib.rcParams["figure.dpi"] / matplotlib.rcParams["savefig.dpi"])
-
-
-class _Reduced(PdfFile):
-    """A PDF whose page is smaller than its layout; Matplotlib has no scale for what it draws in points."""
-
-    def newPage(self, width: float, height: float) -> None:
-        page, share = cast(Any, super()), _reduction()
-        page.newPage(share * width, share * height)
-        if share != 1.0:
-            page.output(share, 0, 0, share, 0, 0, Op.concat_matrix)
-        self.width, self.height = width, height
 
 
 def _reduced(drawing: bytes, share: float) -> bytes:

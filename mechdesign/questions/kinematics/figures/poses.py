@@ -18,7 +18,7 @@ from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, extent, tiled, windows
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
@@ -28,6 +28,8 @@ from mechdesign.study import Study
 _MAX_COLUMNS = 3
 _PAGE = 7.5  # inches, of all panels together, about
 _MIN_HEIGHT = 1.8  # inches, of a panel
+_LOWEST = 0.9  # and on a page that holds no more
+_TRIES = 4  # to find panels that a page holds
 _GAP = 0.15  # inches between panels
 _PAD = 0.42  # inches around what is drawn
 _SYMBOLS = 0.75  # size of symbols
@@ -49,7 +51,7 @@ _HEAD = 8.5  # points, a head's length, and of its arrow at most
 _HEAD_SHARE = 0.6
 _NEAR = 1.1  # larger sides of the mechanism from its middle up to which instant centres are drawn
 _TICK_EDGE = 0.07  # of a panel's width, at both ends, without the number of a tick
-_ORDER = 5.2  # above links and pins
+_ORDER = 4.8  # above links and pins, below names
 _SHAPES = ("o", "s", "D", "^", "v", "p")
 _FILLED_HEAD = Path([(-1, 0.36), (0, 0), (-1, -0.36), (-1, 0.36)], closed=True)
 _OPEN_HEAD = Path([(-1, 0.42), (0, 0), (-1, -0.42)])
@@ -93,13 +95,21 @@ def poses_figure(view: MotionView) -> Figure | None:
             places.append(np.array(tips, dtype=complex))
         places.append(np.array([z for z in each.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
     everything, count = np.concatenate(places), len(chosen.shown)
-    columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=_PAGE, least=_MIN_HEIGHT)
-    titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
-    above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
     heading = style.folded(_heading(chosen, listed=sweep.poses.listed), 11, style.width() - LEFT - RIGHT)
     top = _HEADING + _HEADING_LINE * heading.count("\n") + _KEY * (arrows + len(rows))
+    page, least = _PAGE, _MIN_HEIGHT
+    # Lower panels may stand in more columns, and narrower ones have more lines above them.
+    for _ in range(_TRIES):
+        columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=page, least=least)
+        titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
+        above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
+        lines = -(-count // columns)
+        room = style.tallest() - top - BELOW - lines * above
+        if lines * window.height <= room:
+            break
+        page, least = room, _LOWEST
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
     for axes, title, each in zip(grid, titles, chosen.shown, strict=True):
         axes.set_title(title, loc="left", fontsize=_TITLE_SIZE)
@@ -205,7 +215,7 @@ def _draw_centres(axes: Axes, each: SpecialPose, centres: Sequence[Centre], lett
             where = f"at ({x:.4g}, {y:.4g})" if np.isfinite(z) else "at infinity" if np.isinf(z) else "none"
             away.append(textwrap.fill(f"centre of {centre.one}, {centre.other}: {where}", letters))
     if away:
-        axes.text(0.02, 0.02, "\n".join(away), transform=axes.transAxes, fontsize=8, va="bottom", zorder=_ORDER + 1,
+        axes.text(0.02, 0.02, "\n".join(away), transform=axes.transAxes, fontsize=8, va="bottom", zorder=5.2,
                   path_effects=HALO)  # fmt: skip
 
 

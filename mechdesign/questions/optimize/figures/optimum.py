@@ -122,7 +122,7 @@ def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
         for words, _, _ in parts
     ]
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
-    free = (style.TALLEST - _BELOW - 2 * _LEGEND) / count - above
+    free = (style.tallest() - _BELOW - 2 * _LEGEND) / count - above
     window = fit(places, wide, _MAX_BESIDE if columns > 1 else min(8.0 / count, free), 0.25)
     figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
                            below=_BELOW + _LEGEND)  # fmt: skip

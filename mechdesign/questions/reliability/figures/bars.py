@@ -67,13 +67,17 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.width() - margin) / (_ACROSS + _MIN_WIDTH)))
     )
     bar = max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06, style.line(10.0) * lines)
-    free = style.TALLEST - _AROUND + _PANEL_GAP
-    fitting = max(1, int(free / (_PANEL_GAP + (0.15 + min(MIN_SOURCES, len(names))) * bar)))
-    rows = min(fitting, -(-len(pairs) // columns))
+    free = style.tallest() - _AROUND + _PANEL_GAP
+    rows = -(-len(pairs) // columns)
+    # Where a page does not hold all panels with a few bars each, the last are left out.
+    while rows > 1 and rows * (_PANEL_GAP + (0.15 + min(MIN_SOURCES, len(names))) * bar) > free:
+        rows -= 1
     left_out = len(pairs[rows * columns :])
     pairs, blocks, bars = (part[: rows * columns] for part in (pairs, blocks, bars))
-    fitting = int((free / rows - _PANEL_GAP) / bar - 0.15)
-    ranked = np.argsort(-largest, kind="stable")[: min(MAX_SOURCES, max(fitting, MIN_SOURCES))]
+    most = MAX_SOURCES
+    while most > MIN_SOURCES and rows * (_PANEL_GAP + (0.15 + most) * bar) > free:
+        most -= 1
+    ranked = np.argsort(-largest, kind="stable")[:most]
     where = "" if each and poses.count > 1 else f"average over {poses.count} poses"
     if sobol is not None or poses.count == 1:
         section, pose = study.reliability, sobol or 0

@@ -51,7 +51,7 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
         columns = 1
     blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
     down, rows = 0.5 if len(blocks) == 1 else 0.68, 2 * len(blocks)
-    tall = min(1.75, (style.TALLEST - _AROUND + down) / rows - down)
+    tall = min(1.75, (style.tallest() - _AROUND + down) / rows - down)
     figure, grid = style.page(
         columns * rows, columns, tall, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75, down=down
     )

@@ -287,7 +287,7 @@ def sheet(
     title = style.folded(title[0].upper() + title[1:], 11.0, style.width() - LEFT - 0.1)
     top = _TITLE + style.line(11.0) * title.count("\n")
     below += BELOW + _LEGEND
-    free = style.TALLEST - top - above - (rows - 1) * down - below
+    free = style.tallest() - top - above - (rows - 1) * down - below
     scale = min(inside / wide, min(_MAX_HEIGHT if rows == 1 else 7.5, free) / rows / tall)
     window = Window(middle, scale, scale * wide, scale * tall)
     figure, panels = windows(
