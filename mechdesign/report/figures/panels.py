@@ -46,7 +46,7 @@ _NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
 _LEGEND_LETTERS = 14.75  # an inch
 _LEGEND_ROW = 0.19  # inches
-_LEGEND_ROOM = 2 * _LEGEND_ROW  # by which a narrow page may grow
+_LEGEND_ROOM = 4 * _LEGEND_ROW  # by which a narrow page may grow for its title and its legend
 _ABSCISSA_TICK = 0.47  # inches from one to the next
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)

@@ -52,7 +52,7 @@ _PANEL_TITLE = 0.34
 _TITLE_LINE = 0.17  # more of it
 _TITLE = 0.4
 _ROW_GAP = 0.28
-_BESIDE = 0.3  # of a panel without labels of its own
+_BESIDE, _BESIDE_NARROW = 0.45, 0.3  # of a panel without labels of its own
 _TICK = 0.65  # from one number along x to the next, twice that along y
 _MAX_HEIGHT = 6.5
 
@@ -277,7 +277,9 @@ def sheet(
     room = style.width() - RIGHT - (_BAR if bar else 0.0)
     wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
     pitch = (room - LEFT) / columns
-    inside = pitch - _BESIDE if style.narrow() or columns > 2 else room / columns - LEFT
+    inside = room / columns - LEFT if columns < 3 else pitch - _BESIDE
+    if style.narrow():
+        inside = pitch - _BESIDE_NARROW
     above, down = 0.0, _ROW_GAP
     if number > 1:
         titles, name = panel_titles(titles, inside)
