@@ -274,7 +274,10 @@ def filled(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, levels: Floa
         for maker in makers:
             areas += starmap(Path, zip(*maker.filled(low, high), strict=True))
         colors += [colormaps[COLORMAP](norm(inside))] * (len(areas) - count)
-    lines = [[line @ [1, 1j] for maker in makers for line in maker.lines(level)] for level in levels.tolist()]
+    lines = [
+        [np.asarray(line, dtype=float) @ np.array([1, 1j]) for maker in makers for line in maker.lines(level)]
+        for level in levels.tolist()
+    ]
     axes.add_collection(PathCollection(areas, facecolors=colors, linewidths=0, antialiaseds=False), autolim=False)
     ways = [np.column_stack([line.real, line.imag]) for line in chain.from_iterable(lines)]
     axes.add_collection(LineCollection(ways, colors="white", linewidths=0.5, alpha=0.7), autolim=False)

@@ -195,8 +195,8 @@ def goal_maps(view: DesignsView) -> Figure | None:
     if not view.mapped or len(goals) < 2:
         return None
     columns = 1 if style.narrow() else min(len(goals), 3)
-    figure, panels = sheet(len(goals), columns, 1.5, "Each goal over the design variables", above=0.7, below=1.0,
-                           across=0.45, down=1.35)  # fmt: skip
+    figure, panels = sheet(len(goals), columns, 1.5, "Each goal over the design variables", above=0.7, below=1.2,
+                           across=0.45, down=1.5)  # fmt: skip
     for number, (axes, goal) in enumerate(zip(panels, goals, strict=True)):
         filled, extend = _fill(axes, designs, designs.values[:, number], smallest=goal.smallest)
         place = axes.inset_axes((0, -0.5, 1, 0.06))
@@ -273,9 +273,9 @@ def parallel_axes(designs: Designs) -> Figure:
     heights = np.where(high > low, (columns - low) / np.where(high > low, high - low, 1.0), 0.5)
     upright, titles = style.narrow(), [label(designs, name) for name in names]
     shown = f"{min(len(rows), MAX_LINES)} of " if min(len(rows), MAX_LINES) < len(near) else ""
-    words = f"{shown}{len(near)} feasible designs, the best on top" + f"; {outside(near)}" * (not near.all())
+    heading = f"{shown}{len(near)} feasible designs, the best on top" + f"; {outside(near)}" * (not near.all())
     lines_below = max(map(len, titles)) * _LETTER if upright else style.line(9.0) * 3
-    figure, (axes,) = sheet(1, 1, 2.9, words, left=0.2, right=_BAR, above=0.65, below=0.4 + lines_below)
+    figure, (axes,) = sheet(1, 1, 2.9, heading, left=0.2, right=_BAR, above=0.65, below=0.4 + lines_below)
     places = np.arange(len(names))
     lines = [np.column_stack([places, heights[row]]) for row in rows]
     score = designs.cpi[rows]

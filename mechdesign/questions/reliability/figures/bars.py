@@ -72,8 +72,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     # Where a page does not hold all panels with a few bars each, the last are left out.
     while rows > 1 and rows * (_PANEL_GAP + (0.15 + min(MIN_SOURCES, len(names))) * bar) > free:
         rows -= 1
-    left_out = len(pairs[rows * columns :])
-    pairs, blocks, bars = (part[: rows * columns] for part in (pairs, blocks, bars))
+    held = rows * columns
+    left_out = len(pairs[held:])
+    pairs, blocks, bars = pairs[:held], blocks[:held], bars[:held]
     most = MAX_SOURCES
     while most > MIN_SOURCES and rows * (_PANEL_GAP + (0.15 + most) * bar) > free:
         most -= 1

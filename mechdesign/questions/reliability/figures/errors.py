@@ -91,8 +91,9 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
                 axis.plot(swept.values, mean, color=drawn.color, linewidth=1.2)
                 continue
             for value in (mean - reach, mean, mean + reach):
-                shown = {"linewidth": 1.2, "markersize": 2.8, "markevery": max(1, len(value) // _most_dots())}
-                (entries[drawn.words],) = axis.plot(swept.values, value, **shown, **_line(drawn))
+                every = max(1, len(value) // _most_dots())
+                (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, markevery=every,
+                                                    **_line(drawn))  # fmt: skip
         reach = _FAR_FROM_ERRORS * np.abs(axis.get_ylim()).max()
         far = []
         for limit in np.broadcast_to(error_limits(study, tables, output, order), (2, len(swept.values))):

@@ -24,6 +24,7 @@ _BINS = 60
 _MAX_LINEAR_SAMPLES = 400_000
 _MAX_LINEAR_RATIO = 50.0
 _DASHED = (0, (5, 2))
+_TICK = 0.65  # inches from one number along x to the next
 _AROUND = 2.6  # inches above and below all panels, with a legend of several rows
 
 
@@ -50,7 +51,7 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
     if style.narrow() and len(shown) < 3:
         columns = 1
     blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
-    down, rows = 0.5 if len(blocks) == 1 else 0.68, 2 * len(blocks)
+    down, rows = 0.5 if len(blocks) == 1 else 0.85 if style.narrow() else 0.68, 2 * len(blocks)
     tall = min(1.75, (style.tallest() - _AROUND + down) / rows - down)
     figure, grid = style.page(
         columns * rows, columns, tall, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75, down=down
@@ -65,7 +66,10 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
                 continue
             for axis, logarithmic in zip(pair, (False, True), strict=True):
                 _histogram(axis, block[column], entries, logarithmic=logarithmic)
-            pair[0].set_title(block[column].name, loc="left", fontsize=9.5)
+            room = pair[0].get_position().width * style.width()
+            pair[0].set_title(style.folded(block[column].name, 9.5, room), loc="left", fontsize=9.5)
+            for axis in pair:
+                axis.locator_params(axis="x", nbins=max(1, min(4, int(room / _TICK))))
             pair[1].set_xlabel(style.axis_label("error", block[column].unit))
     kept, samples = given.samples.kept, given.samples.errors.shape[1]
     note = f"{look(given.method).words}, {samples:,} samples"
@@ -131,7 +135,6 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         axis.text(0.99, 0.98, f"limit {beyond} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
     axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
-    axis.locator_params(axis="x", nbins=4)
 
 
 def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) -> list[float]:
