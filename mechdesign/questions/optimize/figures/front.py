@@ -31,17 +31,17 @@ def pareto_figure(view: DesignsView) -> Figure | None:
 
 def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
-    pairs = list(combinations(range(len(designs.goals)), 2))
-    columns = 1 if style.narrow() else min(len(pairs), 2)
-    rows = -(-len(pairs) // columns)
-    low = style.narrow() or len(pairs) > 1
+    shown = pairs(designs)
+    columns = 1 if style.narrow() else min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    low = style.narrow() or len(shown) > 1
     lines = style.line(10.0) * 2 * low
     figure, panels = sheet(
-        len(pairs), columns, 3.3 if len(pairs) == 1 else min(_ROW, 5.6 / rows),
+        len(shown), columns, 3.3 if len(shown) == 1 else min(_ROW, 5.6 / rows),
         f"Pareto front: {len(front)} of {int(designs.feasible.sum())} feasible designs", left=0.9 + lines,
         above=0.62, below=0.55 + lines, across=0.9 + lines, down=0.85 + lines,
     )  # fmt: skip
-    for axes, pair in zip(panels, pairs, strict=True):
+    for axes, pair in zip(panels, shown, strict=True):
         _front(axes, designs, front, pair)
         for axis, goal in zip((axes.xaxis, axes.yaxis), pair, strict=True):
             axis.set_label_text(_goal_label(designs, designs.goals[goal], folded=low))
@@ -49,6 +49,11 @@ def front_figure(designs: Designs, front: Table) -> Figure:
     labels = [style.folded(words, 9.0, style.width() - 0.6) for words in labels]
     legend(figure, handles, labels, 1 if len(labels) > 2 else fitting(labels))
     return figure
+
+
+def pairs(designs: Designs) -> list[tuple[int, int]]:
+    """The goals of each panel, along and up."""
+    return [*combinations(range(len(designs.goals)), 2)]
 
 
 def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:
