@@ -123,9 +123,10 @@ def context(look: str = "screen") -> Iterator[None]:
     """Matplotlib's defaults with one of `LOOKS` inside the context; afterwards the user's settings apply again."""
     wide, _, dots, reduction = LOOKS[look]
     page = {"figure.figsize": (wide, wide), "figure.dpi": dots, "savefig.dpi": dots / reduction}
+    # As rcdefaults, which reads all styles that come with Matplotlib besides.
+    defaults = {name: value for name, value in matplotlib.rcParamsDefault.items() if not name.startswith("backend")}
     with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS | page)
+        matplotlib.rcParams.update(defaults | _SETTINGS | page)
         yield
 
 
@@ -136,7 +137,7 @@ def width() -> float:
 
 def tallest() -> float:
     """Greatest height of the page, inches of its layout."""
-    return next(look.height for look in LOOKS.values() if look.width == width())
+    return next((look.height for look in LOOKS.values() if look.width == width()), math.inf)
 
 
 def narrow() -> bool:

@@ -109,8 +109,7 @@ def curves_figure(
     table = tables["motion"]
     if not moving_names(poses):
         return None
-    speed = study.kinematics.speed if study.kinematics is not None else None
-    over = abscissa(study, poses, speed)
+    over = abscissa(study, poses, _speed(study))
     swept, x = over.name, over.values
     panels = _panels(study, table, swept, x)
     if not panels:
@@ -148,9 +147,14 @@ def curves_figure(
     return figure
 
 
+def _speed(study: Study) -> float | None:
+    """At which the path's point passes it, if the study says so."""
+    return study.kinematics.speed if study.kinematics is not None else None
+
+
 def _marks(study: Study, limits: Table | None, poses: Poses, over: Along) -> list[tuple[float, str]]:
     """Where on the axis the motion ends or is singular, and what it is there."""
-    speed = study.kinematics.speed if study.kinematics is not None else None
+    speed = _speed(study)
     if limits is None or (speed is None and over.name not in limits):
         return []
     if speed is None:
@@ -317,8 +321,8 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
 
 def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
     """The curves of the study before, dashed, each in the colour of its name."""
-    table, section = before.result.tables["motion"], before.study.kinematics
-    x = abscissa(before.study, DrawnMotion.of(before.result).shown.poses, section and section.speed).values
+    table, poses = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
+    x = abscissa(before.study, poses, _speed(before.study)).values
     low, high = axis.get_ylim()
     for curve in panel.curves:
         if curve.column.name in table:

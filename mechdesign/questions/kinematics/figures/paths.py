@@ -1,9 +1,9 @@
-"""Paths of a mechanism's points along its motion, with ticks of time and centrodes, and the mechanism on its way."""
+"""Paths of a mechanism's points along its motion, with ticks and crank angles, and the mechanism on its way."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,16 +12,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Flags, Ints
+from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, framed, tiled, windows
 from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
@@ -33,6 +32,7 @@ from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 _LEGEND_LINE = 0.19  # inches
+_TICKS = 0.4  # inches, the word before those of ticks
 _LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
@@ -53,10 +53,6 @@ _NUMBER = 8.0  # points, the type of a number
 _ROUND_ANGLES = (15, 30, 45, 60, 90, 120, 180)  # steps of numbers, degrees
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
-# Of centrodes.
-_CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
-_NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
-_STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is fixed
 # Of the panels of assemblies.
 _MAX_COLUMNS = 4
 _PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
@@ -75,7 +71,7 @@ def motion_paths_figure(view: MotionView) -> Figure | None:
         return None
     tables = view.result.tables
     kinds = _kinds(view.study, tables["loops"]) if "loops" in tables else []
-    return paths_figure(view.sweep, centres=tables.get("instant_centres"), kinds=kinds, before=view.before)
+    return paths_figure(view.sweep, kinds=kinds, before=view.before)
 
 
 def _kinds(study: Study, table: Table) -> list[str]:
@@ -86,14 +82,13 @@ def _kinds(study: Study, table: Table) -> list[str]:
 
 
 def paths_figure(
-    sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None, kinds: Sequence[str] = (),
+    sweep: Sweep, *, above: float = ABOVE, kinds: Sequence[str] = (),
     before: Before | None = None,
 ) -> Figure:  # fmt: skip
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `centres` are the
-    instant centres, of which those against the ground have a path, too; `kinds` are words about its loops. A study
-    before it lies under it in grey dashes. `above` it, inches are left for a title.
+    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `kinds` are words
+    about its loops. A study before it lies under it in grey dashes. `above` it, inches are left for a title.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
@@ -101,21 +96,15 @@ def paths_figure(
         if target.table is not None and len(target.coordinates) == 2
     ]
     earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
-    centrodes = _centrodes(sweep, centres)
-    middle, *sides = extent(sweep.extent)
-    near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
-    places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
-    steps = _steps(sweep)
+    places = np.concatenate([sweep.extent, *wanted, *([earlier.extent] if earlier is not None else [])])
+    steps = steps_of(sweep)
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
-    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
-             for link in centrodes]  # fmt: skip
-    if rows := sum(label.count("\n") + 1 for label in words) + (steps is not None) + len(kinds):
+    kinds = [style.folded(kind, 9, room) for kind in kinds]
+    if steps is not None:
+        steps = steps._replace(words=style.folded(steps.words, 9, room - _TICKS))
+    if rows := sum(label.count("\n") + 1 for label in (*kinds, *([steps.words] if steps is not None else []))):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
-        path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
-        axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
-                  label=label)  # fmt: skip
     for kind in kinds:
         axes.plot([], [], " ", label=kind)
     numbers = _draw_steps(axes, sweep, steps) if steps is not None else []
@@ -142,39 +131,15 @@ def paths_figure(
     return figure
 
 
-def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
-    """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
-    if centres is None:
-        return {}
-    centrodes = {}
-    for name in centres.names:
-        pair, _, column = name.rpartition(".")
-        links = pair.split(".")
-        if column == "x" and GROUND in links and len(links) == 2:
-            path = vector(centres[name], centres[f"{pair}.y"])[sweep.rows]
-            path[~np.isfinite(path)] = complex(np.nan, np.nan)
-            known = path[np.isfinite(path)]
-            if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
-                centrodes[next(link for link in links if link != GROUND)] = path
-    return centrodes
-
-
-def _leaps(path: Complexes, side: float) -> Flags:
-    """Points after which a path passes through infinity; `path` is relative to the mechanism's middle."""
-    far = np.abs(path) > side
-    turned = (np.conj(path[:-1]) * path[1:]).real < 0
-    return np.append(far[:-1] & far[1:] & turned, False)
-
-
-class _Steps(NamedTuple):
-    """Poses at equal steps of what is swept, the step in words, and those of them whose value is written."""
+class Steps(NamedTuple):
+    """Poses at equal steps of what is swept, the step in words, and the values that are written beside some."""
 
     rows: Ints
     words: str
-    written: Ints
+    written: Mapping[int, str]
 
 
-def _steps(sweep: Sweep) -> _Steps | None:
+def steps_of(sweep: Sweep) -> Steps | None:
     """Steps of a sweep of one coordinate, with their time where it has a constant rate; None of other motions."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
@@ -199,16 +164,16 @@ def _steps(sweep: Sweep) -> _Steps | None:
     each = -(-len(rows) // most)
     if unit == "deg":
         each = next((k for k in range(each, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), each)
-    return _Steps(rows, f"ticks every {words}", rows[::each])
+    degree = "\N{DEGREE SIGN}" * (unit == "deg")
+    written = {k: f"{values[k]:.4g}{degree}" for k in rows[::each].tolist()}
+    return Steps(rows, f"every {words}; numbers: {name}", written)
 
 
-def _draw_steps(axes: Axes, sweep: Sweep, steps: _Steps) -> list[Label]:
+def _draw_steps(axes: Axes, sweep: Sweep, steps: Steps) -> list[Label]:
     """Short lines across the boldest paths, of a length on paper; returns the numbers to be written beside some."""
     ranked, looks = ranks(sweep.study), {look.point: look for look in path_looks(sweep)}
     shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
     half, lines, numbers = _TICK / 2 / (shown[1, 0] - shown[0, 0]), [], []
-    (name,) = moving_names(sweep.poses)
-    values, degrees = sweep.poses.values[name][sweep.rows], sweep.study.units.label(sweep.mechanism.quantity(name))
     for point, path in sweep.places.items():
         if ranked[point] < max(ranked.values()):
             continue
@@ -223,14 +188,11 @@ def _draw_steps(axes: Axes, sweep: Sweep, steps: _Steps) -> list[Label]:
         color = darker(looks[point].color)
         for row, toward in zip(rows.tolist(), across.tolist(), strict=True):
             if row in steps.written and np.isfinite(toward):
-                text = f"{values[row]:.4g}" + "\N{DEGREE SIGN}" * (degrees == "deg")
-                heading = float(np.angle(toward))
-                numbers.append(
-                    Label(text, (complex(path[row]),), color, _TICK / 2 + 1, heading, _NUMBER, optional=True)
-                )
+                numbers.append(Label(steps.written[row], (complex(path[row]),), color, _TICK / 2 + 1,
+                                     float(np.angle(toward)), _NUMBER, optional=True))  # fmt: skip
     axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
-    words = steps.words + f"; numbers: {name}" * bool(numbers)
-    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2, label=words)
+    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2,
+              label=f"ticks {steps.words}")  # fmt: skip
     return numbers
 
 
@@ -283,9 +245,9 @@ def _path_names(sweep: Sweep) -> list[Label]:
     labels = []
     for look in looks:
         far = np.nan_to_num(np.abs(look.path - look.path[np.isfinite(look.path)][0]))
-        anchors = look.path[np.argsort(-far)[: len(far) // 3 : max(len(far) // 12, 1)]]
-        if look.point in several and len(anchors):
-            labels.append(Label(look.point, tuple(anchors.tolist()), darker(look.color), 6.0, size=9.5))
+        anchors = look.path[np.argsort(-far)[: len(far) // 3 : max(len(far) // 12, 1)]].tolist()
+        if look.point in several and anchors:
+            labels.append(Label(f"path of {look.point}", anchors, darker(look.color), 6.0, size=9.0, optional=True))
     return labels
 
 

@@ -66,7 +66,7 @@ def transmission_figure(view: MotionView) -> Figure | None:
     section = study.kinematics
     if not sweep.poses.motion or not moving_names(sweep.poses):
         return None
-    over = abscissa(study, sweep.poses, section and section.speed)
+    over = abscissa(study, sweep.poses, section.speed if section is not None else None)
     x = over.values[sweep.rows]
     loops = transmissions(study, tables.get("loops"), sweep, over)
     asked = list((section.mechanical_advantage if section is not None else {}).items())
