@@ -108,8 +108,11 @@ def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Li
         shift = line.rail * size / 72
         artist.set_transform(axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans))
         spacing = shapes.TICK_SPACING
-        ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
-        artist.set_path_effects([ticks, Normal()])
+        ends = axes.transData.transform(rows(np.array(line.places)))
+        # A rail without room for a tick has none.
+        if 72 / figure.dpi * np.hypot(*np.ptp(ends, axis=0)) > 2 * spacing:
+            ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
+            artist.set_path_effects([ticks, Normal()])
     return artist
 
 

@@ -31,7 +31,6 @@ _EDGE = 0.05  # left of the label of an axis
 _LINE = 0.18  # a line of it
 _TICK = 0.1  # a tick and its gap
 _DIGIT = 0.083  # a digit of its number
-_POWER_LETTERS = 5  # of a power of ten
 BELOW_BARE = 0.6  # below the lowest panel: its axis alone
 BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
 # Inches of a map and its bar of colours.
@@ -47,6 +46,7 @@ _NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
 _LEGEND_LETTERS = 14.75  # an inch
 _LEGEND_ROW = 0.19  # inches
+_LEGEND_ROOM = 4 * _LEGEND_ROW  # by which a narrow page may grow for its title and its legend
 _ABSCISSA_TICK = 0.47  # inches from one to the next
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
@@ -113,6 +113,7 @@ def stack(
 ) -> tuple[Figure, list[Axes]]:
     """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
     top = _TOP + 0.1 * bool(note)
+    tall = min(tall, (style.tallest() - top - bottom - _LEGEND_ROOM + _GAP) / panels - _GAP)
     figure, axes = style.page(panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_GAP, sharex=True)
     title(figure, heading, note)
     for axis in axes:
@@ -132,7 +133,7 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
     numbers = [
         text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
     ]
-    letters = max(len(text) if "$" not in text else _POWER_LETTERS for text in numbers)
+    letters = max(map(len, numbers))
     lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
     left = max(figure.subplotpars.left * style.width(), _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
     figure.subplots_adjust(left=left / style.width())
@@ -307,9 +308,12 @@ def _map(
         values = np.log10(np.maximum(values, 1e-3 * 10.0 ** levels[0]))
     known = values[np.isfinite(values)]
     norm = style.steps(levels, float(known.min()), float(known.max()))
-    for patch in sectors.patches:
-        shown = _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays])
-        style.filled(axes, patch.nodes.real, patch.nodes.imag, shown, norm, levels)
+    shown = [
+        (patch.nodes.real, patch.nodes.imag,
+         _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays]))
+        for patch in sectors.patches
+    ]  # fmt: skip
+    style.filled(axes, shown, norm, levels)
     for curve in sectors.outline:
         axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
     style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
@@ -374,5 +378,5 @@ def _power(level: float) -> str:
     if 1e-2 <= level < 1e4:
         return f"{level:g}"
     power = int(np.floor(np.log10(level) + 1e-9))
-    digits, ten = f"{level / 10.0**power:.3g}", f"10$^{{{power}}}$"
+    digits, ten = f"{level / 10.0**power:.3g}", f"10{style.raised(power)}"
     return ten if digits == "1" else f"{digits}\N{MIDDLE DOT}{ten}"

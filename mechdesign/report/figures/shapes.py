@@ -170,7 +170,7 @@ def _guide(scene: Scene, guide: Guide, colors: Mapping[str, str], ends: tuple[co
     """A rail of the ground, or a bar with a slot, and the slider on it."""
     shapes: list[Shape] = []
     if guide.owner == GROUND:
-        shapes += _rail(*ends)
+        shapes += _rail(*ends) if ends[0] != ends[1] else []
     else:
         shapes += _bar(reach(scene, guide, ends), colors[guide.owner], guide.owner)
         if guide.slider is None:
