@@ -5,7 +5,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import io
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -30,6 +33,7 @@ from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
+from mechdesign.report.page.dark import dark
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR, harmless
 from mechdesign.report.requirements import Verdict, judged_by, named
@@ -40,6 +44,10 @@ from mechdesign.terms import path_of
 # Pixels of the drawings in an index, twice their width on the page, and the number of their colours.
 _THUMBNAIL = (240, 180)
 _FEW_COLORS = 32
+_INDENT = re.compile(r"^[ ]*(?://.*\n)?", re.MULTILINE)  # and a line of comment
+_FIRST_NUMBERS = 5  # at the top of a page
+
+_Number = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -82,18 +90,29 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
-    moving = any(section["moving"] is not None for section in sections)
+    moving = {section["command"]: section["moving"] for section in sections if section["moving"] is not None}
+    # The mechanism beside the answers moves through a motion, if there is one.
+    lead = next((name for name, part in moving.items() if "given" in part["data"]), next(iter(moving), ""))
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
+    drawing = drawing or (_sketch(study) if plots else "")
+    drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
+    drawings += [picture["html"] for section in sections for picture in section["pictures"]]
+    first, more = _divided({section["command"]: section["headlines"] for section in sections})
     return _page(
         "report.html.j2",
         moving=moving,
+        drawings=drawings,
+        lead=lead,
+        first=first,
+        more=more,
         study=study,
         about=_about(study),
-        drawing=drawing or (_sketch(study) if plots else ""),
+        drawing=drawing,
         plots=plots,
         answers=answers,
-        mover=partial(_mover, sections),
+        mover=partial(_mover, moving),
+        pose_of=_pose_of,
         questions=QUESTIONS,
         required=required,
         met=sum(each["met"] for each in required),
@@ -103,19 +122,40 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     )
 
 
-def _mover(sections: Iterable[Mapping[str, Any]], command: str, pose: Mapping[str, float]) -> str:
-    """The question whose mechanism moves through poses like one: its own, or kinematics; empty where there is none."""
-    given = {
-        section["command"]: {name for name, *_ in section["moving"]["data"].get("given", ())}
-        for section in sections
-        if section["moving"] is not None
-    }
-    return next((name for name in (command, "kinematics") if given.get(name) and given[name] <= pose.keys()), "")
+def _mover(moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None) -> str:
+    """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one."""
+    for name in dict.fromkeys((command, "kinematics")):
+        keys = moving[name]["data"].get("keys", ()) if name in moving else ()
+        if any(pose is None or {each for each, *_ in key} <= pose.keys() for key in keys):
+            return name
+    return ""
+
+
+def _pose_of(verdict: Verdict) -> dict[str, float]:
+    """The numbers that the place of a verdict names, such as a pose."""
+    numbers = {}
+    for part in verdict.place.split(", "):
+        name, _, value = part.rpartition(" ")
+        with suppress(ValueError):
+            numbers[name] = float(value)
+    return numbers
+
+
+def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, _Number]], dict[str, list[_Number]]]:
+    """The key numbers at the top of the page, each with its question, and those that remain to each question.
+
+    The questions take turns, and each gives its numbers in their order.
+    """
+    turns = [(k, place, command) for place, (command, own) in enumerate(numbers.items()) for k in range(len(own))]
+    top = sorted(turns)[:_FIRST_NUMBERS]
+    first = [(command, numbers[command][k]) for k, _, command in sorted(top, key=itemgetter(1, 0))]
+    taken = Counter(command for *_, command in top)
+    return first, {command: [*own[taken[command] :]] for command, own in numbers.items()}
 
 
 def index(entries: Sequence[Entry]) -> bytes:
     """The page of several studies, a row each."""
-    return _page("index.html.j2", moving=False, entries=entries, version=version("mechdesign"))
+    return _page("index.html.j2", moving={}, drawings=(), entries=entries, version=version("mechdesign"))
 
 
 def _sketch(study: Study) -> str:
@@ -152,19 +192,20 @@ def thumbnail(study: Study) -> str:
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
-def _page(template: str, *, moving: bool, **content: Any) -> bytes:
+def _page(template: str, *, moving: Mapping[str, Any], drawings: Iterable[str], **content: Any) -> bytes:
     environment = Environment(
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
-    styles = _text("page.css") + (_text("moving.css") if moving else "")
-    script = _text("moving.js") if moving else ""
+    styles = _text("page.css") + (_text("moving.css") if moving else "") + dark(drawings)
+    script = _text("page.js") + (_text("moving.js") if moving else "")
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
-    policy += [f"script-src {_hash(script)}"] if script else []
+    policy += [f"script-src {_hash(script)}"]
     text = environment.get_template(template).render(
         **content,
+        moving=moving,
         generator=Markup(GENERATOR),
         policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
         # These texts are files of the package, and none contains the end tag of its element.
@@ -175,7 +216,9 @@ def _page(template: str, *, moving: bool, **content: Any) -> bytes:
 
 
 def _text(name: str) -> str:
-    return files("mechdesign.report.page").joinpath("templates", name).read_text(encoding="utf-8")
+    """A style sheet or a script without indents and lines of comments."""
+    text = files("mechdesign.report.page").joinpath("templates", name).read_text(encoding="utf-8")
+    return _INDENT.sub("", text)
 
 
 def _hash(text: str) -> str:

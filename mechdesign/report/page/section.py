@@ -19,14 +19,13 @@ from mechdesign.study import Study
 
 HELP_PAGE = "howto/report"
 
-# Beside a moving mechanism this picture of the same curves is left out.
-CURVES = "motion"
 # Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
 # A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
+MOST_ON_PAPER = 8  # columns of a table that is printed
 _DIGITS = 6
 _NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIGN}\N{INFINITY}"}
 
@@ -56,8 +55,7 @@ def section(
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
-    doubled = CURVES if part is not None and part.beside else ""
-    shown = {name: html for name, html in pictures.items() if name != doubled}
+    shown = {name: html for name, html in pictures.items() if part is None or name not in part.replaces}
     return {
         "command": result.command,
         "headlines": [dataclasses.asdict(number) for number in numbers],
@@ -87,6 +85,7 @@ def _table(table: Table) -> dict[str, Any]:
         "meaning": table.meaning,
         "rows": count,
         "turned": turned,
+        "narrow": turned or len(table.columns) <= MOST_ON_PAPER,
         "columns": [
             {"name": column.name, "unit": column.unit, "meaning": column.meaning, "numeric": column.numeric}
             for column in table.columns

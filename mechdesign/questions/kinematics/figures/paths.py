@@ -18,7 +18,7 @@ from mechdesign.questions.poses import Shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, PLANE, RIGHT, TITLE, extent, framed, tiled, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
@@ -80,6 +80,7 @@ def paths_figure(
     if rows := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    axes.set_label(PLANE)  # type: ignore[arg-type]
     for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
         axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
@@ -183,6 +184,7 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
 class PathLook(NamedTuple):
     """How the path of a point is drawn: in the colour of its link, and the wider and stronger the higher its rank."""
 
+    point: str
     path: Complexes
     color: str
     width: float
@@ -199,7 +201,7 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     for name, link in sweep.mechanism.description.links.items():
         for point in link_points(link) if name != GROUND else ():
             owners.setdefault(point, name)
-    looks = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
+    looks = [PathLook(point, path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
              for point, path in sweep.traces.items()]  # fmt: skip
     return sorted(looks, key=lambda look: look.rank)
 

@@ -18,7 +18,7 @@ from matplotlib.patheffects import withStroke
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
+from mechdesign.report.figures.framing import BELOW, LEFT, PLANE, RIGHT, Window, extent, windows
 from mechdesign.report.figures.panels import legend_at_left
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
@@ -269,6 +269,7 @@ def sheet(
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
+        axes.set_label(PLANE)  # type: ignore[arg-type]
         axes.set_title(name, loc="left", fontsize=9.5)
     figure.text(LEFT / style.width(), 1 - 0.12 / outer, title, va="top", fontsize=11)
     colors = None
