@@ -109,7 +109,7 @@ def test_a_page_holds_all_of_a_study(asks, invoke):
     page = Page("results/both/report.html")
     check(page)
     headings = page.said("h2")
-    assert headings[:3] == ["Mechanism", "Answers", "Requirements"]
+    assert headings[:3] == ["Answers", "Requirements", "Mechanism"]
     assert {"How does it move?", "How stiff is it?"} <= set(headings)
     motion = json.loads(Path("results/both/kinematics/manifest.json").read_text())["tables"]["motion.csv"]["columns"]
     heads = page.said("th")
