@@ -326,7 +326,7 @@ def test_one_cursor_goes_through_every_picture(opened):
     assert cursors() == pytest.approx([0.0] * len(found), abs=0.4)
 
 
-def test_who_draws_at_the_linkage_moves_its_nearest_point(opened):
+def test_a_drag_on_the_linkage_moves_its_nearest_point(opened):
     page = opened("four_bar")
     pin = page.locator(".moving [data-at=A]:has(circle)").bounding_box()
     drawing = page.locator(".moving svg").first.bounding_box()

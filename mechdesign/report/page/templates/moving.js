@@ -352,7 +352,7 @@
         if (playing) stop(); else play();
       }
     });
-    // Who draws at the linkage moves the point that is nearest to the pointer.
+    // A drag on the linkage moves the point that is nearest to the pointer.
     let held = "";
     follow(drawing, false, (x, y, begins) => {
       const far = (point, k) => Math.hypot(moved.x[point][k] - x, moved.y[point][k] - y);
