@@ -132,6 +132,14 @@ def proper(name: object) -> bool:
     return isinstance(name, str) and name not in {"", ".", ".."} and not {"/", os.sep, "\0"}.intersection(name)
 
 
+def file_names(directory: Path) -> list[str]:
+    """Names of the files in a folder, sorted; none where it does not exist or cannot be read: writing says why."""
+    try:
+        return sorted(path.name for path in directory.iterdir())
+    except OSError:
+        return []
+
+
 def check_own(directory: Path, names: Iterable[str], own: Collection[str], read: Iterable[Path] = ()) -> None:
     """Check that results would replace only the folder's own files, and none that is `read`.
 
@@ -143,13 +151,9 @@ def check_own(directory: Path, names: Iterable[str], own: Collection[str], read:
         If there is such a file; it is named.
     """
     patterns = [*names, *map(glob.escape, own)]
-    try:
-        there = sorted(
-            path for path in directory.iterdir() if any(fnmatchcase(path.name, pattern) for pattern in patterns)
-        )
-    except OSError:
-        # Usually the folder does not exist; otherwise writing will give the reason.
-        return
+    there = [
+        directory / name for name in file_names(directory) if any(fnmatchcase(name, pattern) for pattern in patterns)
+    ]
     kept = [file for file in read if os.path.exists(file)]
     for path in there:
         if os.path.exists(path) and any(path.samefile(file) for file in kept):

@@ -204,12 +204,13 @@ class Answer(Result):
         """All its pictures, and last the mechanism; none of an interrupted computation."""
         from mechdesign.report.figures import style
         from mechdesign.report.figures.mechanism import mechanism_figure
+        from mechdesign.report.figures.pictures import figures
         from mechdesign.report.figures.rendering import Gallery
 
         if self.interrupted:
             return Gallery()
         with style.context():
-            drawn = writer.figures(self.study, self)
+            drawn = figures(self.study, self)
             drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 

@@ -21,14 +21,13 @@ from mechdesign.cli.options import PDF, Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
-from mechdesign.files import owned, settle
+from mechdesign.files import FORMATS, owned, settle
 from mechdesign.progress import Progress
 from mechdesign.questions.look import LONG
 from mechdesign.report import manifest, requirements, writer
 from mechdesign.report.cases import best_of, telling_columns
 from mechdesign.report.figures.before import Before
 from mechdesign.report.manifest import Extras
-from mechdesign.report.names import most_telling
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict, judged_again, judged_by, on_warnings
 from mechdesign.report.tables import from_csv
@@ -79,8 +78,9 @@ class Outcome:
     def picture(self) -> Path | None:
         """The most telling of its pictures; None where there is none."""
         content = manifest.read(self.directory) if self.written else None
-        name = most_telling(self.command, manifest.recorded_files(content)) if content is not None else ""
-        return self.directory / name if name else None
+        files = manifest.recorded_files(content) if content is not None else {}
+        # The pictures of a question are listed in their order, which begins with the most telling.
+        return next((self.directory / name for name in files if name.rpartition(".")[2] in FORMATS), None)
 
     @property
     def word(self) -> str:

@@ -30,4 +30,3 @@ SENSITIVITIES = TableKind.of("sensitivities", "derivatives of results with respe
     ("at_unit", "unit of the parameter; empty where the study does not tell it"),
     ("settled", "1 where the differences agree"))  # fmt: skip
 KEY_NUMBERS: tuple[KeyNumber, ...] = ()
-PICTURES = {"sweep": "response main_effects scatter", "sensitivities": "sensitivities"}

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
 from mechdesign.errors import StudyError
-from mechdesign.files import check_own, check_writable, proper, unsettled
+from mechdesign.files import check_own, check_writable, file_names, proper, unsettled
 from mechdesign.report.names import names
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import Verdict
@@ -264,11 +264,14 @@ def check_folder(directory: Path, study: Study, command: str, asked: Extras, bef
         If the folder takes no files.
     """
     check_writable(directory)
-    written = [NAME, *names(command, asked.formats if asked.plots else "", animate=asked.animate)]
+    ours, suffixes = own(directory), tuple(f".{kind}" for kind in asked.formats.split(","))
+    # Pictures are named only where one of them may replace a file of others: that imports Matplotlib.
+    others = asked.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
+    written = [NAME, *names(command, asked.formats if others else "", animate=asked.animate)]
     studies = [study] if before is None else [study, before]
     read = [file for each in studies for _, file, _ in each.inputs()]
     read += [each.path for each in studies if each.path is not None]
-    check_own(directory, [*written, pages.SECTION] if asked.report else written, own(directory), read)
+    check_own(directory, [*written, pages.SECTION] if asked.report else written, ours, read)
 
 
 def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:

@@ -6,12 +6,10 @@ import dataclasses
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechdesign.cautions import Caution
-from mechdesign.commands import QUESTIONS
 from mechdesign.errors import OutputError, explain
 from mechdesign.files import Transaction, check_marked, check_writable, flowing, replace
 from mechdesign.progress import NULL, Progress
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from mechdesign.report.figures.before import Before
-    from mechdesign.report.figures.rendering import Gallery
 
 HELP_PAGE = "howto/report"
 
@@ -191,17 +188,6 @@ def sketch(study: Study) -> bytes:
         return style.encoded(sketch_figure(study), "png")
 
 
-def figures(study: Study, result: Result, before: Before | None = None) -> Gallery:
-    """Figures of a result's command by their names, and why others could not be made; use inside `style.context`."""
-    from mechdesign.report.figures.rendering import Gallery
-
-    gallery = Gallery()
-    shown = (study, result.seen) if before is None else (study, result.seen, before)
-    # Preparations that all pictures of a command share may fail, too.
-    gallery.add(f"of {result.command}", import_module(QUESTIONS[result.command].figures).figures, *shown)
-    return gallery
-
-
 def pictures(
     study: Study, result: Result, asked: Extras, jobs: int | None = None, before: Before | None = None
 ) -> tuple[dict[str, bytes], tuple[Caution, ...]]:
@@ -211,6 +197,7 @@ def pictures(
     """
     from mechdesign.report.figures import style
     from mechdesign.report.figures.mechanism import mechanism_figure
+    from mechdesign.report.figures.pictures import figures
     from mechdesign.report.figures.rendering import Drawing, render
     from mechdesign.report.page import vector
 

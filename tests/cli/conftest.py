@@ -12,7 +12,8 @@ from typer.testing import CliRunner
 
 from mechdesign.cautions import Caution
 from mechdesign.cli.app import app
-from mechdesign.commands import QUESTIONS
+from mechdesign.report.figures import pictures
+from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Column, Result, Table
 
 SLIDER = """\
@@ -63,9 +64,8 @@ def analysis(monkeypatch):
     def install(function, command="kinematics"):
         module = ModuleType(f"mechdesign.questions.{command}.analysis")
         setattr(module, command, function)
-        figures = import_module(QUESTIONS[command].figures)
         monkeypatch.setitem(sys.modules, module.__name__, module)
-        monkeypatch.setattr(figures, "figures", lambda study, result: {})
+        monkeypatch.setattr(pictures, "figures", lambda *given: Gallery())
 
     install(lambda study, **options: answer())
     return install

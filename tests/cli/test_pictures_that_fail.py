@@ -21,11 +21,10 @@ def failing(*arguments, **options):
 @pytest.mark.parametrize(
     ("module", "function", "lost", "name"),
     [
-        ("questions.kinematics.figures", "curves_figure", "motion.png", "motion"),
-        ("questions.kinematics.figures", "paths_figure", "paths.png", "paths"),
+        ("questions.kinematics.figures.curves", "curves_figure", "motion.png", "motion"),
+        ("questions.kinematics.figures.paths", "paths_figure", "paths.png", "paths"),
         ("report.figures.mechanism", "mechanism_figure", "mechanism.png", "mechanism.png"),
         ("questions.kinematics.figures.animation", "animation", "motion.gif", "motion.gif"),
-        ("questions.kinematics.figures", "figures", "motion.png paths.png", "of kinematics"),
     ],
 )
 def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, name):
@@ -44,6 +43,18 @@ def test_one_picture_fails(folder, invoke, monkeypatch, module, function, lost, 
     manifest = json.loads((out / "manifest.json").read_text())
     assert manifest["warnings"] == [{"kind": "undrawn", "message": told}]
     assert manifest["files"] == {each: hashlib.sha256((out / each).read_bytes()).hexdigest() for each in files}
+
+
+def test_what_pictures_share_fails(folder, invoke, monkeypatch):
+    from mechdesign.questions.kinematics.figures.view import MotionView
+
+    monkeypatch.setattr(MotionView, "sweep", property(failing))
+    done = invoke("kinematics", STUDY)
+    assert done.exit_code == 0, done.output
+    assert done.stderr.count("could not be drawn: internal error: RuntimeError: no such font") >= 2
+    files = {path.name for path in (folder / "results/slider/kinematics").iterdir()}
+    assert files >= TABLES
+    assert files & PICTURES == {"mechanism.png"}
 
 
 @pytest.mark.nightly
@@ -71,13 +82,13 @@ def test_check_tells_a_drawing_that_fails(folder, invoke, monkeypatch):
 
 @pytest.mark.nightly
 def test_tables_stand_when_the_process_ends_among_the_pictures(folder, invoke, monkeypatch):
-    from mechdesign.questions.kinematics import figures as kinematics
+    from mechdesign.questions.kinematics.figures import curves
 
     def interrupt(*arguments):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(kinematics, "curves_figure", interrupt)
+        patch.setattr(curves, "curves_figure", interrupt)
         assert invoke("run", STUDY).exit_code == 130
     out = folder / "results/slider/kinematics"
     assert {path.name for path in out.iterdir()} >= TABLES

@@ -12,11 +12,10 @@ from typer.testing import CliRunner
 import mechdesign
 from mechdesign.cli.app import app
 from mechdesign.errors import StudyError
-from mechdesign.questions.kinematics import figures as kinematics
-from mechdesign.questions.workspace import figures as workspace
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.overlay import COLOR
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.page.moving import moving
 
 FOUR_BAR = """
@@ -54,7 +53,7 @@ def test_names_are_drawn_letter_by_letter():
     )
     result, before = overlaid("kinematics", now, then)
     with style.context():
-        figure = kinematics.figures(now, result, before)["paths"]
+        figure = figures(now, result, before)["paths"]
         drawn = style.encoded(figure, "svg").decode()
     (legend,) = figure.legends
     assert legend.get_texts()[1].get_text() == r"study, name=\$\frac\$ \u202e (before)"
@@ -66,7 +65,7 @@ def test_curves_and_paths_before_are_dashed_under_those_now():
     now, then = (study_of(FOUR_BAR.format(rocker=rocker, motion=SWEEP)) for rocker in (60, 68))
     result, before = overlaid("kinematics", now, then)
     with style.context("paper"):
-        found = kinematics.figures(now, result, before)
+        found = figures(now, result, before)
         assert not found.failed
         for figure in found.values():
             figure.canvas.draw()
@@ -99,7 +98,7 @@ def test_the_boundary_before_is_in_the_picture_of_the_workspace():
     now, then = (study_of(ARM.format(lower=lower)) for lower in (30, 40))
     result, before = overlaid("workspace", now, then)
     with style.context():
-        figure = workspace.figures(now, result, before)["workspace"]
+        figure = figures(now, result, before)["workspace"]
         figure.canvas.draw()
     grey = [line.get_xydata() for line in figure.axes[0].lines if line.get_color() == COLOR]
     radii = np.hypot(*np.concatenate([line for line in grey if len(line) > 3]).T)

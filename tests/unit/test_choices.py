@@ -10,9 +10,9 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.questions.optimize.figures import figures
 from mechdesign.questions.optimize.variables import check_choices, from_cube, grid
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Result
 from mechdesign.study import Study
 

@@ -6,11 +6,13 @@ from helpers.studies import study_of
 from matplotlib.text import Text
 
 import mechdesign
-from mechdesign.questions.kinematics.figures import curves_figure, figures
 from mechdesign.questions.kinematics.figures.animation import in_order
+from mechdesign.questions.kinematics.figures.curves import curves_figure
 from mechdesign.questions.kinematics.figures.transmission import transmission_figure
+from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import sketch_figure
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.figures.scene import Sweep, ranks
 
 FOUR_BAR = """
@@ -298,7 +300,7 @@ def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_pla
     study = study_of(FOUR_BAR, advantage)
     result = mechdesign.kinematics(study)
     with style.context():
-        figure = transmission_figure(study, result.tables, Sweep.of(result.drawn.shown))
+        figure = transmission_figure(MotionView(study, result))
     axes = figure.axes[1]
     assert axes.get_yscale() == "log"
     marks = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]

@@ -10,7 +10,6 @@ from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
 import mechdesign
-from mechdesign.questions.optimize.figures import figures
 from mechdesign.questions.optimize.figures.front import front_figure
 from mechdesign.questions.optimize.figures.scores import (
     ENVELOPE_STEPS,
@@ -22,6 +21,7 @@ from mechdesign.questions.optimize.figures.scores import (
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Column, Table
 from mechdesign.study import Study
 

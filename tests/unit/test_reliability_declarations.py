@@ -14,12 +14,12 @@ import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.questions.reliability.engine.design_points import DesignPoints
 from mechdesign.questions.reliability.engine.problem import Estimate, Problem
-from mechdesign.questions.reliability.figures import figures
 from mechdesign.questions.reliability.methods import normal
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.task import MethodResult, Task
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.study_file import schema
 
@@ -37,7 +37,7 @@ reliability:
 
 def run(task: Task) -> MethodResult:
     """The first order with twice its deviations."""
-    return normal("cautious", task, task.linear.shift(), 4.0 * task.linear.covariance())
+    return normal(task, task.linear.shift(), 4.0 * task.linear.covariance())
 
 
 def rung(
@@ -48,7 +48,9 @@ def rung(
 
 @pytest.fixture
 def cautious() -> Iterator[None]:
-    method = Method("cautious", "cautious first order", "first-order errors, twice as wide", 2, step=1, module=__name__)
+    method = Method(
+        "cautious", "cautious first order", "first-order errors, twice as wide", "Never.", 2, step=1, module=__name__
+    )
     known = dict(METHODS)
     METHODS[method.name] = method
     yield

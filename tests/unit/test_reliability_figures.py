@@ -14,13 +14,13 @@ from matplotlib.path import Path as Outline
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.questions.poses import study_poses
-from mechdesign.questions.reliability.figures import figures
 from mechdesign.questions.reliability.figures.bars import allocation_figure, contributions_figure
 from mechdesign.questions.reliability.figures.densities import SHARES, smoothed
 from mechdesign.questions.reliability.schema.methods import METHODS
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import look
 from mechdesign.report.figures.panels import number, plane
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Column, Table
 
 SLIDER = """

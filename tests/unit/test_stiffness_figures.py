@@ -11,11 +11,11 @@ from helpers.stiffness import ARM, FIVE_BAR
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.stiffness.figures import figures
 from mechdesign.questions.stiffness.figures.springs import Coil
 from mechdesign.report.figures import style
 from mechdesign.report.figures.mechanism import mechanism_figure
 from mechdesign.report.figures.panels import plane, quantity, round_down
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Result
 
 

@@ -7,12 +7,13 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.workspace.figures import figures
 from mechdesign.questions.workspace.figures.boundary import inscribed_figure
 from mechdesign.questions.workspace.figures.index_maps import index_columns
 from mechdesign.questions.workspace.figures.ranged import loops
 from mechdesign.questions.workspace.figures.regions import fate, regions
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Column, Result, Table
 
 FIVE_BAR = """
@@ -113,16 +114,14 @@ def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> N
 def test_the_largest_shapes_are_drawn_where_the_table_has_them() -> None:
     study = study_of(FIVE_BAR)
     result = mechdesign.workspace(study)
-    found = regions(study, result)
     plain = Result("workspace", {**result.tables, "indices": Table("indices", (Column("area", np.ones(1)),))})
     shapes = {"circle_x": 0.0, "circle_y": 0.4, "circle_radius": 0.1, "rectangle_x": 0.0, "rectangle_y": 0.4,
               "rectangle_width": 0.2, "rectangle_height": 0.1}  # fmt: skip
     columns = tuple(Column(name, np.array([value])) for name, value in shapes.items())
     with style.context():
-        assert inscribed_figure(study, plain, found) is None
-        page = inscribed_figure(
-            study, Result("workspace", {**result.tables, "indices": Table("indices", columns)}), found
-        )
+        assert inscribed_figure(WorkspaceView(study, plain)) is None
+        shaped = Result("workspace", {**result.tables, "indices": Table("indices", columns)})
+        page = inscribed_figure(WorkspaceView(study, shaped))
     assert page is not None
     circle, rectangle = page.axes[0].patches[-2:]
     assert circle.get_window_extent().height == pytest.approx(2 * rectangle.get_window_extent().height, rel=1e-6)

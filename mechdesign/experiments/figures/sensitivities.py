@@ -8,9 +8,8 @@ from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.figures import style
-from mechdesign.report.figures.rendering import Gallery
-from mechdesign.results import Result, Table
-from mechdesign.study import Study
+from mechdesign.report.figures.pictures import View, picture
+from mechdesign.results import Table
 
 # Panels, and bars of each, that a picture has room for.
 MOST_RESULTS, MOST_BARS = 8, 20
@@ -23,15 +22,10 @@ _NAME, _FIGURES, _TITLE = 9.0, 8.0, 10.0  # points
 _NONE = 1e-9
 
 
-def figures(study: Study, result: Result) -> Gallery:
-    """``sensitivities``."""
-    gallery = Gallery()
-    gallery.add("sensitivities", sensitivities_figure, result.main)
-    return gallery
-
-
-def sensitivities_figure(table: Table) -> Figure:
+@picture(View, "sensitivities")
+def sensitivities_figure(view: View) -> Figure:
     """A panel a result: bars of elasticity, the largest first, with derivative and error in figures beside them."""
+    table = view.result.main
     results = list(dict.fromkeys(table["result"].tolist()))
     shown = [np.flatnonzero(table["result"] == name) for name in results[:MOST_RESULTS]]
     shown = [rows[_order(table["elasticity"][rows])][:MOST_BARS] for rows in shown]

@@ -73,4 +73,3 @@ KEY_NUMBERS = (
     KeyNumber(MOTION, "<drive>_effort", "largest effort of {name}", "size"),
     KeyNumber(MOTION, "conditioning", "smallest conditioning (0 singular, 1 best)", "smallest"),
 )  # fmt: skip
-PICTURES = "paths motion poses transmission modes"

@@ -49,6 +49,5 @@ KEY_NUMBERS = (
     KeyNumber(OPTIMUM, "<variable>", "best {name}", "first"),
     KeyNumber(OPTIMUM, "", "{name} of the best", "first"),
 )  # fmt: skip
-PICTURES = "CPI objective indices designs pareto hypervolume convergence optimum"
 # Studies that it writes, and copies of the files that they read.
 STUDIES = "optimum.yaml optimum_*.yaml knee.yaml nearest.yaml *input_*"

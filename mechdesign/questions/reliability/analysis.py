@@ -123,7 +123,7 @@ def first_order_tables(
         If nothing varies.
     """
     task, _, _ = _first_order(study, poses, find_sources(study, poses)[0])
-    results = [MethodResult("analytic", normal=(task.linear.shift(), task.linear.covariance()))]
+    results = [MethodResult(normal=(task.linear.shift(), task.linear.covariance()), method="analytic")]
     if "reliability" in wanted:
         results = [with_cycle(methods.run("analytic", task), task, ())]
     built = [tables.moments(task, results)] if "moments" in wanted else []

@@ -103,9 +103,5 @@ KEY_NUMBERS = (
     KeyNumber(MOMENTS, "sigma", "standard deviation of {output}, {order}", "largest", by=("output", "order")),
     KeyNumber(CAPABILITY, "cpk", "smallest Cpk of {output}", "smallest", by=("output",)),
 )  # fmt: skip
-PICTURES = (
-    "bands means deviations difference deviation_map failure_map reliability density density_contours histogram "
-    "convergence estimate contributions allocation"
-)
 # Studies that it writes, and copies of the files that they read.
 STUDIES = "allocated.yaml *input_*"

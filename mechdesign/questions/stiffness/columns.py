@@ -54,4 +54,3 @@ KEY_NUMBERS = (
     KeyNumber(STIFFNESS, "k_max", "largest stiffness", "largest"),
     KeyNumber(DEFLECTIONS, "dx", "largest deflection {name}", "size"),
 )  # fmt: skip
-PICTURES = "springs deflections free directions stiffness joint_forces force_hodographs"

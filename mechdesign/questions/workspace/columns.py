@@ -74,4 +74,3 @@ KEY_NUMBERS = (
     KeyNumber(INDICES, "circle_radius", "radius of the largest circle inside", "largest", several="regions"),
     KeyNumber(INDICES, "<index>_mean", "mean {name}", "largest", several="regions"),
 )  # fmt: skip
-PICTURES = "workspace range path speed_ratio ellipses inscribed drives"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -25,8 +23,9 @@ from mechdesign.experiments.figures.sweep.quantities import (
     title,
     without_number,
 )
+from mechdesign.experiments.figures.sweep.view import CasesView
 from mechdesign.report.figures import style
-from mechdesign.results import Table
+from mechdesign.report.figures.pictures import picture
 
 # Inches.
 _MARGINS = {"left": 1.1, "right": 0.15, "bottom": 0.75}
@@ -41,11 +40,15 @@ MOST_ROWS = 6
 MOST_SCATTERED = 7
 
 
-def main_effects(entries: Sequence[Axis], results: Sequence[Axis], count: int) -> Figure:
+@picture(CasesView, "main_effects", order=20)
+def main_effects(view: CasesView) -> Figure | None:
     """A row of panels a result, a column an entry: mean and range over the cases of each value; dashed, its limits.
 
     Where there is no room for all entries side by side, the rest stands below.
     """
+    if view.empty:
+        return None
+    entries, results, count = view.entries, view.results, len(view.table)
     across = entries[:MOST_ENTRIES]
     columns = min(len(across), _fitting())
     blocks = [across[k : k + columns] for k in range(0, len(across), columns)]
@@ -93,8 +96,12 @@ def _effect(axes: Axes, entry: Axis, number: Axis) -> None:
     )  # fmt: skip
 
 
-def scatter(entries: Sequence[Axis], results: Sequence[Axis], table: Table, *, required: bool) -> Figure:
+@picture(CasesView, "scatter", order=30)
+def scatter(view: CasesView) -> Figure | None:
     """Every two of the entries and results against another, a point a case; those that do not meet a limit marked."""
+    if view.empty:
+        return None
+    entries, results, table, required = view.entries, view.results, view.table, bool(view.study.requirements)
     most = min(MOST_SCATTERED, _fitting() + 2)
     taken = [*entries[: most - 1]]
     taken += results[: most - len(taken)]

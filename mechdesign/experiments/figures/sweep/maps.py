@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -27,9 +27,10 @@ from mechdesign.experiments.figures.sweep.quantities import (
     sample,
     without_number,
 )
+from mechdesign.experiments.figures.sweep.view import CasesView
 from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import style
-from mechdesign.results import Table
+from mechdesign.report.figures.pictures import picture
 
 # Entries of which every two have a map, and maps of a picture, also where none have room side by side.
 MOST_ENTRIES, MOST_MAPS, MOST_BELOW = 4, 6, 4
@@ -43,13 +44,17 @@ _VEIL, _HATCH = [(1.0, 1.0, 1.0, 0.6)], "#555555"
 _MOST_OTHERS = 3  # entries that are named in a title
 
 
-def response(entries: Sequence[Axis], results: Sequence[Axis], table: Table, goals: Mapping[str, int]) -> Figure | None:
+@picture(CasesView, "response", order=10)
+def response(view: CasesView) -> Figure | None:
     """Each result over every two of the first entries that are numbers, with the limits, the cases and the best one.
 
     None where no two entries span a plane. Goals, 1 to be small and -1 to be large, come first where there is no room
     for all results. Where other entries vary, too, a map has the mean over them, or what is best where it is known
     which way is better, of the cases that meet every requirement, or else of the nearest miss.
     """
+    if view.empty:
+        return None
+    entries, results, table, goals = view.entries, view.results, view.table, view.drawn.goals
     numbers = [entry for entry in entries if not entry.words]
     pairs = (Plane.of(x, y, others=len(entries) > 2) for x, y in combinations(numbers[:MOST_ENTRIES], 2))
     most = MOST_BELOW if style.narrow() else MOST_MAPS

@@ -13,10 +13,12 @@ from matplotlib.patches import Patch
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.overlay import DASHES, name_both
 from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import ranks
 from mechdesign.results import Column, Table
 from mechdesign.study import Poses, Study, Units
@@ -80,6 +82,13 @@ class _Panel(NamedTuple):
     def rows(self) -> int:
         """Rows of that legend."""
         return -(-len(self.curves) // self.columns) + bool(self.left_out)
+
+
+@picture(MotionView, "motion", order=20)
+def motion_figure(view: MotionView) -> Figure | None:
+    """Every output of a motion."""
+    poses = view.sweep.poses
+    return curves_figure(view.study, view.result.tables, poses, view.before) if poses.motion else None
 
 
 def curves_figure(

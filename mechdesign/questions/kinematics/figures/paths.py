@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from mechdesign.mechanism.algebra import vector
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Flags, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
-from mechdesign.questions.poses import Shown
+from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
@@ -22,10 +21,10 @@ from mechdesign.report.figures.framing import ABOVE, LEFT, PLANE, RIGHT, TITLE, 
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
 from mechdesign.report.figures.shapes import link_colors
 from mechdesign.results import Table
-from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 _LEGEND_LINE = 0.19  # inches
@@ -52,6 +51,14 @@ _TITLE = 0.3  # inches above a panel
 _NOTE = 0.3  # inches above all panels
 _GAP = 0.12  # inches between panels
 _SMALL_SYMBOLS = 0.6
+
+
+@picture(MotionView, "paths", order=10)
+def motion_paths_figure(view: MotionView) -> Figure | None:
+    """The paths of a motion; None where no pose is valid."""
+    if not view.sweep.poses.motion or not len(view.sweep.valid):
+        return None
+    return paths_figure(view.sweep, centres=view.result.tables.get("instant_centres"), before=view.before)
 
 
 def paths_figure(
@@ -206,9 +213,13 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     return sorted(looks, key=lambda look: look.rank)
 
 
-def modes_figure(study: Study, table: Table, modes: Mapping[str, Shown], count: int) -> Figure:
-    """A panel an assembly that has a valid pose, as many of all as there are `modes`, on one scale."""
-    shown = [(title, Sweep.of(each)) for title, each in modes.items()]
+@picture(MotionView, "modes", order=50)
+def modes_figure(view: MotionView) -> Figure | None:
+    """A panel an assembly that has a valid pose, as many of all as the record of the result has, on one scale."""
+    if "modes" not in view.result.tables:
+        return None
+    study, table, count = view.study, view.result.tables["modes"], view.result.counts["modes"]
+    shown = [(title, Sweep.of(each)) for title, each in view.drawn.modes.items()]
     moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
     notes = []
     if moving > len(shown):

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
 
-from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
@@ -21,6 +21,7 @@ from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep, pose, ranks
 from mechdesign.study import Study
 
@@ -73,9 +74,10 @@ _KINDS = (
 )
 
 
-def poses_figure(study: Study, sweep: Sweep, drawn: DrawnMotion) -> Figure | None:
+@picture(MotionView, "poses", order=30)
+def poses_figure(view: MotionView) -> Figure | None:
     """A panel a pose, all on one scale, with a key of the arrows; None where nothing but its motion is to be seen."""
-    chosen = drawn.special
+    study, sweep, chosen = view.study, view.sweep, view.drawn.special
     centres = list(chosen.shown[0].centres) if chosen.shown else []
     if not chosen.shown or not (chosen.special or chosen.rates or centres or sweep.poses.listed):
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +12,7 @@ from matplotlib.patheffects import withStroke
 from mechdesign.mechanism.algebra import quiet
 from mechdesign.mechanism.four_bars import FourBar, four_bars
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import (
     BELOW_BARE,
@@ -24,6 +24,7 @@ from mechdesign.report.figures.panels import (
     stack,
     tick_abscissa,
 )
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Table
 from mechdesign.study import Study
@@ -56,10 +57,12 @@ class Transmission(NamedTuple):
     at: float
 
 
-def transmission_figure(study: Study, tables: Mapping[str, Table], sweep: Sweep) -> Figure | None:
+@picture(MotionView, "transmission", order=40)
+def transmission_figure(view: MotionView) -> Figure | None:
     """Transmission angles over the swept coordinate with the band that is good, and mechanical advantages."""
+    study, tables, sweep = view.study, view.result.tables, view.sweep
     section = study.kinematics
-    if not moving_names(sweep.poses):
+    if not sweep.poses.motion or not moving_names(sweep.poses):
         return None
     over = abscissa(study, sweep.poses)
     x = over.values[sweep.rows]

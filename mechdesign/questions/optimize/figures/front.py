@@ -10,15 +10,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.questions.optimize.figures.designs import head, value_text
+from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import fitting
+from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 
 _FRONT_MARKS = "so^DvPX"
 _LONGEST_NAME = 22  # letters of a goal in one line along an axis of several panels
 _ROW = 3.2  # inches
+
+
+@picture(DesignsView, "pareto", order=50)
+def pareto_figure(view: DesignsView) -> Figure | None:
+    """The front, if several goals have one."""
+    return front_figure(view.designs, view.front) if view.front is not None else None
 
 
 def front_figure(designs: Designs, front: Table) -> Figure:
@@ -80,8 +88,12 @@ def _goal_label(designs: Designs, goal: Goal, *, folded: bool) -> str:
     return (",\n" if folded else ", ").join((words, sense))
 
 
-def growth_figure(growth: Table) -> Figure:
+@picture(DesignsView, "hypervolume", order=60)
+def growth_figure(view: DesignsView) -> Figure | None:
     """Hypervolume of the front over the number of designs, and its growth by the last tenth of them."""
+    if view.front is None:
+        return None
+    growth = view.result.tables["hypervolume"]
     figure = style.new_figure(3.2)
     axes = figure.add_subplot()
     axes.plot(growth["designs"], growth["hypervolume"], "o-", color=style.BLUE, markersize=4)

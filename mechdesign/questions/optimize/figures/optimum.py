@@ -14,15 +14,27 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.paths import draw_paths, paths_figure
+from mechdesign.questions.optimize.analysis import DrawnDesign, drawn_design
+from mechdesign.questions.optimize.figures.designs import listed
+from mechdesign.questions.optimize.figures.front import chosen, described, marked
+from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.poses import Shown
+from mechdesign.questions.workspace.drawn import DrawnRegion
+from mechdesign.questions.workspace.figures.boundary import regions_figure, workspace_figure
+from mechdesign.questions.workspace.figures.regions import regions
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, column_width, fit, framed, windows
+from mechdesign.report.figures.mechanism import sketch_and_first_pose
 from mechdesign.report.figures.panels import MAX_PANELS, Along, abscissa, legend_below, tick_abscissa
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
 
+# Angles at which the outline of a contained shape is drawn.
+_OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
+_UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 # Inches.
 _HEIGHT = 5.0
 _TITLE = 0.42
@@ -230,3 +242,47 @@ def _panels(figure: Figure, over: Along, shown: Sequence[Reached]) -> None:
             axes.set_xlabel(over.label)
         else:
             axes.tick_params(labelbottom=False)
+
+
+@picture(DesignsView, "optimum", order=80)
+def optimum_figure(view: DesignsView) -> Figure:
+    """The best design: in its workspace if that was judged, else in its motion.
+
+    Of a front those that are marked in it, side by side.
+    """
+    drawn, designs, front = view.drawn, view.designs, view.front
+    if front is not None:
+        parts = [(described(designs, front, name, row), drawn_design(designs, chosen(designs, front, row)))
+                 for name, row in marked(designs, front)]  # fmt: skip
+        moving = [(words, own.shown, own.motion) for words, own in parts
+                  if own.shown is not None and own.shown.configuration.valid.any()]  # fmt: skip
+        if len(parts) > 1 and len(moving) == len(parts):
+            return designs_figure(moving)
+        judged_regions = [(words, own.study, regions(own.study, own.region)[0]) for words, own in parts
+                 if own.region is not None]  # fmt: skip
+        if len(parts) > 1 and len(judged_regions) == len(parts):
+            figure = regions_figure(judged_regions, "some designs of the front where they are best conditioned")
+            for axes, (_, own) in zip(figure.axes, parts, strict=True):
+                _draw_contained(axes, own)
+            return figure
+    best, words = drawn.best, listed(designs.design(designs.best))
+    if best.region is not None:
+        region = regions(best.study, best.region)[0]
+        there = f", at {region.title}" if region.title else ""
+        dotted = "; dotted: what it contains" if best.contained else ""
+        title = f"the best design, {words}{there}{dotted}"
+        figure = workspace_figure(best.study, DrawnRegion.of(best.region), region, title)
+        _draw_contained(figure.axes[0], best)
+        return figure
+    # A title may be broken between variables only.
+    words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
+    if best.motion is not None:
+        return design_figure(best.study, best.motion, words)
+    return sketch_and_first_pose(best.study, best.shown, words)
+
+
+def _draw_contained(axes: Axes, own: DrawnDesign) -> None:
+    """Outline of what a workspace is to contain."""
+    for shape, centre in own.contained:
+        z = centre + shape.radius(_OUTLINE) * np.exp(1j * _OUTLINE)
+        axes.plot(z.real, z.imag, color=style.INK, linestyle=":", linewidth=1.6, zorder=5)

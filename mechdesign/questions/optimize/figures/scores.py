@@ -15,10 +15,12 @@ from matplotlib.tri import Triangulation
 
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.figures.designs import folded, head, label, listed, tick, value_text
+from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.variables import variables_of
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import fitting
+from mechdesign.report.figures.pictures import picture
 
 MAP_LEVELS = 14
 MARKERS = "osD^vP*X<>"
@@ -30,6 +32,13 @@ MAX_VALUES = 200
 # Fewer designs of a grid are drawn as cells, without interpolation.
 FEWEST_OF_FIELD = 1000
 _LETTER = 0.08  # inches
+
+
+@picture(DesignsView, "CPI", "objective", order=10)
+def score_figure(view: DesignsView) -> dict[str, Figure]:
+    """The score of all goals, or the objective of one, over the variables."""
+    name = "CPI" if len(view.designs.goals) > 1 else "objective"
+    return {name: score_surface(view.designs) if view.mapped else score_curves(view.designs)}
 
 
 def score_curves(designs: Designs) -> Figure:
@@ -125,9 +134,12 @@ def score_surface(designs: Designs) -> Figure:
     return figure
 
 
-def goal_maps(designs: Designs) -> Figure:
+@picture(DesignsView, "indices", order=30)
+def goal_maps(view: DesignsView) -> Figure | None:
     """Each goal over two variables, side by side."""
-    goals = designs.goals
+    designs, goals = view.designs, view.designs.goals
+    if not view.mapped or len(goals) < 2:
+        return None
     columns = 1 if style.narrow() else min(len(goals), 3)
     rows = -(-len(goals) // columns)
     figure = style.new_figure(0.3 + 2.7 * rows)
@@ -178,6 +190,12 @@ def _fill(axes: Axes, designs: Designs, values: Floats) -> ScalarMappable:
     return filled
 
 
+@picture(DesignsView, "designs", order=40)
+def designs_figure(view: DesignsView) -> Figure | None:
+    """All designs with more than two variables."""
+    return parallel_axes(view.designs) if len(view.designs.variables) > 2 else None
+
+
 def parallel_axes(designs: Designs) -> Figure:
     """Each feasible design a line across its variables and goals, the colour its score, the best of all on top."""
     names = [*designs.variables, *(goal.name for goal in designs.goals)]
@@ -215,6 +233,13 @@ def parallel_axes(designs: Designs) -> Figure:
     what = "sum of the normalised goals" if len(designs.goals) > 1 else "normalised goal"
     style.color_bar(figure, drawn, what, ax=axes, pad=0.02)
     return figure
+
+
+@picture(DesignsView, "convergence", order=70)
+def convergence_figure(view: DesignsView) -> Figure | None:
+    """The convergence of a search."""
+    searched = view.study.optimize is not None and view.study.optimize.method == "search"
+    return convergence(view.designs) if searched else None
 
 
 def convergence(designs: Designs) -> Figure:

@@ -11,9 +11,11 @@ from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import best_probability, followed_in_words, heading
 from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, title
+from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -31,6 +33,13 @@ _FAILURE_ROOM = 1.4
 _PANEL_GAP = 0.94
 _ACROSS = 0.3
 _MIN_WIDTH = 1.9  # of a panel
+
+
+@picture(ErrorsView, "contributions", order=50)
+def contributions_picture(view: ErrorsView) -> Figure:
+    """The contributions at the pose whose samples are shown, or the average."""
+    worst = view.drawn.samples.pose if view.drawn.samples is not None else 0
+    return contributions_figure(view.study, view.result.tables["contributions"], view.poses, worst)
 
 
 def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 0) -> Figure:
@@ -128,6 +137,12 @@ def _name(axis: Axes, names: list[str]) -> None:
     axis.set_ylim(len(names) - 0.42, -0.58)
     axis.margins(x=0.25)
     axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.dataLim.x0 < -1.0 else 0.0)
+
+
+@picture(ErrorsView, "allocation", order=60)
+def allocation_picture(view: ErrorsView) -> Figure | None:
+    """The tolerances that were allocated, if any were."""
+    return allocation_figure(view.study, view.result.tables) if "allocation" in view.result.tables else None
 
 
 def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:

@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.numerics.arrays import Flags, Floats
+from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.simulation import CELLS, REACH
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import Sampled, heading, look
 from mechdesign.report.figures.panels import title
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.shapes import lighter
 
 # Shares of the made mechanisms that an ellipse or a region holds, with the ellipses' dashes and the regions' tints.
@@ -41,8 +43,12 @@ _BEYOND = "#FBEDE4"  # where a limit is broken
 Ends = tuple[float, float]
 
 
-def density_figures(given: Sampled) -> dict[str, Figure]:
+@picture(ErrorsView, "density_contours", "density", order=80)
+def density_figures(view: ErrorsView) -> dict[str, Figure] | None:
     """``density_contours``, in the errors' units, and ``density``: both densities as surfaces [S2, Fig. 5]."""
+    given = view.sampled("density")
+    if given is None:
+        return None
     assert given.samples.pair is not None
     labels = [
         style.axis_label(f"{heading(given.samples.outputs[k], given.samples.orders[k])} error", given.samples.units[k])

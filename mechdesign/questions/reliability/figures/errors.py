@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import (
@@ -28,7 +29,6 @@ from mechdesign.report.figures.panels import (
     BELOW_WITH_LEGEND,
     MAX_PANELS,
     Along,
-    Plane,
     clear_of_ticks,
     fitting,
     legend_below,
@@ -38,9 +38,9 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
     title,
 )
-from mechdesign.results import Result, Table
+from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
 
 MAX_OUTPUTS = 7
 _MARKS = ("o", "s", "^", "D", "v", "P", "X")  # of outputs, in grey
@@ -61,8 +61,12 @@ _MAX_LINEAR_RATIO = 8.0
 Legend = dict[str, Any]
 
 
-def sweep_figures(study: Study, tables: Mapping[str, Table], swept: Along) -> dict[str, Figure]:
+@picture(ErrorsView, "bands", "means", "deviations", "difference", order=10)
+def sweep_figures(view: ErrorsView) -> dict[str, Figure] | None:
     """Bands of the errors, means, standard deviations and the methods' difference over the sweep [S3, Figs. 5 to 7]."""
+    study, tables, swept = view.study, view.result.tables, view.swept
+    if swept is None:
+        return None
     moments, made = tables["moments"], {"bands": _bands(study, tables, swept)}
     for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
         made[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
@@ -197,8 +201,12 @@ def _grouped(table: Table) -> list[tuple[str, str, list[str]]]:
     return [(*key, outputs[:MAX_OUTPUTS]) for key, outputs in list(panels.items())[:MAX_PANELS]]
 
 
-def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
+@picture(ErrorsView, "deviation_map", "failure_map", order=20)
+def map_figures(view: ErrorsView) -> dict[str, Figure] | None:
     """Standard deviation of each output, and the failure probability where there are limits."""
+    study, result, over = view.study, view.result, view.over
+    if over is None:
+        return None
     moments = result.tables["moments"]
     method = best_moments(moments)
     shown = [channel for channel in channels(moments) if channel[1] == "position"] or channels(moments)
@@ -220,8 +228,14 @@ def map_figures(study: Study, result: Result, over: Plane) -> dict[str, Figure]:
     return made
 
 
-def estimate_figure(study: Study, table: Table, poses: Poses, swept: Along | None) -> Figure:
+@picture(ErrorsView, "reliability", order=30)
+def estimate_figure(view: ErrorsView) -> Figure | None:
     """Failure by every method, over what a sweep runs over or beside the words for each listed pose."""
+    study, poses, swept = view.study, view.poses, view.swept
+    few = poses.listed or (view.over is None and poses.count <= MAX_LISTED)
+    if "reliability" not in view.result.tables or (not few and swept is None):
+        return None
+    table = view.result.tables["reliability"]
     known, unseen = methods(table), _unseen(table)
     count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values

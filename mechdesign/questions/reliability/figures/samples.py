@@ -9,10 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.figures.view import ErrorsView
 from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import Sampled, apart, channels, heading, look, methods
 from mechdesign.report.figures.panels import MAX_PANELS, clear_of_ticks, legend_below, number, stack, title
+from mechdesign.report.figures.pictures import picture
 
 # A limit farther out than this, in widths of the histogram, is named and not drawn.
 _FAR_FROM_HISTOGRAM = 0.6
@@ -36,8 +38,12 @@ class _Histogram(NamedTuple):
     limits: tuple[float, float]
 
 
-def histogram_figure(given: Sampled) -> Figure:
+@picture(ErrorsView, "histogram", order=40)
+def histogram_figure(view: ErrorsView) -> Figure | None:
     """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
+    given = view.sampled("histogram")
+    if given is None:
+        return None
     shown = _histograms(given)
     columns = 1 if style.narrow() else min(len(shown), 2 if len(shown) == 4 else 3)
     blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
@@ -137,8 +143,12 @@ def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) ->
     return far
 
 
-def convergence_figure(given: Sampled) -> Figure:
+@picture(ErrorsView, "convergence", order=90)
+def convergence_figure(view: ErrorsView) -> Figure | None:
     """Mean of the simulation against the number of samples, within three standard errors of its end [S3, Fig. 4]."""
+    given = view.sampled("convergence")
+    if given is None:
+        return None
     table, moments = given.tables["convergence"], given.tables["moments"]
     shown = channels(table)[:MAX_PANELS]
     figure, axes = stack(len(shown), "Mean of made mechanisms as samples are added", "samples",
@@ -162,8 +172,12 @@ def convergence_figure(given: Sampled) -> Figure:
     return figure
 
 
-def trend_figure(given: Sampled) -> Figure:
+@picture(ErrorsView, "estimate", order=70)
+def trend_figure(view: ErrorsView) -> Figure | None:
     """Failure probability against the number of samples with its interval, beside what other methods say."""
+    given = view.sampled("estimate")
+    if given is None:
+        return None
     table, reliability = given.tables["estimate"], given.tables["reliability"]
     known = [method for method in methods(reliability) if method != "monte_carlo"]
     figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=given.where,

@@ -15,20 +15,21 @@ from matplotlib.lines import Line2D
 
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.poses import Shown, pose_in_words
+from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.elements import beam_line, corners_of
 from mechdesign.questions.stiffness.figures.joint_forces import load_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
+from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import ARC, arc, force
-from mechdesign.results import Table
-from mechdesign.study import Poses, Study
+from mechdesign.study import Study
 
 MAX_LOADS = 4
 MAX_DIRECTIONS = 4  # poses
@@ -52,8 +53,12 @@ _CUBIC = np.array([1 - 3 * _ALONG**2 + 2 * _ALONG**3, _ALONG - 2 * _ALONG**2 + _
                    3 * _ALONG**2 - 2 * _ALONG**3, _ALONG**3 - _ALONG**2])  # fmt: skip
 
 
-def deflections_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
+@picture(StiffnessView, "deflections", order=20)
+def deflections_figure(view: StiffnessView) -> Figure | None:
     """The whole mechanism where each load moves it, a panel a load, all with one magnification."""
+    study, poses, drawn = view.study, view.poses, view.drawn.first
+    if drawn is None:
+        return None
     scene, asked = pose(study.mechanism, drawn.configuration), drawn.body
     if scene is None or not drawn.twists:
         return None
@@ -184,8 +189,10 @@ def _beam(
     return np.asarray(tail + _ALONG * span, dtype=np.complex128), np.asarray((straight + 1j * across) * along)
 
 
-def directions_figure(study: Study, tables: Mapping[str, Table], shown: Shown) -> Figure | None:
+@picture(StiffnessView, "directions", order=40)
+def directions_figure(view: StiffnessView) -> Figure | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
+    study, tables, shown = view.study, view.result.tables, view.drawn.shown
     table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
     assert section is not None
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, fit, windows
 from mechdesign.report.figures.panels import (
@@ -24,6 +25,7 @@ from mechdesign.report.figures.panels import (
     stack,
     tick_abscissa,
 )
+from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -107,13 +109,17 @@ def _loaded(joints: Sequence[Joint], rounding: float) -> list[Joint]:
     return sorted(loaded, key=lambda joint: -joint.peak)
 
 
-def joint_force_figures(study: Study, table: Table, count: int, over: Along) -> dict[str, Figure]:
+@picture(StiffnessView, "joint_forces", "force_hodographs", order=60)
+def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
     """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
+    study, over = view.study, view.swept
     section = study.stiffness
     assert section is not None
-    forces, moments = borne(table, count, study.mechanism.size)
+    if over is None or "forces" not in view.result.tables:
+        return None
+    forces, moments = borne(view.result.tables["forces"], view.poses.count, study.mechanism.size)
     if not forces:
-        return {}
+        return None
     loads = [f"{load_in_words(study, load)} at {section.at}" for load in section.loads[:MAX_LOADS]]
     kinds = {"force": forces[:MAX_JOINTS], "moment": moments[:MAX_JOINTS]}
     return {

@@ -6,8 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import Along, Plane, map_sheet, quantity, tick_abscissa
+from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
 
@@ -20,7 +22,16 @@ _BEYOND = 10.0
 _TAIL = 0.04
 
 
-def curves_figure(study: Study, table: Table, over: Along) -> Figure | None:
+@picture(StiffnessView, "stiffness", order=50)
+def stiffness_figure(view: StiffnessView) -> Figure | None:
+    """Stiffnesses along a motion, or a map of them; None of poses that are neither."""
+    table = view.result.tables["stiffness"]
+    if view.over is not None:
+        return _map(view.study, table, view.over)
+    return _curves(view.study, table, view.swept) if view.swept is not None else None
+
+
+def _curves(study: Study, table: Table, over: Along) -> Figure | None:
     """Stiffnesses to a force and to a moment along a path; what is the same everywhere is written, not drawn."""
     units = study.units
     forces = {"k_x": ("-", style.BLUE, "o"), "k_y": ("-", style.ORANGE, "s"), "k_min": ("--", style.INK, ""),
@@ -79,7 +90,7 @@ def _constant(values: Floats) -> bool:
     return len(known) == len(values) and float(np.ptp(known)) <= _FLAT * float(np.abs(known).max())
 
 
-def map_figure(study: Study, table: Table, over: Plane) -> Figure:
+def _map(study: Study, table: Table, over: Plane) -> Figure:
     """k_min over the poses, and k_max beside it."""
     unit = study.units.label("stiffness")
     parts = []

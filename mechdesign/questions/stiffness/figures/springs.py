@@ -14,14 +14,15 @@ from matplotlib.lines import Line2D
 from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
+from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.framing import LEFT, MAX_HEIGHT, TITLE, framed
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import quantity
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import point_labels
-from mechdesign.results import Table
 from mechdesign.study import Poses, Study
 
 _COIL_LENGTH = 0.17  # over the size of the mechanism
@@ -31,7 +32,12 @@ _ORDER = 5.0  # above the mechanism
 LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
 
-def springs_figure(study: Study, poses: Poses, drawn: DrawnPose) -> Figure | None:
+@picture(StiffnessView, "springs", order=10)
+def springs_figure(view: StiffnessView) -> Figure | None:
+    """The equivalent springs at the first pose, as coils."""
+    study, poses, drawn = view.study, view.poses, view.drawn.first
+    if drawn is None:
+        return None
     scene = pose(study.mechanism, drawn.configuration)
     coils = _coils(study, drawn, scene) if scene is not None else []
     if scene is None or not coils:
@@ -123,8 +129,12 @@ def _line(axes: Axes, places: Complexes, width: float, lift: float, **look: obje
     axes.add_line(Line2D(places.real, places.imag, lw=width, zorder=_ORDER + lift, **options))
 
 
-def free_motion_figure(study: Study, table: Table, poses: Poses, drawn: DrawnPose) -> Figure | None:
+@picture(StiffnessView, "free", order=30)
+def free_motion_figure(view: StiffnessView) -> Figure | None:
     """The asked body moved both ways along its free twist, at the first pose that has one."""
+    study, table, poses, drawn = view.study, view.result.tables["stiffness"], view.poses, view.drawn.loose
+    if drawn is None:
+        return None
     section, row = drawn.body.section, drawn.row
     scene = pose(study.mechanism, drawn.configuration)
     if scene is None:

@@ -17,6 +17,7 @@ from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.poses import in_study_units, radians
 from mechdesign.questions.workspace.drawn import DrawnRegion
 from mechdesign.questions.workspace.figures.regions import ROOM, Region, fill, lines, pieces, places, sheet, some
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -24,7 +25,7 @@ from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
 from mechdesign.report.figures.panels import MAX_PANELS, Along, legend_below, stack, tick_abscissa
-from mechdesign.results import Result
+from mechdesign.report.figures.pictures import picture
 from mechdesign.study import Study
 
 CIRCLE = ("circle_x", "circle_y", "circle_radius")
@@ -58,6 +59,16 @@ def workspace_figure(
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=True, drives=False)
     name_both(page.figure, before)
     return page.figure
+
+
+@picture(WorkspaceView, "workspace", order=10)
+def boundary_figure(view: WorkspaceView) -> Figure | None:
+    """The region with its boundary; of several values of the held coordinates the regions side by side."""
+    if not view.regions:
+        return None
+    if len(view.regions) > 1:
+        return side_by_side(view.study, view.regions, view.before)
+    return workspace_figure(view.study, view.drawn, view.regions[0], before=view.before)
 
 
 def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
@@ -100,12 +111,13 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     return plan.solve(np.broadcast_arrays(*values), limits=False)
 
 
-def inscribed_figure(study: Study, result: Result, regions: Sequence[Region]) -> Figure | None:
+@picture(WorkspaceView, "inscribed", order=50)
+def inscribed_figure(view: WorkspaceView) -> Figure | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
-    table = result.tables["indices"]
-    if not any(name in table for name in (*CIRCLE, *RECTANGLE)):
+    study, table = view.study, view.result.tables["indices"]
+    if not view.regions or not any(name in table for name in (*CIRCLE, *RECTANGLE)):
         return None
-    shown = some(regions)
+    shown = some(view.regions)
     places = np.concatenate([region.places() for region in shown])
     page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
                  bar=False)  # fmt: skip
@@ -132,15 +144,19 @@ def inscribed_figure(study: Study, result: Result, regions: Sequence[Region]) ->
     return page.figure
 
 
-def drives_figure(study: Study, regions: Sequence[Region]) -> Figure:
+@picture(WorkspaceView, "drives", order=60)
+def drives_figure(view: WorkspaceView) -> Figure | None:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
-    names, mechanism = study.mechanism.drives, study.mechanism
+    study, mechanism = view.study, view.study.mechanism
     parts = [
         (region.boundary, side, region.title)
-        for region in some([region for region in regions if len(region.boundary)])
+        for region in some([region for region in view.regions if len(region.boundary)])
         for side in SIDES
         if (region.boundary["side"] == side).any()
     ][:MAX_PANELS]
+    if not parts:
+        return None
+    names = mechanism.drives
     label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
     figure, panels = stack(len(parts), "Drives along the boundary of the workspace", label, tall=_DRIVES_HEIGHT)
     units = {study.units.label(mechanism.quantity(name)) for name in names}

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.workspace.ellipses import Ellipses
-from mechdesign.questions.workspace.figures.regions import Region, fill, sheet
+from mechdesign.questions.workspace.figures.regions import fill, sheet
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.report.figures.panels import quantity, round_down
-from mechdesign.study import Study
+from mechdesign.report.figures.pictures import picture
 
 # Half axis of the largest ellipse drawn at the common scale, over the distance of neighbouring places; of this share
 # of the ellipses none is larger. The rest would cover others: they grow without bounds towards singularities.
@@ -28,15 +28,18 @@ _VELOCITY: dict[str, Any] = {"color": style.BLUE, "linestyle": "-"}
 _FORCE: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (3, 1.2))}
 
 
-def ellipses_figure(study: Study, region: Region, ellipses: Ellipses | None) -> Figure | None:
+@picture(WorkspaceView, "ellipses", order=40)
+def ellipses_figure(view: WorkspaceView) -> Figure | None:
     """Velocity ellipses, J u for drive rates u of unit size, and force ellipses, J^-T u for efforts u [Yoshikawa 1985].
 
     None where the Jacobian is not that of a point.
     """
-    section, units = study.workspace, study.units
+    study, section, units = view.study, view.study.workspace, view.study.units
+    ellipses = view.drawn.ellipses if len(view.regions) == 1 else None
     if ellipses is None or section is None or not len(ellipses.places):
         return None
     title = f"where point {section.point} is fast (velocity ellipse) and where strong (force ellipse)"
+    (region,) = view.regions
     page = sheet(study, region.places(), [""], title, bar=False, below=_ROOM)
     (axes,) = page.axes
     fill(axes, region.local)

@@ -13,11 +13,14 @@ from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
+from mechdesign.indices import INDEX_NAMES
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.workspace.figures.regions import Grid, Region, grids, sheet, some
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.panels import node_areas, quantile
+from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.study import Study
 
@@ -30,16 +33,19 @@ CLEAR_OF_LINES = 5.0
 CLEAR_OF_NAMES = 18.0
 
 
-def map_figures(study: Study, regions: Sequence[Region]) -> Gallery:
+@picture(WorkspaceView, *INDEX_NAMES, order=80)
+def map_figures(view: WorkspaceView) -> Gallery | None:
     """One map an index of the table of local indices; of many regions a few, spread evenly.
 
     There is none of an index that is infinite everywhere.
     """
-    shown = some(regions)
-    names = [name for name in index_columns(regions[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
+    if not view.regions:
+        return None
+    shown = some(view.regions)
+    names = [name for name in index_columns(view.regions[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
     maps = Gallery()
     for name in names:
-        maps.add(name, _index_map, study, shown, name)
+        maps.add(name, _index_map, view.study, shown, name)
     return maps
 
 

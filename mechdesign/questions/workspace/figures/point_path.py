@@ -10,22 +10,27 @@ from matplotlib.figure import Figure
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
 from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, sheet
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
 from mechdesign.report.figures.panels import coordinate_label
-from mechdesign.results import Result, Table
+from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 # Speed ratios grow without bound at dead centres: colours end at this quantile.
 _SHOWN_RATIOS = 0.97
 
 
-def path_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
+@picture(WorkspaceView, "path", "speed_ratio", order=30)
+def path_figures(view: WorkspaceView) -> dict[str, Figure] | None:
     """``path``: the mechanism with the point's path, coloured by its speed ratio; ``speed_ratio`` over the drive."""
-    path = result.tables["path"]
-    return {"path": _path(study, path, before), "speed_ratio": _speed(study, path)}
+    if "path" not in view.result.tables:
+        return None
+    path = view.result.tables["path"]
+    return {"path": _path(view.study, path, view.before), "speed_ratio": _speed(view.study, path)}
 
 
 def _ends(ratio: Floats) -> tuple[float, bool]:

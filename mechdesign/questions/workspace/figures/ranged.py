@@ -23,20 +23,26 @@ from mechdesign.questions.workspace.figures.regions import (
     places,
     sheet,
 )
+from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.schema import Over
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
 from mechdesign.report.figures.overlay import name_both
-from mechdesign.results import Result, Table
+from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
 from mechdesign.study import Study
 
 
-def range_figures(study: Study, result: Result, before: Before | None) -> dict[str, Figure]:
+@picture(WorkspaceView, "workspace", "range", order=20)
+def range_figures(view: WorkspaceView) -> dict[str, Figure] | None:
     """``workspace``: the region and what ends it, with the sketch; ``range``: which value decides there."""
+    study, result, before = view.study, view.result, view.before
     section = study.workspace
     assert section is not None
+    if "path" in result.tables or "local" in result.tables:
+        return None
     (name, over), *_ = ((name, values) for name, values in section.at.items() if isinstance(values, Over))
     indices, boundary = result.tables["indices"], result.tables["boundary"]
     others = [other for other in section.at if other != name and other in indices]

@@ -1,0 +1,23 @@
+"""What pictures of a motion show."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.report.figures.pictures import View
+from mechdesign.report.figures.scene import Sweep
+
+
+class MotionView(View):
+    """A motion, or poses one by one: lists of poses have neither curves nor paths, grids only their assemblies."""
+
+    @cached_property
+    def drawn(self) -> DrawnMotion:
+        """The solved poses and what makes some special."""
+        return DrawnMotion.of(self.result)
+
+    @cached_property
+    def sweep(self) -> Sweep:
+        """The solved poses with the paths of their points."""
+        return Sweep.of(self.drawn.shown)

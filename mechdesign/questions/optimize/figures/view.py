@@ -1,0 +1,36 @@
+"""What pictures of an optimisation show."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.questions.optimize.judge import Designs
+from mechdesign.report.figures.pictures import View
+from mechdesign.results import Table
+
+MIN_MAP_DESIGNS = 9
+
+
+class DesignsView(View):
+    """The designs of an optimisation with their goals, and the best."""
+
+    @cached_property
+    def drawn(self) -> DrawnDesigns:
+        """The designs and the best."""
+        return DrawnDesigns.of(self.result)
+
+    @property
+    def designs(self) -> Designs:
+        """The designs with variables and goals."""
+        return self.drawn.designs
+
+    @property
+    def mapped(self) -> bool:
+        """Whether score and goals are maps over two variables."""
+        return len(self.designs.variables) == 2 and len(self.designs) >= MIN_MAP_DESIGNS
+
+    @property
+    def front(self) -> Table | None:
+        """The front of designs that no other is better than in every goal."""
+        return self.result.tables.get("pareto")
