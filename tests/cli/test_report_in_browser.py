@@ -14,6 +14,7 @@ from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.page import Answered, report
@@ -21,7 +22,6 @@ from mechdesign.report.page.printing import pdf
 from mechdesign.report.page.section import section
 from mechdesign.report.page.vector import picture
 from mechdesign.report.requirements import requirements
-from mechdesign.report.writer import figures
 from mechdesign.study import load
 
 try:

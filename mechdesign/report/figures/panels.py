@@ -142,7 +142,7 @@ def tick_abscissa(axis: Axes, swept: Along) -> None:
     The axes that share them are marked as panels over what is swept; a page moves a cursor through them.
     """
     for panel in axis.get_shared_x_axes().get_siblings(axis):
-        panel.set_label(f"{OVER}{swept.label}")  # type: ignore[arg-type]
+        panel.set_label(f"{OVER}{swept.label}")
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
     inches = axis.get_position().width * style.width()
     axis.xaxis.set_major_locator(

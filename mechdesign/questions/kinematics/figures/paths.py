@@ -87,7 +87,7 @@ def paths_figure(
     if rows := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    axes.set_label(PLANE)  # type: ignore[arg-type]
+    axes.set_label(PLANE)
     for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
         path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
         axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,

@@ -269,7 +269,7 @@ def sheet(
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
-        axes.set_label(PLANE)  # type: ignore[arg-type]
+        axes.set_label(PLANE)
         axes.set_title(name, loc="left", fontsize=9.5)
     figure.text(LEFT / style.width(), 1 - 0.12 / outer, title, va="top", fontsize=11)
     colors = None
