@@ -237,10 +237,19 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for answer in answers:
+        meanings = _meanings(answer.section)
         for k, verdict in zip_longest([*judged_by(study, answer.command), *of_warnings], answer.verdicts):
             about = {"command": answer.command, "verdict": verdict, "met": verdict is not None and verdict.met}
-            rows.append((answer.command == SWEEP.name, k, about | rules[k]))
+            about |= {"meaning": meanings.get(rules[k]["what"].strip("|"), ""), **rules[k]}
+            rows.append((answer.command == SWEEP.name, k, about))
     return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
+
+
+def _meanings(section: Mapping[str, Any] | None) -> dict[str, str]:
+    """Meanings of the columns of a result that have no unit, such as indices."""
+    tables = section["tables"] if section is not None else ()
+    columns = (column for table in tables for column in table["columns"])
+    return {column["name"]: column["meaning"] for column in columns if column["numeric"] and not column["unit"]}
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:
