@@ -333,8 +333,10 @@ def tell(outcome: Outcome, study: Study, options: Options) -> None:
 
 def write_report(
     directory: Path, study: Study, outcomes: Sequence[Outcome], options: Options, left: Sequence[str] = ()
-) -> None:
-    """Write a study's report from the files of its questions; `left` are questions that were not answered.
+) -> list[Mapping[str, str]]:
+    """Write a study's report from the files of its questions, and return its key numbers.
+
+    `left` are questions that were not answered.
 
     Raises
     ------
@@ -361,6 +363,7 @@ def write_report(
         writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
         printed = f", printed in {directory / pages.PRINTED}"
     terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
+    return [number for each in told if each.section is not None for number in each.section["headlines"]]
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:

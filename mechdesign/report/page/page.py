@@ -68,13 +68,25 @@ class Entry:
 
     name: str
     label: str
-    answers: Sequence[tuple[str, str, int]]  # command, outcome in words and exit code
+    answers: Sequence[tuple[str, str, int]] = ()  # command, outcome in words and exit code
     met: int = 0
     required: int = 0
     warnings: int = 0
+    numbers: Sequence[Mapping[str, str]] = ()  # some of its key numbers, see `Headline`
     drawing: str = ""  # an image as a data URI
     link: str = ""  # to its report; empty where there is none
     failed: str = ""  # why there is none
+    outcome: str = ""  # the same in a word or two
+
+    @property
+    def verdict(self) -> tuple[int, str]:
+        """Its place among all verdicts, and the verdict in a word or two."""
+        wrong = next((word for _, word, code in self.answers if code > 1), self.outcome)
+        if any(code == 1 for _, _, code in self.answers):
+            return 0, "NOT MET"
+        if wrong:
+            return 1, wrong
+        return (2, "met") if self.required else (3, "nothing required")
 
 
 def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: bool = True) -> bytes:
@@ -93,10 +105,14 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     moving = {section["command"]: section["moving"] for section in sections if section["moving"] is not None}
     # The mechanism beside the answers moves through a motion, if there is one.
     lead = next((name for name, part in moving.items() if "given" in part["data"]), next(iter(moving), ""))
+    parts = ["moving"] * bool(moving)
+    parts += ["sorted"] * any(table["sorted"] for section in sections for table in section["tables"])
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
     drawing = drawing or (_sketch(study) if plots else "")
     drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
+    # Each design of a front has a drawing.
+    drawings += [each.get("drawing", "") for part in moving.values() for each in part["data"].get("choices", ())]
     drawings += [picture["html"] for section in sections for picture in section["pictures"]]
     first, more = _divided({section["command"]: section["headlines"] for section in sections})
     return _page(
@@ -106,6 +122,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         lead=lead,
         first=first,
         more=more,
+        parts=parts,
         study=study,
         about=_about(study),
         drawing=drawing,
@@ -154,8 +171,9 @@ def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, 
 
 
 def index(entries: Sequence[Entry]) -> bytes:
-    """The page of several studies, a row each."""
-    return _page("index.html.j2", moving={}, drawings=(), entries=entries, version=version("mechdesign"))
+    """The page of several studies, a row each: first those that will not do, then by their names."""
+    entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
+    return _page("index.html.j2", entries=entries, version=version("mechdesign"))
 
 
 def _sketch(study: Study) -> str:
@@ -192,20 +210,20 @@ def thumbnail(study: Study) -> str:
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
-def _page(template: str, *, moving: Mapping[str, Any], drawings: Iterable[str], **content: Any) -> bytes:
+def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] = (), **content: Any) -> bytes:
+    """A page with the scripts of some parts, and the colours of some drawings on a dark screen."""
     environment = Environment(
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
-    styles = _text("page.css") + (_text("moving.css") if moving else "") + dark(drawings)
-    script = _text("page.js") + (_text("moving.js") if moving else "")
+    styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
+    script = "".join(_text(f"{part}.js") for part in ("page", *parts))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
     policy += [f"script-src {_hash(script)}"]
     text = environment.get_template(template).render(
         **content,
-        moving=moving,
         generator=Markup(GENERATOR),
         policy="; ".join([*policy, "base-uri 'none'", "form-action 'none'"]),
         # These texts are files of the package, and none contains the end tag of its element.

@@ -21,6 +21,7 @@ from mechdesign.results import Column, Table
 # Integers in a unit of a drawing, and in a degree.
 PLACES = 20
 TURNS = 100
+TIMES = 10_000  # in the time of a motion
 # Digits of integers.
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 _BASE = 32
