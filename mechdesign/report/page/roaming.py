@@ -32,7 +32,7 @@ from mechdesign.study import Study
 # Cells along the larger side of a region, each with at most one pose: for a single region, and for each of several.
 CELLS = 60
 FEW_CELLS = 32
-_DPI = 84  # of the map of an index
+_DPI = 72  # of the map of an index
 _SWATCH = 16.0  # width of a colour in the legend
 _NAMED_POSES = 12  # in which names keep off the links
 _LINE = 17.0  # height of a line of the legend, in the drawing's units
