@@ -48,7 +48,7 @@ def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
-    what = f"the steps of {poses.swept} are" if poses.swept is not None else "the steps of the path are"
+    what = f"the steps of {poses.swept or 'the path'} are"
     return [Caution(
         "incomplete",
         f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "

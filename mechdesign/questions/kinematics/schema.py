@@ -95,8 +95,12 @@ class KinematicsSection(MotionSection):
                 checker.report(path, f"{' and '.join(pair)} are listed twice")
             seen.add(frozenset(pair))
         drives = len(checker.mechanism.drives)
-        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
-            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+        moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
+        if self.instant_centres and drives > 1 and not moved:
+            message = (
+                f"with {drives} drives instant centres depend on how fast each moves: give 'rates', a 'speed' or a "
+                "'motion'"
+            )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
 
     def _check_advantage(self, checker: Checker) -> None:

@@ -17,7 +17,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, Sector, Sectors
+from mechdesign.study.poses import TIME, Poses, Sector, Sectors
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
@@ -66,7 +66,9 @@ def along(study: Study, poses: Poses) -> Along | None:
 
 
 def abscissa(study: Study, poses: Poses) -> Along:
-    """The one coordinate that moves, always the same way, or else the number of the pose."""
+    """Time, the one coordinate that moves, always the same way, or else the number of the pose."""
+    if poses.times is not None:
+        return Along(poses.times, style.axis_label(TIME, study.units.label("time")), TIME)
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(poses.numbers + 1, "pose along the path")

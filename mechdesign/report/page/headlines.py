@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.questions.columns import DRIVE, GIVEN, key_numbers
+from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
 from mechdesign.questions.workspace.columns import HELD
 from mechdesign.report.cases import best_of
@@ -25,7 +25,7 @@ _RATES_AND_FORCES = [
     MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
 ]
 # Kinds of columns that say which pose a row is of.
-_POSE = (DRIVE, GIVEN, HELD)
+_POSE = (TIMED, DRIVE, GIVEN, HELD)
 # A number below this part of the others in its unit is zero up to rounding.
 _NOISE = 1e-12
 _DIGITS = 4
