@@ -221,7 +221,7 @@ class Along:
         places = self.snapped(np.where(known, s, 0.0))
         if poses.swept is not None:
             given = poses.abscissa.reshape(-1, poses.line)
-            values = poses.along(line, places).abscissa
+            values = poses.along(line, places).named[poses.swept]
             near = AT_GIVEN_PLACE * np.ptp(given)
             row = given[line, np.clip(np.round(places), 0, poses.line - 1).astype(np.intp)]
             places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))

@@ -109,10 +109,11 @@ class Course(fields.Model):
         quantity = checker.coordinate(name, path, at_key=True)
         if quantity not in ("length", "angle"):
             return
+        if self.held is not None:
+            checker.kind((*path, "held"), quantity)
         for index in range(len(self.segments or ())):
             for key in ("from", "to"):
                 checker.kind((*path, "segments", index, key), quantity)
-        checker.kind((*path, "held"), quantity)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:

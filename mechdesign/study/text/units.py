@@ -192,6 +192,11 @@ class Units:
         """Radians in one unit of angle."""
         return _scale(self.angle)
 
+    @cached_property
+    def time_factor(self) -> float:
+        """Seconds in one unit of time."""
+        return _scale(self.time)
+
     def label(self, kind: str) -> str:
         """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
         length, angle, time, force = KINDS[kind]
