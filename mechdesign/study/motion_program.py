@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.errors import StudyError
-from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.point_paths import bends, between, table_of
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import Course
@@ -26,7 +26,7 @@ SHORTEST, RISING = 1e-6, 1e-12
 
 @dataclass(frozen=True, eq=False)
 class TimedCourse:
-    """A coordinate over time, phase by phase: value + rise (sum of powers[j] u^j + amplitude sin(frequency u + shift)).
+    """A coordinate over time, phase by phase: value + rise s(u), by a law's phases `schema.motion_laws.Phase`.
 
     u is the time from ``origin`` on, over ``duration``. Arrays are of shape (designs, phases), of one design where all
     are alike.
@@ -38,7 +38,8 @@ class TimedCourse:
     value: Floats
     rise: Floats
     powers: Floats  # shape (phases, powers)
-    waves: Floats  # amplitude, frequency and shift, shape (phases, 3)
+    waves: Complexes  # shape (phases,)
+    frequencies: Floats
     marks: Floats  # times at which segments end, shape (designs, segments); none of what is held
 
     def at(self, line: Ints, phase: Ints, time: Floats, order: int = 0) -> Floats:
@@ -52,8 +53,8 @@ class TimedCourse:
         for column in powers.T[::-1]:
             s = s * u + column
         if self.waves.any():
-            amplitude, frequency, shift = self.waves[phase].T
-            s += amplitude * frequency**order * (1j**order * np.exp(1j * (frequency * u + shift))).imag
+            frequency = self.frequencies[phase]
+            s += (self.waves[phase] * 1j**order * np.exp(1j * frequency * u)).imag * frequency ** (order - 1.0)
         return np.asarray(self.rise[own] * s / duration**order + (self.value[own] if order == 0 else 0.0))
 
     def take(self, designs: Ints) -> TimedCourse:
@@ -163,7 +164,9 @@ def number_of_instants(
 ) -> Ints:
     """How many poses the motion of each design has, shape (designs,) or (1,); -1 where it is none."""
     courses = _courses(motion, folder, value)
-    wrong = np.logical_or.reduce([np.zeros(1, dtype=bool), *(wrong for wrong, _ in _faults(courses))])
+    wrong = np.zeros(1, dtype=bool)
+    for fault, _ in _faults(courses):
+        wrong = wrong | fault
     return np.where(wrong, -1, _times(courses, instants)[1])
 
 
@@ -180,7 +183,7 @@ def _courses(
             assert given.held is not None
             held = table_of([[given.held]], value)[..., 0]
             one, none = np.ones_like(held), np.zeros_like(held)
-            courses[name] = TimedCourse(none, none, one, held, none, none[:1], np.zeros((1, 3)), none[:, :0])
+            courses[name] = TimedCourse(none, none, one, held, none, none[:1], *_still(1), none[:, :0])
     return courses
 
 
@@ -201,13 +204,14 @@ def _by_laws(name: str, given: Course, value: Callable[[float], Floats]) -> Time
         parts += own
     widest = max(len(part.powers) for part in parts)
     powers = np.array([[*part.powers, *[0.0] * (widest - len(part.powers))] for part in parts])
-    waves = np.array([[part.amplitude, part.frequency, part.shift] for part in parts])
+    waves = np.array([part.wave for part in parts], dtype=complex)
+    frequencies = np.array([part.frequency for part in parts], dtype=float)
     origin: Floats = ends[:, which]
     duration: Floats = durations[:, which]
     begins: Floats = np.array([part.begin for part in parts])
     return TimedCourse(
         origin + begins * duration, origin, duration, table[:, which, 1], np.diff(table[..., 1])[:, which], powers,
-        waves, ends[:, 1:],
+        waves, frequencies, ends[:, 1:],
     )  # fmt: skip
 
 
@@ -227,7 +231,12 @@ def _spline(folder: Folder, file: str) -> TimedCourse:
     steps = np.diff(times)
     powers = curve.c[::-1].T * steps[:, None] ** np.arange(4)
     begin, one = times[None, :-1], np.ones((1, len(steps)))
-    return TimedCourse(begin, begin, steps[None], 0 * one, one, powers, np.zeros((len(steps), 3)), times[None, -1:])
+    return TimedCourse(begin, begin, steps[None], 0 * one, one, powers, *_still(len(steps)), times[None, -1:])
+
+
+def _still(phases: int) -> tuple[Complexes, Floats]:
+    """Waves, and their frequencies, of phases without any."""
+    return np.zeros(phases, dtype=complex), np.ones(phases)
 
 
 def _faults(courses: Mapping[str, TimedCourse]) -> Iterator[tuple[Flags, str]]:

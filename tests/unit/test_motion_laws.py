@@ -344,3 +344,67 @@ def test_units_of_time_and_angle_are_the_studys(tmp_path: Path) -> None:
     assert table.column("time").unit == "min"
     assert table["time"][-1] == pytest.approx(0.5)
     assert table["theta_velocity"][3] == pytest.approx(math.pi)
+
+
+def test_reliability_has_the_rates_of_each_instant(tmp_path: Path) -> None:
+    motion = "motion: {theta: [{from: 40, to: 100, time: 0.3, law: cycloidal}]}"
+    asks = "dimensions: {rod.length: 0.05}, outputs: [P.x], methods: [analytic]"
+    timed = mechdesign.reliability(load(f"reliability: {{{motion}, instants: 4, {asks}}}", tmp_path)).tables["moments"]
+    rows = np.flatnonzero((timed["time"] > 0.05) & (timed["time"] < 0.15))
+    drive = asked(f"kinematics: {{{motion}, instants: 4}}", tmp_path).tables["motion"]
+    rates = (
+        f"rates: {{theta: {drive['theta_velocity'][1]}}}, accelerations: {{theta: {drive['theta_acceleration'][1]}}}"
+    )
+    listed = f"reliability: {{poses: [{{theta: {drive['theta'][1]}}}], {rates}, {asks}}}"
+    alone = mechdesign.reliability(load(listed, tmp_path)).tables["moments"]
+    assert timed["order"][rows].tolist() == alone["order"].tolist() == ["position", "velocity", "acceleration"]
+    np.testing.assert_allclose(timed["sigma"][rows], alone["sigma"], rtol=1e-9)
+
+
+def test_other_questions_take_the_poses_of_the_motion(tmp_path: Path) -> None:
+    text = """
+kinematics: {motion: {theta: [{from: 40, to: 100, time: 0.3}]}, instants: 7}
+stiffness:
+  {link: rod, at: P, sections: {bar: {E: 2e5, width: 4, height: 8}}, elastic: {rod: bar}, actuators: {theta: 3e7}}
+reliability: {dimensions: {rod.length: 0.05}, limits: {P.x: 0.1}, methods: [analytic]}
+"""
+    study = load(text, tmp_path)
+    for table in (mechdesign.stiffness(study).tables["stiffness"], mechdesign.reliability(study).tables["reliability"]):
+        assert "time" in table.names
+        # The row of all poses together has no time.
+        times = table["time"][np.isfinite(table["time"])]
+        assert np.unique(times) == pytest.approx(np.linspace(0, 0.3, 7))
+    for key, words in (("rates: {theta: 3}", "those of the motion of kinematics"), ("speed: 3", "leave out 'speed'")):
+        told = problems(text.replace("{dimensions", f"{{{key}, dimensions"), tmp_path)
+        assert words in told
+    told = problems(text.replace("P.x: 0.1", "P.x_velocity: 0.1"), tmp_path)
+    assert "needs 'rates', a 'speed' or a 'motion'" in told
+
+
+def test_designs_are_judged_as_if_each_were_asked_alone(tmp_path: Path) -> None:
+    """The time of a move and its rise are design variables: poses differ in number and in place."""
+    text = """
+kinematics:
+  motion: {theta: [{from: 40, to: 40 + rise, time: fast, law: harmonic}, {dwell: 0.1}, {to: 40, time: 0.4}]}
+  outputs: [P]
+  instants: 9
+optimize:
+  variables: {rise: {from: 50, to: 70, number: 2}, fast: {from: 0.1, to: 0.3, number: 5}}
+  minimize: [{result: kinematics.P.x_acceleration.peak}, {result: kinematics.P.y.mean}]
+"""
+    study = load(text, tmp_path)
+    designs = mechdesign.optimize(study).tables["designs"]
+    goals = [name for name in designs.names if name.startswith("kinematics")]
+    assert len(designs) == 10
+    assert len(np.unique(designs[goals[0]])) == 10
+    for k in range(len(designs)):
+        values = {f"mechanism.parameters.{name}": float(designs[name][k]) for name in ("rise", "fast")}
+        extremes = mechdesign.kinematics(mechdesign.load(study.path, values)).tables["extremes"]
+        row = extremes["output"].tolist().index("P.x_acceleration")
+        peak = max(-extremes["min"][row], extremes["max"][row])
+        assert designs[goals[0]][k] == pytest.approx(peak, rel=1e-9)
+        # The mean is over time.
+        many = mechdesign.load(study.path, {**values, "kinematics.instants": 20001})
+        table = mechdesign.kinematics(many).tables["motion"]
+        mean = np.trapezoid(table["P.y"], table["time"]) / table["time"][-1]
+        assert designs[goals[1]][k] == pytest.approx(mean, rel=1e-7)

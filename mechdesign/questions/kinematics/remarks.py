@@ -49,7 +49,7 @@ def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
-    what = f"the steps of {poses.swept or 'the path'} are"
+    what = f"the steps of {'the motion' if poses.program is not None else poses.swept or 'the path'} are"
     return [Caution(
         "incomplete",
         f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
@@ -207,8 +207,8 @@ def _jumps(question: MotionQuestion, program: MotionProgram) -> list[Caution]:
     first = pose_in_words(question.study, question.poses, row)
     return [Caution(
         "incomplete",
-        f"the velocity jumps at {counted(int(np.count_nonzero(jumps)), 'instant')}, the first: {first}; the acceleration "
-        "that a jump takes is in no row; of the laws only 'constant' jumps",
+        f"the velocity jumps at {counted(int(np.count_nonzero(jumps)), 'instant')}, the first: {first}; the "
+        "acceleration that a jump takes is in no row; of the laws only 'constant' jumps",
         _TABLE, row, first,
     )]  # fmt: skip
 

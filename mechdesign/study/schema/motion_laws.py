@@ -6,19 +6,19 @@ chapter on cam design; VDI 2143.]
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Part of a law, ``s = sum of powers[j] u^j + amplitude sin(frequency u + shift)``, from a time on."""
+    """Part of a law, ``s = sum of powers[j] u^j + Im(wave exp(i frequency u))/frequency``, from a time on."""
 
     begin: float
     powers: tuple[float, ...]
-    amplitude: float = 0.0
-    frequency: float = 0.0
-    shift: float = 0.0
+    wave: complex = 0.0
+    frequency: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ LAWS = {
     "constant": Law("constant velocity, which jumps at both ends", (Phase(0, (0, 1)),), 1, 0),
     "harmonic": Law(
         "half a wave of a cosine; the acceleration jumps at both ends",
-        (Phase(0, (0.5,), 0.5, math.pi, -math.pi / 2),), math.pi / 2, math.pi**2 / 2,
+        (Phase(0, (0.5,), -0.5j * math.pi, math.pi),), math.pi / 2, math.pi**2 / 2,
     ),
     "cycloidal": Law(
         "a whole sine wave of acceleration, without jumps",
-        (Phase(0, (0, 1), -0.5 / math.pi, 2 * math.pi),), 2, 2 * math.pi,
+        (Phase(0, (0, 1), -1, 2 * math.pi),), 2, 2 * math.pi,
     ),
     "polynomial345": Law(
         "10 u^3 - 15 u^4 + 6 u^5, without jumps of acceleration",
@@ -65,9 +65,9 @@ LAWS = {
     "modified_sine": Law(
         "a slow sine wave of acceleration between two fast quarters, without jumps",
         (
-            Phase(0, (0, _SLOW), -_SLOW / (4 * math.pi), 4 * math.pi),
-            Phase(1 / 8, (2 / (4 + math.pi), _SLOW), -9 / (4 * (4 + math.pi)), 4 * math.pi / 3, math.pi / 3),
-            Phase(7 / 8, (4 / (4 + math.pi), _SLOW), -_SLOW / (4 * math.pi), 4 * math.pi),
+            Phase(0, (0, _SLOW), -_SLOW, 4 * math.pi),
+            Phase(1 / 8, (2 / (4 + math.pi), _SLOW), -3 * _SLOW * cmath.exp(1j * math.pi / 3), 4 * math.pi / 3),
+            Phase(7 / 8, (4 / (4 + math.pi), _SLOW), -_SLOW, 4 * math.pi),
         ), 4 * _SLOW, 4 * math.pi * _SLOW,
     ),
     "trapezoidal": Law(
