@@ -79,10 +79,6 @@ class Series:
         Of shapes (functions, pieces, nodes), twice, and (pieces,).
         """
         s = pieces.nodes
-        if self.curve.poses.program is not None:
-            # At a jump of a rate a piece has at its end what is before the jump.
-            last = np.isin(pieces.end, self.curve.poses.corners)
-            s[last, -1] = np.nextafter(s[last, -1], -1.0)
         values, conditioning = self._values(np.repeat(pieces.line, s.shape[1]), s.ravel())
         values = values.reshape(len(self.names), *s.shape)
         divisors = np.ones_like(values)

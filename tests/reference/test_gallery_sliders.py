@@ -146,7 +146,7 @@ def test_v_twin_has_a_primary_force_of_constant_size() -> None:
 
 
 def test_pusher_moves_by_its_laws_and_its_servo_by_the_law_of_cosines() -> None:
-    """Peaks of the modified sine, 1.760 h/T and 5.528 h/T^2, and of the polynomial 3-4-5, 1.875 and 5.774; h = 50 mm."""
+    """Peaks of the modified sine, 1.760 h/T and 5.528 h/T^2, and of the 3-4-5 polynomial, 1.875; h = 50 mm."""
     result = result_of("rise_dwell_return")
     motion, extremes = result.tables["motion"], result.tables["extremes"]
     slow = np.pi / (4 + np.pi)

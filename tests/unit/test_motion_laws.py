@@ -20,6 +20,7 @@ from mechdesign.study.schema.motion_laws import LAWS
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.text.inputs import Folder
 
+ROOT = Path(__file__).parents[2]
 MECHANISM = """
 mechanism:
   parameters: {rise: 90, fast: 0.3}
@@ -104,6 +105,13 @@ def test_peaks_are_the_printed_ones(law: str) -> None:
     velocity, acceleration = PRINTED[law]
     assert declared.velocity == pytest.approx(velocity, abs=6e-4)
     assert declared.acceleration == pytest.approx(acceleration, rel=2e-3)
+
+
+def test_page_has_the_peaks_of_every_law() -> None:
+    page = (ROOT / "docs" / "howto" / "motion_laws.md").read_text(encoding="utf-8")
+    rows = re.findall(r"\| `(\w+)` \| ([\d.]+) \| ([\d.]+)", page)
+    declared = [(name, f"{law.velocity:.3f}", f"{law.acceleration:.3f}") for name, law in LAWS.items()]
+    assert rows == declared
 
 
 @pytest.mark.parametrize("law", ["cycloidal", "polynomial345", "polynomial4567", "modified_sine"])

@@ -65,7 +65,7 @@ CONTRIBUTIONS = TableKind.of("contributions", "what the errors come from",
     ("sobol_total_high",
      "share that the source causes by itself and together with others, upper end of its interval, 99.7 %"))  # fmt: skip
 DENSITY = TableKind.of("density", "density of two errors: bivariate normal and simulation [S2, Figs. 4, 5]",
-    TIMED, GIVEN, ("<output>_error", "centre of the cell", "as the output"),
+    GIVEN, ("<output>_error", "centre of the cell", "as the output"),
     ("x, y", "error of <output> about its mean, in deviations of the first order"),
     ("normal", "bivariate normal density, standardised"),
     ("simulated", "density of the samples, standardised"))  # fmt: skip
