@@ -31,6 +31,7 @@ from typing import Any
 
 import yaml
 from forking import forked
+from steps import step
 
 import mechdesign
 from mechdesign.errors import MechdesignError
@@ -230,7 +231,9 @@ def _run(tools: Path, path: Path) -> tuple[str, list[str]]:
             page.printed = ""
         return f"{found['fence']}{found['kind']}\n{body}{found['fence']}"
 
-    return _FENCE.sub(block, path.read_text(encoding="utf-8")), page.wrong
+    with step(f"examples of {path.relative_to(ROOT)}"):
+        text = _FENCE.sub(block, path.read_text(encoding="utf-8"))
+    return text, page.wrong
 
 
 def pages(names: Iterable[str] = ()) -> list[Path]:

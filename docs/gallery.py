@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container, Iterable
 from pathlib import Path
 
 import yaml
+from steps import step
+from thumbnails import thumbnail
 
 ROOT = Path(__file__).parents[1]
 CONFIGS = ROOT / "configs"
@@ -25,6 +28,9 @@ GROUPS = {
                     "bored_in_one_setting", "cheapest_tolerances", "one_in_a_billion", "five_bar_precision_map"),
     "Stiffness": ("planar_3rpr", "planar_2rpr_rp", "planar_rp_rr", "press_stiffness", "stiffness_map", "loaded_arm"),
 }  # fmt: skip
+# Of the home page: mechanisms that look unlike each other.
+HOME = ("four_bar", "jansen", "shaper", "five_bar", "scissor_lift", "v_twin", "peaucellier", "excavator", "watt",
+        "pantograph", "klann", "trammel")  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
 PICTURES = ("optimum", "allocation", "deflections", "failure_map", "density_contours", "springs", "workspace", "paths",
             "bands", "density", "reliability")  # fmt: skip
@@ -53,35 +59,74 @@ def _block(found: re.Match[str]) -> str:
     return "\n".join((f"```{kind}", *lines, "```", ""))
 
 
-def picture(results: Path) -> Path | None:
+def results(path: Path) -> Path:
+    """The folder of the shipped results of a study."""
+    return ROOT / "results" / path.relative_to(CONFIGS).with_suffix("")
+
+
+def picture(folder: Path) -> Path | None:
     """The picture of a study's results that says most."""
-    found = {path.stem: path for path in sorted(results.rglob("*.png"))}
+    found = {path.stem: path for path in sorted(folder.rglob("*.png"))}
     return next((found[name] for name in PICTURES if name in found), None)
+
+
+def title(path: Path) -> str:
+    """What a study is called."""
+    return str(yaml.safe_load(path.read_text(encoding="utf-8")).get("name") or path.stem)
 
 
 def page(path: Path) -> str:
     """The page of one study."""
     text = path.read_text(encoding="utf-8")
-    title = yaml.safe_load(text).get("name") or path.stem
-    shown = picture(ROOT / "results" / path.relative_to(CONFIGS).with_suffix(""))
+    shown = picture(results(path))
     place = path.relative_to(ROOT).as_posix()
-    parts = [f"# {title}", comment(text)]
+    parts = [f"# {title(path)}", comment(text)]
     if shown is not None:
-        parts.append(f"![{title}](../../{shown.relative_to(ROOT).as_posix()})")
+        parts.append(f"![{title(path)}](../../{shown.relative_to(ROOT).as_posix()})")
     begin = len(_opening(text)) + 1
     parts.append(f"```sh\nmechdesign run {place}\n```\n\n`{place}`:")
     parts.append(f"```{{literalinclude}} ../../{place}\n:language: yaml\n:lines: {begin}-\n```")
     return "\n\n".join(parts) + "\n"
 
 
-def pages() -> dict[str, str]:
-    """The texts of all pages and of their list, by their paths in the folder of the site."""
-    found = studies()
+def wall(names: Iterable[str], moving: Container[str], folder: str = "") -> str:
+    """Thumbnails of studies, each a link to its page: those that move, and pictures of the results of the others.
+
+    `folder` is the way from the page with the wall to the gallery.
+    """
+    found, lines = studies(), []
+    for name in names:
+        shown = picture(results(found[name]))
+        if name in moving:
+            image = f"![]({folder}{name}.svg)"
+        elif shown is not None:
+            up = "../" if folder else "../../"
+            image = f"![]({up}{shown.relative_to(ROOT).as_posix()})"
+        else:
+            image = ""
+        lines.append(f"[{image} {title(found[name])}]({folder}{name}.md)")
+    return "\n\n".join((":::{container} wall", *lines, ":::"))
+
+
+def pages(moving: Container[str] = ()) -> dict[str, str]:
+    """The texts of all pages and of their list, by their paths in the site; thumbnails of `moving` studies move."""
     parts = ["# Gallery", "Every study here is in the repository, runs as it is, and is tested against its source."]
     for group, names in GROUPS.items():
         listed = "\n".join(names)
-        parts.append(f"## {group}\n\n```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```")
+        parts.append(f"## {group}\n\n{wall(names, moving)}\n\n```{{toctree}}\n:hidden:\n\n{listed}\n```")
     return {
         "gallery/index.md": "\n\n".join(parts) + "\n",
-        **{f"gallery/{name}.md": page(path) for name, path in found.items()},
+        **{f"gallery/{name}.md": page(path) for name, path in studies().items()},
     }
+
+
+def with_thumbnails() -> dict[str, str]:
+    """All pages, the thumbnails that move, and the wall of the home page, by their paths in the folder of the site."""
+    moving: dict[str, str] = {}
+    for name, path in studies().items():
+        with step(f"thumbnail of {name}"):
+            svg = thumbnail(path)
+        if svg is not None:
+            moving[name] = svg
+    thumbnails = {f"gallery/{name}.svg": svg for name, svg in moving.items()}
+    return pages(moving) | thumbnails | {"gallery/_home.md": wall(HOME, moving, "gallery/") + "\n"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import examples
@@ -11,10 +12,13 @@ import papers
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.typing import ExtensionMetadata
+from steps import step
 
 ROOT = Path(__file__).parent
 # What makes pages: functions that give their texts by their paths.
-MAKERS = (gallery.pages, lists.pages, papers.pages)
+MAKERS = (gallery.with_thumbnails, lists.pages, papers.pages)
+# Reports that pages show, by their names in the folder `_static`: what an example has written.
+REPORTS = {"first_four_bar.html": "tutorials/first_four_bar/results/study/kinematics/report.html"}
 
 
 def write(app: Sphinx) -> None:
@@ -26,7 +30,9 @@ def write(app: Sphinx) -> None:
         If an example does not do what its page says.
     """
     for maker in MAKERS:
-        for name, text in maker().items():
+        with step(f"pages of {maker.__module__}"):
+            texts = maker()
+        for name, text in texts.items():
             path = ROOT / name
             path.parent.mkdir(parents=True, exist_ok=True)
             if not path.exists() or path.read_text(encoding="utf-8") != text:
@@ -34,6 +40,8 @@ def write(app: Sphinx) -> None:
     # Pictures of the pages come from what their examples have written.
     if wrong := examples.wrong(examples.pages()):
         raise ExtensionError("\n\n".join(wrong))
+    for name, report in REPORTS.items():
+        shutil.copyfile(examples.RUN / report, ROOT / "_static" / name)
 
 
 def setup(app: Sphinx) -> ExtensionMetadata:

@@ -39,12 +39,18 @@ class Statistic(NamedTuple):
         Whether it has no unit; else it has that of the values.
     integral : bool
         Whether it contains a mean, which is an integral along a motion.
+    end : int
+        1 where it is the largest value, -1 where it is the smallest, else 0.
+    absolute : bool
+        Whether the end is that of the absolute values.
     """
 
     meaning: str
     of: Callable[[Spread], Floats]
     pure: bool = False
     integral: bool = False
+    end: int = 0
+    absolute: bool = False
 
 
 def _evenness(values: Spread) -> Floats:
@@ -53,12 +59,14 @@ def _evenness(values: Spread) -> Floats:
 
 
 STATISTICS: Mapping[str, Statistic] = {
-    "min": Statistic("smallest value", lambda values: values.end(-1)),
-    "max": Statistic("largest value", lambda values: values.end(1)),
+    "min": Statistic("smallest value", lambda values: values.end(-1), end=-1),
+    "max": Statistic("largest value", lambda values: values.end(1), end=1),
     "mean": Statistic("mean value", lambda values: values.mean(1), integral=True),
     "range": Statistic("largest less smallest value", lambda values: values.end(1) - values.end(-1)),
     "rms": Statistic("root of the mean square", lambda values: np.sqrt(values.mean(2)), integral=True),
-    "peak": Statistic("largest absolute value", lambda values: np.maximum(values.end(1), -values.end(-1))),
+    "peak": Statistic(
+        "largest absolute value", lambda values: np.maximum(values.end(1), -values.end(-1)), end=1, absolute=True
+    ),
     "evenness": Statistic("1 less the range over the mean absolute value", _evenness, pure=True, integral=True),
 }
 """Statistics by the word behind the name of a column.
@@ -67,8 +75,6 @@ The evenness is 1 less the coefficient of fluctuation, the range of a speed over
 Shigley's Mechanical Engineering Design, both in the chapter on flywheels). The divisor is the mean of the absolute
 values, as the mean of a quantity that changes its sign may be zero.
 """
-# Statistics that are the worst value where larger is worse (True), and where smaller is worse (False).
-WORST: Mapping[bool, frozenset[str]] = {True: frozenset(("", "max", "peak")), False: frozenset(("", "min"))}
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,12 +11,23 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 import signal
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 from hypothesis import settings
+
+try:
+    from playwright.sync_api import sync_playwright
+except ImportError:
+    sync_playwright = None
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 settings.register_profile("here", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -28,6 +39,20 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}  # of the units that --budget takes
 # Of each generation of the garbage collector, in place of 700, 10, 10.
 THRESHOLDS = (20_000, 20, 50)
+BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the pages"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """One browser for all tests of a file."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None or sync_playwright is None:
+        pytest.skip(ABSENT)
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
+        yield opened
+        opened.close()
 
 
 def seconds_of(text: str) -> float:

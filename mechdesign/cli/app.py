@@ -43,9 +43,10 @@ def _guard() -> Iterator[None]:
     except Exception as error:
         from mechdesign.cli.annotations import annotate, of_error
         from mechdesign.cli.docs import explained
+        from mechdesign.cli.terminal import folded
 
         code, message = explained(error)
-        print(message, file=sys.stderr)
+        print(folded(message, sys.stderr), file=sys.stderr)
         annotate("error", of_error(error, message))
         raise typer.Exit(code) from None
 

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
 _SUFFIXES = (".yaml", ".yml")  # of study files in a folder
+_NUMBERS = 4  # key numbers of a study in the index
 
 
 def questions(study: Study) -> tuple[str, ...]:
@@ -317,7 +318,7 @@ def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: boo
         pages.remove(task.root / pages.REPORT)
         return None
     left = [command for command, _ in task.questions if command not in {outcome.command for outcome in outcomes}]
-    write_report(task.root, study, outcomes, options, left)
+    numbers = write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
     from mechdesign.report.page.page import Entry, thumbnail
@@ -330,6 +331,7 @@ def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: boo
         met=sum(verdict.met for verdict in verdicts),
         required=sum(number_of(study, command) for command, _ in task.questions),
         warnings=len({warning for outcome in outcomes for warning in outcome.warnings}),
+        numbers=numbers[:_NUMBERS],
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
     )

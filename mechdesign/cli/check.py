@@ -38,7 +38,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
-                terminal.emit("\n".join([head, describe(study.mechanism), *clearances, ""]))
+                terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, ""]))
             doubts = sketch_doubts(study.mechanism)
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning} [suspect]", quiet=options.quiet)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import sys
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import typer
 
-from mechdesign.cli.terminal import emit
+from mechdesign.cli.terminal import emit_words
 from mechdesign.errors import AssemblyError, StudyError, explain
 from mechdesign.reference import Entry, below, entries, find, find_messages, holding, near, place
 
@@ -22,7 +20,6 @@ _INDENT = "  "
 _NAMED = 3
 # Three words or more without a name or a number.
 _WORDS = re.compile(r"(?<![\w.])[a-z]+(?: [a-z]+){2,}(?![\w.])")
-_NO_WRAPPING = 10_000
 _OVERVIEW = (
     "mechdesign docs WORD... tells what a word means: a key of the study by its path (kinematics.sweep) or its last "
     "part (sweep), a column, a command, an option, one of the words below, or a part of a message (in quotes)."
@@ -44,9 +41,8 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
             close = near(known, word)
             cure = f"; did you mean {close!r}?" if close else "; 'mechdesign docs' lists what there is"
             raise StudyError(f"the reference has no {word!r}{cure}")
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else _NO_WRAPPING
     texts = [_told(known, hits) for _, hits in found] or [_overview(known)]
-    emit("\n".join(_wrapped(line, width) for text in texts for line in text).rstrip("\n") + "\n")
+    emit_words("\n".join(line for text in texts for line in text).rstrip("\n") + "\n")
 
 
 def explained(error: Exception) -> tuple[int, str]:
@@ -130,9 +126,3 @@ def _overview(known: Sequence[Entry]) -> Iterator[str]:
     for kind, words in kinds.items():
         if kind != "key":
             yield f"{kind}: {', '.join(dict.fromkeys(words))}"
-
-
-def _wrapped(line: str, width: int) -> str:
-    """A line wrapped to the width of the terminal, its rest indented further."""
-    indent = " " * (len(line) - len(line.lstrip())) + _INDENT
-    return textwrap.fill(line, width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)

@@ -333,8 +333,10 @@ def tell(outcome: Outcome, study: Study, options: Options) -> None:
 
 def write_report(
     directory: Path, study: Study, outcomes: Sequence[Outcome], options: Options, left: Sequence[str] = ()
-) -> None:
-    """Write a study's report from the files of its questions; `left` are questions that were not answered.
+) -> list[Mapping[str, str]]:
+    """Write a study's report from the files of its questions, and return its key numbers.
+
+    `left` are questions that were not answered.
 
     Raises
     ------
@@ -355,6 +357,7 @@ def write_report(
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
     terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
+    return [number for each in told if each.section is not None for number in each.section["headlines"]]
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:

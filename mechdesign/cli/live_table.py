@@ -118,7 +118,7 @@ class LiveTable:
 
     def say(self, words: str) -> None:
         """Print messages above the table."""
-        words = terminal.coloured(words, self._stream)
+        words = terminal.readable(words, self._stream)
         if self._live is None:
             print(words, end="", file=self._stream, flush=True)
         elif words:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import sys
 import time
 from collections.abc import Iterable, Sequence
@@ -32,23 +33,44 @@ _NAMES = 6  # most names listed of columns that do not fit
 _HEAD = 18  # characters in a line of a column's head, unless a word is longer
 _WORDS = re.compile(r"(?<= )(?=[^ ])|(?<=\.)(?=[^\W\d])")  # where the words of a column's name begin
 _GREAT = 1_000_000  # poses, designs or samples from which a stage is announced
-_VERDICT = re.compile(r"(?<=: )(met|NOT MET)(?=, worst )")
-_COLOURS = {"met": "\x1b[32m", "NOT MET": "\x1b[1;31m"}  # green, and bold red
+_VERDICT = re.compile(r"(?<=:)(\s+)(met|NOT\s+MET)(?=,\s+worst\s)")
+_GREEN, _RED = "\x1b[32m", "\x1b[1;31m"
 _PLAIN = "\x1b[0m"
+_INDENT = 2  # characters by which the rest of a folded line is indented further
 DELAY = 1.0  # seconds before progress is shown
 
 
 def say(text: str, *, quiet: bool = False) -> None:
-    """Print a line to stderr, unless `quiet`."""
+    """Print a message to stderr, unless `quiet`."""
     if not quiet:
-        print(coloured(printable_lines(text), sys.stderr), file=sys.stderr, flush=True)
+        print(readable(printable_lines(text), sys.stderr), file=sys.stderr, flush=True)
+
+
+def readable(text: str, stream: TextIO) -> str:
+    """A text as people read it on a stream: on a terminal folded, and its verdicts in colour."""
+    return coloured(folded(text, stream), stream)
+
+
+def folded(text: str, stream: TextIO) -> str:
+    """A text whose lines a terminal shows without a break inside a word; elsewhere as it is."""
+    return _fold(text, shutil.get_terminal_size().columns) if stream.isatty() else text
+
+
+def _fold(text: str, width: int, further: int = _INDENT) -> str:
+    """A text in lines of at most this width, unless a word is longer; the rest of a line is indented further."""
+    lines = []
+    for line in text.split("\n"):
+        indent = " " * (len(line) - len(line.lstrip()) + further)
+        parts = wrap(line, width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)
+        lines += parts if len(line) > width else [line]
+    return "\n".join(lines)
 
 
 def coloured(text: str, stream: TextIO) -> str:
     """A text, with its verdicts in colour where the stream is a terminal with colours and ``NO_COLOR`` is not set."""
     if not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM", "dumb") == "dumb":
         return text
-    return _VERDICT.sub(lambda verdict: f"{_COLOURS[verdict[0]]}{verdict[0]}{_PLAIN}", text)
+    return _VERDICT.sub(lambda found: f"{found[1]}{_GREEN if found[2] == 'met' else _RED}{found[2]}{_PLAIN}", text)
 
 
 def _is_terminal() -> bool:
@@ -58,12 +80,19 @@ def _is_terminal() -> bool:
 def suggest(path: Path | None, *, quiet: bool) -> None:
     """Tell people at a terminal which file to open, as a line that they can paste into a shell."""
     if path is not None and _is_terminal():
-        say(f"open {shlex.quote(str(path))}", quiet=quiet)
+        line = f"open {shlex.quote(str(path))}"
+        if not quiet:
+            print(printable_lines(line), file=sys.stderr, flush=True)
 
 
 def emit(text: str) -> None:
     """Write data to stdout."""
     emit_all([text])
+
+
+def emit_words(text: str) -> None:
+    """Write lines for people to stdout, folded on a terminal."""
+    emit(folded(text, sys.stdout))
 
 
 def emit_all(texts: Iterable[str]) -> None:
@@ -92,9 +121,9 @@ def show(table: Table, *, as_json: bool, rest: Path | None = None, first: Sequen
 def show_lines(lines: Sequence[str]) -> None:
     """Write the first lines, and how many are left."""
     more = len(lines) - _ROWS
-    emit("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
+    emit_words("".join(f"{printable_lines(line)}\n" for line in lines[:_ROWS]))
     if more > 0:
-        emit(f"... {more} more; --out DIR writes all of them\n")
+        emit_words(f"... {more} more; --out DIR writes all of them\n")
 
 
 def _show_to_people(table: Table, rest: Path | None, first: Sequence[str]) -> None:
@@ -129,8 +158,7 @@ def _show_to_people(table: Table, rest: Path | None, first: Sequence[str]) -> No
         left.append(f"{len(hidden)} more columns ({', '.join(names)})")
     if left:
         words = f"... {' and '.join(left)}{f' in {rest}' if rest is not None else ''}"
-        lines = wrap(words, console.width, break_long_words=False, break_on_hyphens=False)
-        console.print(Text("\n".join(lines)), style="dim", soft_wrap=True)
+        console.print(Text(_fold(words, console.width, further=0)), style="dim", soft_wrap=True)
 
 
 def _place(name: str, first: Sequence[str]) -> int:

@@ -65,9 +65,11 @@ def entries() -> Iterator[Entry]:
         words = _words(reads)
         about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
         # Local indices have entries of their own: `mechdesign.reference.sources.indices`.
-        for what, word, text in _words(read for read in reads if read.words is not INDEX_NAMES):
-            before = chosen[what, word].where if (what, word) in chosen else ()
-            chosen[what, word] = Entry(word, what, text, where=(*before, key.path.replace(".*", "")))
+        for read in reads:
+            for word, each in (read.words or {}).items() if read.words is not INDEX_NAMES else ():
+                before = chosen[read.what, word].where if (read.what, word) in chosen else ()
+                text = getattr(each, "detail", "") or meaning(each)
+                chosen[read.what, word] = Entry(word, read.what, text, where=(*before, key.path.replace(".*", "")))
         yield Entry(
             word=key.path,
             kind=KIND,

@@ -28,7 +28,7 @@ requirements:
 FINE = (
     SLIDER.replace("to: 90, step: 45", "to: 360, step: 1") + "  rates: {theta: 10 rad/s}\n  outputs: [B, rod.angle]\n"
 )
-VOID = {"meta", "img", "br", "link", "input", "hr"}
+VOID = {"meta", "img", "br", "link", "input", "hr", "wbr"}
 
 
 class Page(HTMLParser):
@@ -189,16 +189,49 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     check(page)
     rows = [" ".join(text.split()) for text in page.said("tr")][1:]
     assert "stiffness: ✗ cannot be assembled" in rows[0]
-    assert "✗ 0 of 2 met" in rows[0]
+    assert "✗ NOT MET0 of 2 requirements met" in rows[0]
     assert "wrong study" in rows[1]
     assert "mechanism.links.crank" in rows[1]
-    assert "kinematics: ✓ done no requirements no warnings" in rows[2]
+    assert "kinematics: ✓ doneno warnings" in rows[2]
     assert [each["href"] for each in page.all("a")] == ["both/report.html", "slider/report.html"]
     assert len(page.all("img")) == 2
     failed = Page("results/both/report.html")
     check(failed)
     assert "cannot be assembled: cannot reach <there>" in " ".join(failed.said("p"))
     assert "not judged" in failed.text
+
+
+def test_an_index_begins_with_what_is_not_met_and_has_key_numbers(asks, invoke):
+    for name, limit in (("c", 30), ("a", 30), ("b", 200), ("z", 200)):
+        gate = f"requirements: [{{result: kinematics.extremes.B.x.range, at_least: {limit}}}]\n"
+        (asks / f"{name}.yaml").write_text(SLIDER.replace("Offset slider-crank", name) + gate)
+    studies = [f"{name}.yaml" for name in ("c", "z", "slider", "a", "b")]
+    done = invoke("run", *studies, "--report", "--no-plots", "--out", "all")
+    assert done.exit_code == 1, done.stderr
+    page = Page("all/index.html")
+    check(page)
+    assert [each["href"].partition("/")[0] for each in page.all("a")] == ["b", "z", "a", "c", "slider"]
+    assert [cell.split(" ")[0] for cell in page.said("td")[1::4]] == ["✗", "✗", "✓", "✓", "nothing"]
+    assert page.said("li")[0].startswith("range of A.x: 40")
+    assert "2 not met" in " ".join(page.said("span"))
+
+
+def test_the_index_of_an_interrupted_run_names_the_studies_that_were_not_answered(asks, analysis, invoke):
+    def interrupt(study, **options):
+        raise KeyboardInterrupt
+
+    analysis(interrupt, "stiffness")
+    (asks / "last.yaml").write_text(SLIDER)
+    done = invoke("run", "slider.yaml", "both.yaml", "last.yaml", "--report", "--no-plots", "--jobs", 1)
+    assert done.exit_code == 130
+    page = Page("results/index.html")
+    check(page)
+    rows = [" ".join(text.split()) for text in page.said("tr")][1:]
+    assert len(rows) == 3
+    assert "✗ interrupted" in rows[0]
+    assert "✗ not answered" in rows[1]
+    assert "✓ done" in rows[2]
+    assert not [*Path("results").glob(".*.tmp")]
 
 
 def test_an_interrupted_run_leaves_a_page_of_what_was_finished(asks, analysis, invoke):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.page.frames import frames
@@ -19,28 +21,16 @@ from mechdesign.report.page.section import section
 from mechdesign.study import load
 
 try:
-    from playwright.sync_api import expect, sync_playwright
+    from playwright.sync_api import expect
 except ImportError:
-    sync_playwright = None
+    expect = None
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-BROWSERS = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+# Of a sweep; the last cannot be built.
+FEW_CASES = ("matrix={vary: {mechanism.parameters.l: [5, 4, -1]}, results: [kinematics.extremes.B.x.range]}",)
 PIXELS = 0.2  # of the drawing: a step of the places and of the angles that the page has
-ABSENT = "no browser: install Debian's chromium-headless-shell and pip's playwright to look at the reports"
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """One browser for all."""
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None or sync_playwright is None:
-        pytest.skip(ABSENT)
-    with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=found, args=["--no-sandbox", "--disable-gpu"])
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +40,8 @@ def answers():
     for name, command, *overrides in (
         ("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics), ("five_bar", workspace),
         ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
+        ("gallery/straight_line_front", optimize, "optimize.evaluations=200"),
+        ("gallery/offset_slider_crank", sweep, *FEW_CASES),
     ):  # fmt: skip
         study = load(CONFIGS / f"{name}.yaml", overrides)
         found[Path(name).name] = study, command(study)
@@ -271,9 +263,77 @@ def test_an_index_says_what_it_is(opened):
     assert page.locator(".moving-numbers th", has_text="inverse_condition").get_attribute("title") == meaning
 
 
+def test_a_click_on_a_front_shows_that_linkage_moving(opened, answers):
+    page, table = opened("straight_line_front"), answers["straight_line_front"][1].tables["pareto"]
+    picture, slider = page.locator(".moving-beside svg"), page.get_by_role("slider", name="pose of the motion")
+    assert "knee" in words(page)
+    data = json.loads(page.locator(".moving script").text_content())
+    (x, y), k = data["front"][0], 0
+    wide = float(picture.get_attribute("viewBox").split()[2])
+    box = picture.bounding_box()
+
+    def look():
+        row = data["choices"][k]["number"] - 1
+        assert words(page).startswith(f"design {row + 1} of {len(table)} on the front")
+        chosen = page.locator(".moving-chosen")
+        assert [float(chosen.get_attribute(key)) for key in ("cx", "cy")] == [x[k], y[k]]
+        # The rocker is as long as that of the design, and P is twice as far from A as B.
+        scale, size = data["choices"][0]["scale"], table["l3"][row]
+        pins = {}
+        for point in ("A", "B", "D", "P"):
+            place = page.locator(f".moving-design [data-at={point}]:has(circle)").first.get_attribute("transform")
+            pins[point] = complex(*map(float, re.match(r"translate\((\S+) (\S+)\)", place).groups())) / scale
+        assert abs(pins["B"] - pins["D"]) == pytest.approx(size, abs=2 * PIXELS / scale)
+        assert abs(pins["P"] - pins["A"]) == pytest.approx(2 * size, abs=2 * PIXELS / scale)
+        assert float(page.locator(".moving-numbers tr:has(th:text-is('l3')) td span").inner_text()) == pytest.approx(
+            size, abs=1e-3)  # fmt: skip
+        return pins["P"]
+
+    shown = {data["choices"][k]["number"]}
+    for k, share in ((0, 0.4), (len(x) - 1, 0.8)):
+        scale = box["width"] / wide
+        picture.click(position={"x": scale * x[k], "y": scale * y[k]})
+        first = look()
+        slider.fill(str(share * float(slider.get_attribute("max"))))
+        assert abs(look() - first) > 0.1
+        shown.add(data["choices"][k]["number"])
+    assert len(shown) > 1
+    picture.press("ArrowLeft")
+    k -= 1
+    look()
+    page.locator("dl.numbers div", has_text="best kinematics.P.y_error").get_by_role("link").click()
+    k = 0
+    look()
+    page.get_by_role("button", name="Play").click()
+    before = slider.input_value()
+    page.wait_for_timeout(150)
+    assert slider.input_value() != before
+    page.get_by_role("button", name="Pause").click()
+
+
+def test_a_column_sorts_a_table_by_a_click_and_by_a_key(opened):
+    page = opened("offset_slider_crank")
+    table = page.locator("table.sorted").first
+    cases = table.locator("tbody tr td:first-child")
+    assert cases.all_inner_texts() == ["1", "2", "3"]
+    head = table.locator("th", has_text="mechanism.parameters.l")
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert cases.all_inner_texts() == ["3", "2", "1"]
+    # A case without a number comes last, whichever way.
+    stroke = table.locator("th", has_text="B.x.range")
+    for order in ("ascending", "descending"):
+        stroke.get_by_role("button").press("Enter")
+        assert stroke.get_attribute("aria-sort") == order
+        assert head.get_attribute("aria-sort") is None
+        assert cases.all_inner_texts()[-1] == "3"
+    stroke.get_by_role("button").press("Enter")
+    assert cases.all_inner_texts() == ["1", "2", "3"]
+
+
 @pytest.mark.parametrize("width", [400, 1400])
 def test_nothing_is_wider_than_the_screen(opened, width):
-    for name in ("slider_crank", "five_bar"):
+    for name in ("slider_crank", "five_bar", "straight_line_front", "offset_slider_crank"):
         page = opened(name, width)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 

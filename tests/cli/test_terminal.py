@@ -92,7 +92,7 @@ def test_a_long_name_leaves_room_for_what_became_of_it(capsys, monkeypatch):
 
 def test_the_table_of_what_is_under_way_has_room_for_it():
     live_table = LiveTable(quiet=False)
-    live_table._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    live_table._live = Live(console=Console(file=io.StringIO(), width=400, height=24))
     live_table.start(["long " * 30, "b"])
     live_table.advance(0, ProgressNote("reliability", "samples", 1, 4))
     live_table.done(1, Outcome("b", "kinematics", Path(), 1, 0))
@@ -180,7 +180,7 @@ class Screen(io.StringIO):
 
 
 def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("COLUMNS", "400")
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     place = "a long place " * 10
@@ -193,12 +193,28 @@ def test_verdicts_have_colour_on_a_terminal_and_are_never_cut(monkeypatch):
         monkeypatch.setattr(sys, "stderr", stream)
         terminal.say(words.rstrip("\n"))
         assert stream.getvalue() == told * 2
-    live_table._live = Live(console=Console(file=io.StringIO(), width=80, height=24))
+    live_table._live = Live(console=Console(file=io.StringIO(), width=400, height=24))
     live_table._stream = Screen()
     live_table.say(words)
     assert f"NOT MET, worst 60.2 at {place.rstrip()}" in live_table._live.console.file.getvalue()
     monkeypatch.setenv("NO_COLOR", "1")
     assert terminal.coloured(words, Screen()) == words
+
+
+@pytest.mark.parametrize("width", [60, 80])
+def test_no_line_is_broken_inside_a_word(width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    words = "s: run: requirement: kinematics.extremes.rocker.angle.range at least 65: NOT MET, worst 60.2 at theta 5"
+    for before in range(width):
+        text = f"{'x' * before} {words}"
+        shown = terminal.readable(text, Screen())
+        assert "\x1b[1;31m" in shown
+        lines = re.sub("\x1b.*?m", "", shown).split("\n")
+        assert max(map(len, lines)) <= width
+        assert " ".join(line.strip() for line in lines) == text.strip()
+    assert terminal.folded(words, io.StringIO()) == words
 
 
 def test_a_sweep_shows_the_results_asked_for_in_80_columns(folder, invoke, monkeypatch):

@@ -7,17 +7,30 @@ import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import typer.main
 
 from mechdesign.cli.app import app
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
 ROOT = Path(__file__).parents[2]
 AWAY = re.compile(r"\s*(?:https?:)?//")
 IN_STYLE = re.compile(r"""(?:url\(|@import)\s*['"]?\s*(?:https?:)?//[^)'"]*""")
 # What a browser loads by itself; an `a` waits for a click.
 LOADED = {"src", "srcset", "href", "data", "poster", "action"}
+# Words of the field, and the page that a search for each shows first.
+WORDS = {
+    "backlash": "tutorials/tolerances", "play": "tutorials/tolerances", "slop": "tutorials/tolerances",
+    "pin": "tutorials/tolerances", "tolerance stack": "tutorials/tolerances", "torque": "howto/torque",
+    "stroke": "howto/stroke_and_timing", "swing": "howto/swing_tolerance", "baseline": "howto/batch",
+    "dead centre": "theory/kinematics", "dead center": "theory/kinematics", "toggle": "theory/kinematics",
+    "mechanical advantage": "theory/kinematics", "Grashof": "theory/kinematics", "Jacobian": "theory/kinematics",
+    "manipulability": "theory/workspace", "friction": "theory/limits", "Cpk": "howto/standard_grades",
+}  # fmt: skip
 
 
 class Requests(HTMLParser):
@@ -68,3 +81,23 @@ def test_a_request_would_be_found() -> None:
     requests = Requests()
     requests.feed('<a href="https://a.b/"></a><img src="//a.b/c.png"><p style="background: url(https://a.b/d)">')
     assert requests.found == ["img //a.b/c.png", "url(https://a.b/d"]
+
+
+@pytest.mark.browser
+def test_a_search_for_a_word_of_the_field_shows_its_page_first(site: Path, browser: Browser) -> None:
+    page = browser.new_page()
+    first = {}
+    for word in WORDS:
+        page.goto(f"{(site / 'search.html').as_uri()}?q={word}")
+        link = page.wait_for_selector("#search-results li a")
+        first[word] = link.get_attribute("href").partition(".html")[0]
+    assert first == WORDS
+
+
+def test_thumbnails_are_small(site: Path) -> None:
+    sizes = {
+        path.name: path.stat().st_size for path in (site / "_images").glob("*.svg") if "@keyframes" in path.read_text()
+    }
+    assert len(sizes) > 40
+    assert max(sizes.values()) < 17_000
+    assert sum(sizes.values()) < 450_000

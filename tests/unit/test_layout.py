@@ -17,6 +17,7 @@ ORDER = (
     ("mechdesign.mechanism",),
     ("mechdesign.study.text",),
     ("mechdesign.study.building",),
+    ("mechdesign.questions.reliability.laws",),
     (
         "mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths",
         "mechdesign.study.motion_program",

@@ -14,31 +14,36 @@ from mechdesign.report.tables import to_csv
 from mechdesign.study.schema.study_file import schema
 
 FILE = '''
-"""Reach: distance of the point from the place where its leg begins."""
+"""Reach: distance of the workspace's point from the origin."""
 
 import numpy as np
 
-from mechdesign.questions.workspace.index import Index, of_jacobian
+from mechdesign.questions.workspace.index import Index, length
 
-INDEX = Index(
-    "distance from the origin", of_jacobian(lambda local: np.abs(local.configuration.point("P"))),
-    lambda study, field: study.units.label("length"), section="stiffness",
-)
+
+def prepare(study):
+    """The distance at each place, from the pose that is assembled there."""
+    point = study.workspace.point
+    return lambda local: np.abs(local.configuration.point(point))
+
+
+INDEX = Index("distance from the origin", prepare, length)
 '''
 ARM = """
 mechanism:
   links: {ground: {O: [0, 0]}, upper: [O, E, 50], lower: [E, P, 30]}
   drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
   sketch: {E: [30, 40], P: [60, 40]}
-stiffness: {at: P, actuators: {q1: 1e4, q2: 1e4}, poses: workspace}
 workspace: {point: P, indices: [reach], scan: {about: [0, 0]}}
 """
 
 
 @pytest.fixture
-def reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "reach.py").write_text(FILE)
+def reach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    file = tmp_path / "reach.py"
+    file.write_text(FILE)
     monkeypatch.setattr(indices, "__path__", [*indices.__path__, str(tmp_path)])
+    return file
 
 
 @pytest.mark.slow
@@ -63,12 +68,12 @@ def test_a_new_index_is_found_in_schema_csv_and_picture() -> None:
     assert optimum["lower.length"][0] == 40
 
 
-@pytest.mark.usefixtures("reach")
-def test_what_a_new_index_needs_is_checked() -> None:
-    with pytest.raises(StudyError, match="the index 'reach' needs the stiffness section"):
-        study_of(ARM.replace("stiffness:", "#"))
+def test_what_a_new_index_needs_is_checked(reach: Path) -> None:
     with pytest.raises(StudyError, match="did you mean 'reach'"):
         study_of(ARM, "workspace.indices=[reahc]")
+    reach.with_name("firm.py").write_text(FILE.replace(", length)", ', length, section="stiffness")'))
+    with pytest.raises(StudyError, match="the index 'firm' needs the stiffness section"):
+        study_of(ARM, "workspace.indices=[firm]")
 
 
 def test_without_its_file_there_is_none() -> None:

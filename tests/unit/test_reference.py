@@ -100,6 +100,18 @@ def test_what_is_said_of_a_word():
     assert (length.takes, length.unit) == ("number", "length (mm where the study says no units)")
 
 
+def test_a_method_of_reliability_says_when_to_use_it_and_which_keys_it_takes():
+    for word, parts in {
+        "analytic": ("First-order errors", "linear over the tolerances", "no interval", "pin.analytic"),
+        "auto": ("a 99.7 % interval", "reliability.samples, reliability.precision, ", "pin.monte_carlo"),
+    }.items():
+        entry = next(entry for entry in find(ENTRIES, word) if entry.kind == "method of reliability")
+        assert all(part in entry.text for part in parts)
+        assert entry.where == ("reliability.methods",)
+        keys = entry.text.partition("Its keys: ")[2].removesuffix(".").split(", ")
+        assert all(find(ENTRIES, key) for key in keys)
+
+
 def test_every_word_out_of_a_list_has_a_meaning():
     assert all(entry.text for entry in ENTRIES)
     assert all(meaning for entry in ENTRIES for _, meaning in entry.words)

@@ -37,7 +37,7 @@ reliability:
 
 def run(task: Task) -> MethodResult:
     """The first order with twice its deviations."""
-    return normal("cautious", task, task.linear.shift(), 4.0 * task.linear.covariance())
+    return normal(task, task.linear.shift(), 4.0 * task.linear.covariance())
 
 
 def rung(
@@ -48,7 +48,9 @@ def rung(
 
 @pytest.fixture
 def cautious() -> Iterator[None]:
-    method = Method("cautious", "cautious first order", "first-order errors, twice as wide", 2, step=1, module=__name__)
+    method = Method(
+        "cautious", "cautious first order", "first-order errors, twice as wide", "Never.", 2, step=1, module=__name__
+    )
     known = dict(METHODS)
     METHODS[method.name] = method
     yield

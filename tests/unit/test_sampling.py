@@ -8,6 +8,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
 from mechdesign.errors import StudyError
+from mechdesign.questions.reliability import laws
 from mechdesign.questions.reliability.copula import Correlation
 from mechdesign.questions.reliability.laws import (
     Beta,
@@ -18,13 +19,13 @@ from mechdesign.questions.reliability.laws import (
     Triangular,
     TruncatedNormal,
     Uniform,
-    marginal,
 )
 from mechdesign.questions.reliability.pin_laws import PIN_LAWS
-from mechdesign.questions.reliability.schema.variation import DISTRIBUTIONS, Dimension
+from mechdesign.questions.reliability.schema.variation import Dimension
 from mechdesign.questions.reliability.simulation import generator
 
 SAMPLES = 200_000
+OF_SIGMA = [law.name for law in laws.LAWS.values() if not law.between_ends]
 LAWS: dict[str, Marginal] = {
     "normal": Normal(-0.5, 0.7),
     "truncated": TruncatedNormal(-0.7, 0.5),
@@ -38,6 +39,10 @@ EDGES = np.linspace(-12, 12, 4001)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 U = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + 0.5 * np.diff(EDGES)[:, None] * NODES).ravel()
 DENSITY = (0.5 * np.diff(EDGES)[:, None] * WEIGHTS).ravel() * np.exp(-0.5 * U * U) / np.sqrt(2 * np.pi)
+
+
+def test_every_declared_law_is_tested_here() -> None:
+    assert {type(law) for law in LAWS.values()} == {*laws.LAWS.values()}
 
 
 @pytest.mark.slow
@@ -103,8 +108,8 @@ def test_measured_values_have_their_mean_and_deviation_and_interpolated_quantile
 
 def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
     found = {
-        name: marginal(Dimension(tolerance=[-0.1, 0.3], distribution=name), 2.0, 10.0)  # type: ignore[arg-type]
-        for name in DISTRIBUTIONS
+        name: Dimension(tolerance=[-0.1, 0.3], distribution=name).law(2.0, 10.0)  # type: ignore[arg-type]
+        for name in OF_SIGMA
     }
     for law in found.values():
         assert (law.low, law.high, law.nominal) == (-1.0, 3.0, 2.0)
@@ -112,8 +117,8 @@ def test_a_tolerance_is_three_sigma_its_ends_or_its_peak() -> None:
         assert (found[name].mean, found[name].sigma) == (1.0, pytest.approx(2.0 / 3.0))
     assert isinstance(found["triangular"], Triangular)
     assert found["triangular"].mode == 0.0
-    for name in DISTRIBUTIONS:
-        law = marginal(Dimension(sigma=0.2, distribution=name), 2.0)
+    for name in OF_SIGMA:
+        law = Dimension(sigma=0.2, distribution=name).law(2.0)
         # What is cut loses a little of the deviation that is asked for before the cut.
         cut = 0.9733369 if name == "truncated_normal" else 1.0
         assert law.moments[1] == pytest.approx(0.04 * cut, rel=1e-6)

@@ -227,6 +227,16 @@ QUESTIONS = [
     ("reliability: {dimensions: {r: {tolerance: [2, 1]}}}", "the lowest deviation 2 is above the highest 1"),
     ("reliability: {dimensions: {r: {tolerance: [1, 2, 3]}}}", "expected a half-width or two bounds"),
     ("reliability: {dimensions: {rod.length: {tolerance: [0, 1 deg]}}}", "where a length is expected"),
+    (
+        "kinematics: {sweep: {drive: theta, number: 24}}",
+        "kinematics.sweep: a range stands below the name of its coordinate, and 'from' and 'to' are missing: write "
+        "{theta: {from: 0, to: 360, number: 24}}",
+    ),
+    (
+        "kinematics: {sweep: {from: 10, to: 50}}",
+        "kinematics.sweep: a range stands below the name of its coordinate, and 'step' is missing: write "
+        "{theta: {from: 10, to: 50, step: 5}}",
+    ),
     ("reliability: {dimensions: {theta: {tolerance: 1, distribution: lognormal}}}", "what is lognormal is positive"),
     ("reliability: {dimensions: {load.fx: 3 mm}}", "where a force is expected"),
     ("reliability: {limits: {P.x: {min: 0.1, max: -0.1}}}", "the maximum -0.1 is below the minimum 0.1"),

@@ -15,7 +15,7 @@ from mechdesign.questions.workspace.contained import Shape
 from mechdesign.questions.workspace.question import COLUMNS, split
 from mechdesign.results import Result
 from mechdesign.rows import Chosen
-from mechdesign.statistics import WORST, Asked, worst
+from mechdesign.statistics import STATISTICS, Asked, worst
 from mechdesign.study import Study
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
@@ -96,10 +96,11 @@ class Goal:
             If the result has no such column.
         """
         chosen = terms_of(result, self.column, dict(self.where))
-        if isinstance(chosen, Sum) or chosen.statistic not in WORST[self.smallest]:
+        statistic = None if isinstance(chosen, Sum) else STATISTICS.get(chosen.statistic)
+        if isinstance(chosen, Sum) or (statistic is not None and statistic.end != self.sign):
             numbers = chosen.numbers(designs, assembled=self.unassembled)
             return Judgement(np.abs(numbers) if self.absolute else numbers, None)
-        absolute = self.absolute or chosen.statistic == "peak"
+        absolute = self.absolute or (statistic is not None and statistic.absolute)
         values, counts = chosen.shaped(designs, assembled=self.unassembled)
         found = worst(np.abs(values) if absolute else values, counts, largest=self.smallest)
         if chosen.table.name == "targets" and chosen.column == "rms" and "motion" in result.tables:
@@ -203,7 +204,8 @@ def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -
     """
     if isinstance(condition, Containment):
         name = condition.contains.named(moved)
-        yield Goal(f"{name} contained", "workspace", f"scale of {name}", bound=1 - ROUNDING, outline=condition.contains)
+        scale = f"scale of {name}"
+        yield Goal(f"{name} contained", "workspace", scale, bound=1 - ROUNDING, outline=condition.contains, gate=True)
         return
     _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):

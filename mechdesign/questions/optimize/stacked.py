@@ -22,7 +22,7 @@ from mechdesign.questions.kinematics.loops import loops_table, measured
 from mechdesign.questions.kinematics.motion import move
 from mechdesign.questions.kinematics.question import motion_question
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
-from mechdesign.questions.poses import SolvedPoses, alike, study_poses
+from mechdesign.questions.poses import SolvedPoses, alike, solve_poses, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness import analysis as stiffness
 from mechdesign.questions.stiffness.body import ask
@@ -53,7 +53,7 @@ class Stack(NamedTuple):
     along : Along, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
-        The solved poses of a motion; else empty.
+        The solved poses.
     """
 
     result: Result
@@ -140,10 +140,10 @@ def tables(
             found["targets"] = targets_table(motion, along)
         reason = motion.reason
     elif command == "reliability":
-        found, reason = reliability.first_order_tables(study, poses, wanted)
+        found, reason, solved = reliability.first_order_tables(study, poses, wanted)
     else:
-        body = ask(study)
-        held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
+        body, solved = ask(study), list(solve_poses(study, poses))
+        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(wanted))
         found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
     return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)

@@ -1,22 +1,29 @@
-"""Laws (distributions) of deviations from nominal.
+"""Laws (distributions) of deviations from nominal, each declared once: schema, checks and computation follow from it.
 
 Every law maps a standard normal variable onto a deviation, so that all methods share one space of independent standard
 normal variables. [Rosenblatt, Remarks on a multivariate transformation, 1952.]
+
+A study is read with this module, so that SciPy is imported where a law is computed, not at the top.
 """
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, Self
+from itertools import chain
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.reliability.schema.variation import Dimension
+from mechdesign.study.text import fields
+from mechdesign.study.text.fields import failure
+
+HELP_PAGE = "theory/reliability"
 
 # Half the width of a tolerance in standard deviations of a normal law; `truncated_normal` is cut there [S2, eq. 5].
 SIGMAS = 3.0
@@ -24,7 +31,6 @@ SIGMAS = 3.0
 
 def _normal_cdf(u: Floats | float) -> Floats:
     """Probability that a standard normal variable is below `u`."""
-    # Imported here because the moments of laws need no SciPy, and its import takes long.
     from scipy.special import ndtr
 
     return np.asarray(ndtr(u))
@@ -59,7 +65,16 @@ class Marginal(ABC):
     high: Number
     nominal: Number = 0.0
 
-    # Half the width of the tolerance in standard deviations `sigma`.
+    # The word that a study names it by (empty where none does), and its meaning in a line.
+    name: ClassVar[str] = ""
+    meaning: ClassVar[str] = ""
+    # Keys of a study that this law needs: fields of `Distribution` and of its own class, each a number or several.
+    keys: ClassVar[tuple[str, ...]] = ()
+    # Whether the value itself is positive; its nominal value must be positive then.
+    positive: ClassVar[bool] = False
+    # Whether it needs the two ends of a tolerance: a standard deviation alone does not give it.
+    between_ends: ClassVar[bool] = False
+    # Half the width of the tolerance over the standard deviation `sigma`.
     reach: ClassVar[float] = SIGMAS
     # Second and fourth central moment where `sigma` is 1.
     second: ClassVar[float] = 1.0
@@ -68,13 +83,17 @@ class Marginal(ABC):
     @property
     def numbers(self) -> tuple[Number, ...]:
         """All numbers that the law depends on."""
-        return self.low, self.high, self.nominal
+        own = (getattr(self, key) for key in self.keys)
+        parts = (part if isinstance(part, tuple) else (part,) for part in own)
+        return self.low, self.high, self.nominal, *chain.from_iterable(parts)
 
     def take(self, rows: Sequence[int] | Ints) -> Self:
         """The law at these poses."""
-        return replace(
-            self, low=at_rows(self.low, rows), high=at_rows(self.high, rows), nominal=at_rows(self.nominal, rows)
-        )
+
+        def taken(value: Any) -> Any:
+            return tuple(map(taken, value)) if isinstance(value, tuple) else at_rows(value, rows)
+
+        return replace(self, **{key: taken(getattr(self, key)) for key in ("low", "high", "nominal", *self.keys)})
 
     @property
     def mean(self) -> Number:
@@ -123,27 +142,11 @@ def at_rows(value: Number, rows: Any) -> Number:
     return value if isinstance(value, float | int) or np.ndim(value) == 0 else np.asarray(value)[rows]
 
 
-def marginal(spread: Dimension, nominal: Number, factor: float = 1.0) -> Marginal:
-    """The law of a deviation that a study gives in its units.
-
-    `nominal` is in the core's units (radians, lengths), and `factor` of these are one unit of the study.
-
-    Raises
-    ------
-    ToleranceClassError
-        If the tolerance class does not cover the nominal value.
-    """
-    law = LAWS[spread.distribution]
-    low, high = spread.ends(nominal)
-    if spread.sigma is not None:
-        low, high = -law.reach * spread.sigma, law.reach * spread.sigma
-    if spread.shape is not None:
-        return Beta(factor * low, factor * high, nominal, spread.shape)
-    return law(factor * low, factor * high, nominal)
-
-
 class Normal(Marginal):
     """Normal."""
+
+    name = "normal"
+    meaning = "normal; the tolerance is three standard deviations"
 
     def at(self, u: Floats) -> Floats:
         return np.asarray(self.mean + self.sigma * u)
@@ -156,6 +159,8 @@ _TAIL = 2.0 * SIGMAS * math.exp(-0.5 * SIGMAS**2) / math.sqrt(2.0 * math.pi) / m
 class TruncatedNormal(Marginal):
     """Normal, cut at three standard deviations of the uncut law: no deviation lies outside the tolerance."""
 
+    name = "truncated_normal"
+    meaning = "as normal, and cut at the ends of the tolerance"
     second = 1.0 - _TAIL
     fourth = 3.0 * second - SIGMAS**2 * _TAIL
 
@@ -174,6 +179,8 @@ class TruncatedNormal(Marginal):
 class Uniform(Marginal):
     """Uniform over the tolerance."""
 
+    name = "uniform"
+    meaning = "equally likely over the whole tolerance"
     reach = math.sqrt(3.0)
     fourth = 1.8
 
@@ -187,6 +194,8 @@ class Uniform(Marginal):
 class Triangular(Marginal):
     """Triangular over the tolerance; the mode is the nominal value, or the end of the tolerance nearest to it."""
 
+    name = "triangular"
+    meaning = "over the tolerance, most likely at the nominal value"
     reach = math.sqrt(6.0)
 
     @property
@@ -220,6 +229,10 @@ class Triangular(Marginal):
 
 class Lognormal(Marginal):
     """nominal + deviation is lognormal, and positive."""
+
+    name = "lognormal"
+    meaning = "mean and deviation of normal; the value itself is lognormal and stays positive"
+    positive = True
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:
@@ -273,26 +286,25 @@ class UniformFit(_OfFit):
         return self._from_ends(u, inward)
 
 
+# Laws of fits, by the law of both the hole and the shaft.
+FITS: Mapping[str, type[_OfFit]] = {Normal.name: NormalFit, Uniform.name: UniformFit}
+
+
 def fit_law(distribution: str, hole: float, shaft: float, nominal: float) -> Marginal:
     """Law of a radial clearance about its mean, from half the diameter tolerances of the hole and the shaft."""
-    law = NormalFit if distribution == "normal" else UniformFit
     reach = 0.5 * (hole + shaft)
-    return law(-reach, reach, nominal, hole / (hole + shaft))
+    return FITS[distribution](-reach, reach, nominal, hole / (hole + shaft))
 
 
 @dataclass(frozen=True)
 class Beta(Marginal):
     """Beta over the tolerance, with two shape parameters: equal ones are symmetric, (1, 1) is uniform."""
 
+    name = "beta"
+    meaning = "beta over the tolerance, with two shape parameters, 'shape'"
+    keys = ("shape",)
+    between_ends = True
     shape: tuple[Number, Number] = (1.0, 1.0)
-
-    @property
-    def numbers(self) -> tuple[Number, ...]:
-        return *super().numbers, *self.shape
-
-    def take(self, rows: Sequence[int] | Ints) -> Self:
-        a, b = self.shape
-        return replace(super().take(rows), shape=(at_rows(a, rows), at_rows(b, rows)))
 
     @property
     def moments(self) -> tuple[Number, Number, Number, Number]:
@@ -364,11 +376,26 @@ def _interpolated(ordered: Floats, power: int) -> float:
     return float(between.sum() + 0.5 * (ordered[0] ** power + ordered[-1] ** power)) / len(ordered)
 
 
-LAWS: dict[str, type[Marginal]] = {
-    "normal": Normal,
-    "truncated_normal": TruncatedNormal,
-    "uniform": Uniform,
-    "triangular": Triangular,
-    "lognormal": Lognormal,
-    "beta": Beta,
-}
+# The laws that a study names, in the order of the schema.
+_DECLARED: tuple[type[Marginal], ...] = (Normal, TruncatedNormal, Uniform, Triangular, Lognormal, Beta)
+LAWS = {law.name: law for law in _DECLARED}
+
+
+class Distribution(fields.Model):
+    """The law that a study chooses, and the keys that only some laws have."""
+
+    distribution: Annotated[str, fields.choice(LAWS, "distribution")] = Normal.name
+    """Distribution of the deviations."""
+    shape: (
+        Annotated[tuple[fields.Positive, fields.Positive], fields.pair_of("two shape parameters such as [2, 5]")] | None
+    ) = None
+    """The two shape parameters of a beta distribution. Example: [2, 5]"""
+
+    @model_validator(mode="after")
+    def _keys_of_the_law(self) -> Self:
+        for key in [key for key in Distribution.model_fields if key != "distribution"]:
+            if (key in LAWS[self.distribution].keys) != (getattr(self, key) is not None):
+                owners = " or ".join(law.name for law in LAWS.values() if key in law.keys)
+                example = self.said(key).examples[0]
+                raise failure(f"'distribution: {owners}' and its {key!r}, such as {example}, go together")
+        return self

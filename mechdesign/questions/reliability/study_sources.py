@@ -14,7 +14,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
 from mechdesign.questions.reliability.copula import Correlation
-from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law, marginal
+from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
@@ -91,7 +91,7 @@ def _law(study: Study, name: str, dimension: Dimension, nominal: Number, factor:
     try:
         flaw = dimension.flaw(nominal)
         if not flaw:
-            return marginal(dimension, nominal, factor)
+            return dimension.law(nominal, factor)
     except ToleranceClassError as error:
         flaw = str(error)
     raise StudyError((study.problem(flaw, "reliability", "dimensions", name),))
@@ -146,7 +146,7 @@ def _pin(study: Study, name: str, clearance: Clearance) -> Pin:
     if flaw := clearance.flaw():
         raise StudyError((study.problem(flaw, "reliability", "clearances", name),))
     joints, spread, radius = study.mechanism.description.joints, clearance.radius_spread, clearance.radius
-    law = None if spread is None else marginal(spread, radius)
+    law = None if spread is None else spread.law(radius)
     if clearance.fit is not None:
         law = fit_law(clearance.distribution, clearance.fit.hole, clearance.fit.shaft, radius)
     kind = "slide" if name in joints else clearance.effect

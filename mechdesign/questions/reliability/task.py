@@ -48,7 +48,9 @@ class Task:
     closing : FirstOrder
         The linear model of the margins of assembly, see `first_order.linear_margins`.
     settings : sequence of Setting
-        Poses that can be assembled, in their order; empty where only the first order is computed.
+        A `Setting` for each pose that can be assembled, in the order of the poses: what a made mechanism is solved
+        with there, and how its error is judged. ``setting.pose`` is the pose's place in the arrays above. It is empty
+        where only the first order is computed, as of the designs of `optimize`.
     most : int
         Most samples of methods that stop at a precision.
     """
@@ -119,15 +121,17 @@ class MethodResult:
         (radians, lengths); None where the method gives none.
     cycles : tuple of Estimate
         One for each design; empty where no cycle is estimated.
+    method : str
+        Name of the method; `methods.run` sets it.
     """
 
-    method: str
     estimates: dict[int, Estimate] = field(default_factory=dict)
     sums: dict[int, Sums] = field(default_factory=dict)
     used: dict[int, str] = field(default_factory=dict)
     rungs: dict[int, dict[str, Estimate]] = field(default_factory=dict)
     normal: tuple[Floats, Floats] | None = None
     cycles: tuple[Estimate, ...] = ()
+    method: str = ""
 
     @property
     def cycle(self) -> Estimate | None:
@@ -146,7 +150,7 @@ class MethodResult:
         return mean, covariance
 
     def add(self, other: MethodResult) -> None:
-        """Add the results of other poses."""
+        """Add the estimates and samples of other poses."""
         self.estimates.update(other.estimates)
         self.sums.update(other.sums)
         self.used.update(other.used)

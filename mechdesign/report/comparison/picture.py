@@ -42,10 +42,11 @@ def differences_figure(moved: Sequence[Difference]) -> Figure:
             for values, (name, color, dashes) in zip(each.values, looks, strict=True):
                 axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
             axes.set_xlabel(style.axis_label(each.along.name, each.along.unit))
-            axes.set_ylabel(style.axis_label("", each.unit).strip())
+            axes.set_ylabel(style.axis_label("value", each.unit))
             axes.legend(loc="best")
         name = f"{each.folder}/{each.table}: {each.column}".removeprefix("./")
         axes.set_title(style.folded(name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
+    style.name_powers(panels)
     left = len(moved) - len(shown)
     more = f"; {left} more in differences.csv" if left else ""
     figure.text(0.01, 1 - 0.1 / figure.get_figheight(), f"what moved most{more}", va="top", fontsize=11)

@@ -28,7 +28,7 @@ from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, meanings, places
+from mechdesign.report.page.tracks import CURVES, PLACES, TIMES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -39,7 +39,6 @@ _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid th
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
-_TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",
@@ -89,7 +88,7 @@ def _motion(
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
-    data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
+    data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
     for given in [table.column(name) for name in sweep.poses.values if name in table]:
         unit = numbers.cell(given).unit
@@ -117,7 +116,7 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
     return tostring(root, encoding="unicode")
 
 
-def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
+def gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
     """Runs of poses that are not valid: the first, the last, why in words."""
     reason = sweep.configuration.reason
     ends = np.flatnonzero(np.diff(reason)) + 1
@@ -160,7 +159,7 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
         what = "at the study's rates" if timed is None else "in the study's motion"
         note = f", as {what}" if seconds == own else f"; {what} {own:.3g} {unit}".rstrip()
     pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
-    return {"times": deltas(times / times[-1], _TIMES), "seconds": round(seconds, 3), "pace": pace,
+    return {"times": deltas(times / times[-1], TIMES), "seconds": round(seconds, 3), "pace": pace,
             "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
 
 

@@ -60,13 +60,25 @@ class Entry:
 
     name: str
     label: str
-    answers: Sequence[tuple[str, str, int]]  # command, outcome in words and exit code
+    answers: Sequence[tuple[str, str, int]] = ()  # command, outcome in words and exit code
     met: int = 0
     required: int = 0
     warnings: int = 0
+    numbers: Sequence[Mapping[str, str]] = ()  # some of its key numbers, see `Headline`
     drawing: str = ""  # an image as a data URI
     link: str = ""  # to its report; empty where there is none
     failed: str = ""  # why there is none
+    outcome: str = ""  # the same in a word or two
+
+    @property
+    def verdict(self) -> tuple[int, str]:
+        """Its place among all verdicts, and the verdict in a word or two."""
+        wrong = next((word for _, word, code in self.answers if code > 1), self.outcome)
+        if any(code == 1 for _, _, code in self.answers):
+            return 0, "NOT MET"
+        if wrong:
+            return 1, wrong
+        return (2, "met") if self.required else (3, "nothing required")
 
 
 def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: bool = True) -> bytes:
@@ -82,12 +94,13 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
-    moving = any(section["moving"] is not None for section in sections)
+    parts = ["moving"] * any(section["moving"] is not None for section in sections)
+    parts += ["sorted"] * any(table["sorted"] for section in sections for table in section["tables"])
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
     return _page(
         "report.html.j2",
-        moving=moving,
+        parts=parts,
         study=study,
         about=_about(study),
         drawing=drawing or (_sketch(study) if plots else ""),
@@ -114,8 +127,9 @@ def _mover(sections: Iterable[Mapping[str, Any]], command: str, pose: Mapping[st
 
 
 def index(entries: Sequence[Entry]) -> bytes:
-    """The page of several studies, a row each."""
-    return _page("index.html.j2", moving=False, entries=entries, version=version("mechdesign"))
+    """The page of several studies, a row each: first those that will not do, then by their names."""
+    entries = sorted(entries, key=lambda entry: (entry.verdict[0], entry.name.casefold(), entry.label))
+    return _page("index.html.j2", entries=entries, version=version("mechdesign"))
 
 
 def _sketch(study: Study) -> str:
@@ -152,15 +166,16 @@ def thumbnail(study: Study) -> str:
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
-def _page(template: str, *, moving: bool, **content: Any) -> bytes:
+def _page(template: str, *, parts: Sequence[str] = (), **content: Any) -> bytes:
+    """A page with the scripts of some parts."""
     environment = Environment(
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
-    styles = _text("page.css") + (_text("moving.css") if moving else "")
-    script = _text("moving.js") if moving else ""
+    styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "")
+    script = "".join(_text(f"{part}.js") for part in parts)
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
     policy += [f"script-src {_hash(script)}"] if script else []
     text = environment.get_template(template).render(

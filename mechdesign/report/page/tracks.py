@@ -22,6 +22,7 @@ from mechdesign.results import Column, Table
 PLACES = 20
 TURNS = 100
 CURVES = 10
+TIMES = 10_000  # in the time of a motion
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
 _COMMON = 0.5  # quantile of the absolute values that counts as the size of a column

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from mechdesign.errors import cut
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.paths import PathSection, Speed
@@ -64,6 +65,25 @@ class Sweep(fields.Model):
             yield fields.Misfit(astray, "a step of {} never leads from {} to {}", numbers)
 
 
+def _sweeps(raw: Any) -> Any:
+    """Ranges by coordinate as they are; a range without its coordinate is a mistake."""
+    if not isinstance(raw, dict) or len(raw) < 2 or any(isinstance(value, dict) for value in raw.values()):
+        return raw
+    given = {key: raw[key] for key in Sweep.fields_by_key() if key in raw}
+    names = [value for key, value in raw.items() if key not in given and fields.NAME.fullmatch(str(value))]
+    # A coordinate may have the name of a key, and be held: {theta: 30, step: 5}.
+    if not given or not (names or given.keys() & {"from", "to"}):
+        return raw
+    spaced = given.keys() & {"step", "number"}
+    example = {"from": 0, "to": 360} | ({} if spaced else {"step": 5}) | given
+    missing = [f"'{key}'" for key in example if key not in given]
+    form = ", ".join(f"{key}: {cut(str(value))}" for key, value in example.items())
+    lack = f", and {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing" if missing else ""
+    raise failure(
+        f"a range stands below the name of its coordinate{lack}: write {{{cut([*names, 'theta'][0])}: {{{form}}}}}"
+    )
+
+
 def _poses(raw: Any) -> Any:
     if raw == "workspace":
         return ()
@@ -89,7 +109,7 @@ class PoseSection(fields.Model):
     kinematics, and there a turn of the drive or its limits. Example: [{theta1: 30, theta2: 60}, {C.x: 0.2, C.y: 1.1}]
     Example: workspace
     """
-    sweep: dict[fields.CoordinateName, Sweep] | None = None
+    sweep: Annotated[dict[fields.CoordinateName, Sweep], BeforeValidator(_sweeps)] | None = None
     """Ranges of coordinates; several make a grid, and a number alone is held. Example: {theta: {from: 0, to: 360, step:
     5}}
     """

@@ -31,14 +31,14 @@ def pareto_figure(view: DesignsView) -> Figure | None:
 
 def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
-    pairs = list(combinations(range(len(designs.goals)), 2))
-    columns = 1 if style.narrow() else min(len(pairs), 2)
-    rows = -(-len(pairs) // columns)
-    figure = style.new_figure(4.8 if len(pairs) == 1 else 0.8 + _ROW * rows)
-    for number, pair in enumerate(pairs):
+    panels = pairs(designs)
+    columns = 1 if style.narrow() else min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    figure = style.new_figure(4.8 if len(panels) == 1 else 0.8 + _ROW * rows)
+    for number, pair in enumerate(panels):
         axes = figure.add_subplot(rows, columns, number + 1)
         _front(axes, designs, front, pair)
-        low = style.narrow() or len(pairs) > 1
+        low = style.narrow() or len(panels) > 1
         for axis, goal in zip((axes.xaxis, axes.yaxis), pair, strict=True):
             axis.set_label_text(_goal_label(designs, designs.goals[goal], folded=low))
     handles, labels = figure.axes[0].get_legend_handles_labels()
@@ -47,6 +47,11 @@ def front_figure(designs: Designs, front: Table) -> Figure:
     number = int(designs.feasible.sum())
     head(figure, f"Pareto front: {len(front)} of {number} feasible designs")
     return figure
+
+
+def pairs(designs: Designs) -> list[tuple[int, int]]:
+    """The goals of each panel, along and up."""
+    return [*combinations(range(len(designs.goals)), 2)]
 
 
 def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,23 +18,34 @@ from mechdesign.questions.reliability.simulation import Setting
 from mechdesign.questions.reliability.task import MethodResult, Partial, Task
 from mechdesign.work.chunks import map_chunks
 
+Value = TypeVar("Value")
+
 # Names of streams of random numbers: of searches for design points, and of quasi-Monte Carlo's scrambling.
 SEARCH, QUASI = 1, 2
 
 
 def run(name: str, task: Task) -> MethodResult:
-    """The result of a method."""
-    result: MethodResult = import_module(METHODS[name].place).run(task)
-    return result
+    """The result of a method, with its name.
+
+    Raises
+    ------
+    Partial
+        On an interrupt, with the result so far.
+    """
+    try:
+        result: MethodResult = import_module(METHODS[name].place).run(task)
+    except Partial as error:
+        raise Partial(replace(error.result, method=name)) from None
+    return replace(result, method=name)
 
 
-def normal(name: str, task: Task, mean: Floats, covariance: Floats) -> MethodResult:
+def normal(task: Task, mean: Floats, covariance: Floats) -> MethodResult:
     """Result for normal errors with these means, shape (channels, poses), and covariances, (poses, channels, channels).
 
     Its estimates have no interval.
     """
     estimates = of_normal(task, task.question, mean, covariance) if task.question.limited else {}
-    return MethodResult(name, estimates, normal=(mean, covariance))
+    return MethodResult(estimates, normal=(mean, covariance))
 
 
 def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covariance: Floats) -> dict[int, Estimate]:
@@ -50,29 +63,49 @@ def of_normal(task: Task, question: ReliabilityQuestion, mean: Floats, covarianc
     return {pose: Estimate(value, value, value, 0) for pose, value in zip(rows.tolist(), values.tolist(), strict=True)}
 
 
-def pose_by_pose(name: str, task: Task, work: Callable[[Task, Setting], MethodResult]) -> MethodResult:
-    """Results of `work`, a function of a module, at all poses; an interrupt keeps the poses that are finished."""
-    result = MethodResult(name)
-    task.progress.start(len(task.settings), "poses")
+def pose_by_pose(task: Task, work: Callable[[Task, Setting], MethodResult]) -> MethodResult:
+    """Results of `work`, a function of a module, at all poses; an interrupt keeps the poses that are finished.
+
+    Moments of normal errors are not put together here but by `of_moments`.
+    """
+    result = MethodResult()
     try:
-        for part in map_chunks(partial(_at, work, task), range(len(task.settings)), task.jobs, travels=True):
+        for _, part in _at_poses(task, work):
             result.add(part)
-            task.progress.update(1)
     except KeyboardInterrupt:
         raise Partial(result) from None
     return result
 
 
-def of_limits(name: str, task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
-    """Estimates by `work`, a function of a module, at all poses; an empty result where there are no limits."""
-    if not task.question.limited:
-        return MethodResult(name)
-    return pose_by_pose(name, task, partial(_estimated, name, work))
+def of_limits(task: Task, work: Callable[[Task, Setting], Estimate]) -> MethodResult:
+    """Estimates by `work`, as `pose_by_pose`; an empty result where there are no limits."""
+    return pose_by_pose(task, partial(_estimated, work)) if task.question.limited else MethodResult()
 
 
-def _at(work: Callable[[Task, Setting], MethodResult], task: Task, place: int) -> MethodResult:
+def of_moments(task: Task, work: Callable[[Task, Setting], tuple[Floats, Floats]]) -> MethodResult:
+    """Result as of `normal`, from the mean, shape (channels,), and the covariance by `work`, as `pose_by_pose`."""
+    mean = np.full(task.nominal.shape, np.nan)
+    covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
+    try:
+        for pose, (middle, spread) in _at_poses(task, work):
+            mean[:, pose], covariance[pose] = middle, spread
+    except KeyboardInterrupt:
+        raise Partial(normal(task, mean, covariance)) from None
+    return normal(task, mean, covariance)
+
+
+def _at_poses(task: Task, work: Callable[[Task, Setting], Value]) -> Iterator[tuple[int, Value]]:
+    """Each pose with the value of `work`, spread over the task's jobs."""
+    task.progress.start(len(task.settings), "poses")
+    values = map_chunks(partial(_at, work, task), range(len(task.settings)), task.jobs, travels=True)
+    for setting, value in zip(task.settings, values, strict=True):
+        yield setting.pose, value
+        task.progress.update(1)
+
+
+def _at(work: Callable[[Task, Setting], Value], task: Task, place: int) -> Value:
     return work(task, task.settings[place])
 
 
-def _estimated(name: str, work: Callable[[Task, Setting], Estimate], task: Task, setting: Setting) -> MethodResult:
-    return MethodResult(name, {setting.pose: work(task, setting)})
+def _estimated(work: Callable[[Task, Setting], Estimate], task: Task, setting: Setting) -> MethodResult:
+    return MethodResult({setting.pose: work(task, setting)})

@@ -37,7 +37,7 @@ def rungs() -> dict[str, Rung]:
 
 def run(task: Task) -> MethodResult:
     """Plain samples first, then the other methods, until one is precise enough."""
-    return pose_by_pose("auto", task, _at_pose)
+    return pose_by_pose(task, _at_pose)
 
 
 def _at_pose(task: Task, setting: Setting) -> MethodResult:
@@ -51,13 +51,13 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
 
     if not task.question.limited:
         plain(min(FEW, task.most))
-        return MethodResult("auto", sums={setting.pose: Sums.total(drawn)})
+        return MethodResult(sums={setting.pose: Sums.total(drawn)})
     rng = generator(task.seed, setting.pose, SEARCH, 2)
     # All poses share about `task.most` plain samples.
     problem, shared = problem_of(setting, task.sources), max(FEW, task.most // task.poses.count)
     estimate, used, tried = climb(problem, task.precision, plain, rungs(), rng, task.most, shared)
     pose = setting.pose
-    return MethodResult("auto", {pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: tried})
+    return MethodResult({pose: estimate}, {pose: Sums.total(drawn)}, {pose: used}, {pose: tried})
 
 
 def climb(

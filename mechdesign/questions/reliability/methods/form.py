@@ -41,7 +41,7 @@ _LEAST_SHARE = 0.02
 
 def run(task: Task) -> MethodResult:
     """Probability of failure at every pose."""
-    return of_limits("form", task, _at_pose)
+    return of_limits(task, _at_pose)
 
 
 def _at_pose(task: Task, setting: Setting) -> Estimate:

@@ -69,7 +69,7 @@ _MAX_LOG_DENSITY = 600.0
 
 def run(task: Task) -> MethodResult:
     """Probability of failure at every pose; where no sample failed, the bound that plain samples give."""
-    return of_limits("importance_sampling", task, _at_pose)
+    return of_limits(task, _at_pose)
 
 
 def _at_pose(task: Task, setting: Setting) -> Estimate:

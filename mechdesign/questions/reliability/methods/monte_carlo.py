@@ -19,4 +19,4 @@ def run(task: Task) -> MethodResult:
 
 def _result(task: Task, sums: dict[int, Sums]) -> MethodResult:
     estimates = {pose: part.estimate for pose, part in sums.items()} if task.question.limited else {}
-    return MethodResult("monte_carlo", estimates, sums)
+    return MethodResult(estimates, sums)

@@ -17,7 +17,6 @@ from mechdesign.questions.reliability.methods import QUASI, pose_by_pose
 from mechdesign.questions.reliability.simulation import Setting, Sums, generator, sums_of
 from mechdesign.questions.reliability.task import MethodResult, Task
 
-NAME = "quasi_monte_carlo"
 REPLICATES = 16
 # With fewer failures the replicates' means are far from normal, and the wider binomial interval is used.
 _FEW_FAILURES = 200
@@ -25,7 +24,7 @@ _FEW_FAILURES = 200
 
 def run(task: Task) -> MethodResult:
     """Results at every pose, with about the study's number of samples as points."""
-    return pose_by_pose(NAME, task, _at_pose)
+    return pose_by_pose(task, _at_pose)
 
 
 def _at_pose(task: Task, setting: Setting) -> MethodResult:
@@ -40,7 +39,7 @@ def _at_pose(task: Task, setting: Setting) -> MethodResult:
         ])  # fmt: skip
     total = Sums.total([part for replicate in parts for part in replicate])
     # Points of a Sobol sequence are not independent: their trend with the number of samples is left out.
-    result = MethodResult(NAME, sums={setting.pose: replace(total, trend=total.trend[:0])})
+    result = MethodResult(sums={setting.pose: replace(total, trend=total.trend[:0])})
     if task.question.limited:
         broken = [sum(part.failures for part in replicate) for replicate in parts]
         result.estimates[setting.pose] = estimate(broken, counts[0], total.samples - total.valid)

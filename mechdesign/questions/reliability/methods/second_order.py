@@ -6,7 +6,7 @@ error = f0 + a z + z H z / 2 for deviations z of all that varies; mean and covar
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
@@ -16,11 +16,10 @@ import numpy as np
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import JointMoments
 from mechdesign.questions.reliability.laws import Normal
-from mechdesign.questions.reliability.methods import normal
+from mechdesign.questions.reliability.methods import of_moments
 from mechdesign.questions.reliability.simulation import Setting, errors_of
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.questions.reliability.task import MethodResult, Task
-from mechdesign.work.chunks import map_chunks
 
 # Longest step of the differences, as a part of the mechanism's size or in radians: the fourth root of the rounding
 # error, at which a second derivative has about seven digits.
@@ -71,21 +70,11 @@ def run(task: Task) -> MethodResult:
     """Normal errors of the quadratic model's mean and covariance at every pose."""
     law = cumulants(task.sources)
     steps = step_sizes(task.sources, np.sqrt(np.diagonal(law.covariance)))
-    mean = np.full(task.nominal.shape, np.nan)
-    covariance = np.full((task.poses.count, len(mean), len(mean)), np.nan)
-    task.progress.start(len(task.settings), "poses")
-    work = partial(_moments, task.settings, task.sources, steps, law)
-    found = map_chunks(work, range(len(task.settings)), task.jobs, travels=True)
-    for setting, (middle, spread) in zip(task.settings, found, strict=True):
-        mean[:, setting.pose], covariance[setting.pose] = middle, spread
-        task.progress.update(1)
-    return normal("second_order", task, mean, covariance)
+    return of_moments(task, partial(_at_pose, steps, law))
 
 
-def _moments(
-    settings: Sequence[Setting], sources: Sources, steps: Floats, law: Cumulants, place: int
-) -> tuple[Floats, Floats]:  # fmt: skip
-    return quadratic(settings[place], sources, steps).moments(law)
+def _at_pose(steps: Floats, law: Cumulants, task: Task, setting: Setting) -> tuple[Floats, Floats]:
+    return quadratic(setting, task.sources, steps).moments(law)
 
 
 def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:

@@ -7,8 +7,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import model_validator
 
+from mechdesign.questions.reliability.laws import FITS, LAWS
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError, fit_deviations
-from mechdesign.questions.reliability.schema.variation import DISTRIBUTIONS, Dimension, Tolerance, millimetre
+from mechdesign.questions.reliability.schema.methods import METHODS
+from mechdesign.questions.reliability.schema.variation import Dimension, Tolerance, millimetre
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
@@ -22,10 +24,16 @@ PIN_MODELS = {
     "uniform": "anywhere in the circle of the clearance alike; of a slider each end between its walls",
     "contact": "pin at the hole's wall, in any direction alike; of a slider each end at one wall or the other",
 }
+# Methods by the pin model that they take.
+BY_MOMENTS = ", ".join(method.name for method in METHODS.values() if method.pin == "analytic")
+BY_PLACES = ", ".join(method.name for method in METHODS.values() if method.pin == "monte_carlo")
 _EFFECTS = {
     "offset": "moves the joint's point in the link's frame, by x and y",
     "length": "changes the length r of a binary link alone, to sqrt((r + x)^2 + y^2)",
 }
+# The laws of a clearance: those without keys of their own.
+_LAWS = {name: law for name, law in LAWS.items() if not law.keys}
+LAWS_OF_FITS = " or ".join(FITS)
 # Clearances down to minus this count as zero.
 CLEARANCE_ROUNDING = 1e-9
 
@@ -66,9 +74,9 @@ class PinModel(fields.Model):
 
     short = ({"enum": list(PIN_MODELS), "title": "pin model"},)
     analytic: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that compute: analytic, second_order."""
+    """Model of the methods that compute with its moments: |BY_MOMENTS|."""
     monte_carlo: Annotated[str, fields.choice(PIN_MODELS, "pin model")] = "normal"
-    """Model of the methods that sample, and of form."""
+    """Model of the methods that place each pin: |BY_PLACES|."""
 
     @model_validator(mode="before")
     @classmethod
@@ -92,8 +100,8 @@ class Clearance(fields.Model):
     """How far the clearance given (radial or diametral) deviates: a half-width, or the lowest and highest. A fit has
     its own. Example: 0.01
     """
-    distribution: Annotated[str, fields.choice(DISTRIBUTIONS, "distribution")] = "normal"
-    """Distribution of the clearance over its tolerance; of a fit normal or uniform."""
+    distribution: Annotated[str, fields.choice(_LAWS, "distribution")] = "normal"
+    """Distribution of the clearance over its tolerance; of a fit |LAWS_OF_FITS|."""
     pin: PinModel = PinModel()
     link: fields.LinkName | None = None
     """Link in which the pin moves. Left out: the last link at the joint that no output is said to be of. Example:
@@ -181,7 +189,7 @@ def _check_radius(checker: Checker, clearance: Clearance, path: KeyPath) -> None
     if clearance.fit is not None:
         if "tolerance" in clearance.model_fields_set:
             report((*path, "tolerance"), "a fit has the tolerances of its hole and shaft; leave it out")
-        if clearance.distribution not in ("normal", "uniform"):
-            report((*path, "distribution"), "hole and shaft of a fit are normal or uniform within their tolerances")
+        if clearance.distribution not in FITS:
+            report((*path, "distribution"), f"hole and shaft of a fit are {LAWS_OF_FITS} within their tolerances")
     if flaw := clearance.flaw():
         report((*path, "tolerance"), flaw)

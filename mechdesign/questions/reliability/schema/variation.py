@@ -14,6 +14,7 @@ from mechdesign.errors import StudyError
 from mechdesign.expressions import Number
 from mechdesign.mechanism.model import MEASURED, Place
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.laws import LAWS, Distribution, Marginal
 from mechdesign.questions.reliability.schema.iso_tolerances import (
     ToleranceClassError,
     angle_deviations,
@@ -33,15 +34,6 @@ HELP_PAGE = "theory/reliability"
 
 # Components of a random load, and their kinds of quantity.
 LOADS = {"load.fx": "force", "load.fy": "force", "load.mz": "moment"}
-DISTRIBUTIONS = {
-    "normal": "normal; the tolerance is three standard deviations",
-    "truncated_normal": "as normal, and cut at the ends of the tolerance",
-    "uniform": "equally likely over the whole tolerance",
-    "triangular": "over the tolerance, most likely at the nominal value",
-    "lognormal": "mean and deviation of normal; the value itself is lognormal and stays positive",
-}
-BETA = "beta"
-_OF_DIMENSIONS = {**DISTRIBUTIONS, BETA: "beta over the tolerance, with two shape parameters, 'shape'"}
 # Least number of measured values.
 MIN_MEASURED = 10
 
@@ -101,13 +93,9 @@ Tolerance = Annotated[tuple[float, float], fields.Read(_tolerance, _TOLERANCE)]
 _CLASSED = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM, {**fields.NAME_FORM, "title": "tolerance class"}]}
 
 
-class Dimension(fields.Model):
-    """How a dimension varies: one of ``tolerance``, ``sigma`` and ``measured``; a number or two alone are a tolerance,
-    normal.
-    """
+class _Width(fields.Model):
+    """How far a dimension varies."""
 
-    bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
-    one_of = ("a dimension needs either 'tolerance', 'sigma' or 'measured'", "tolerance", "sigma", "measured")
     tolerance: Annotated[tuple[float, float] | ToleranceClass, fields.Read(_tolerance_or_class, _CLASSED)] | None = None
     """Half-width of the deviations; two numbers, the lowest and the highest; or a class of ISO 286 or ISO 2768 for the
     dimension's nominal size. Example: 0.03 Example: [-0.1, 0.3] Example: js9 Example: ISO 2768-m
@@ -116,12 +104,15 @@ class Dimension(fields.Model):
     """Standard deviation, in place of a tolerance; of truncated_normal that of the normal law before it is cut at 3
     sigma, which leaves 0.9866 sigma. Example: 0.01
     """
-    distribution: Annotated[str, fields.choice(_OF_DIMENSIONS, "distribution")] = "normal"
-    """Distribution of the deviations."""
-    shape: (
-        Annotated[tuple[fields.Positive, fields.Positive], fields.pair_of("two shape parameters such as [2, 5]")] | None
-    ) = None
-    """The two shape parameters of a beta distribution. Example: [2, 5]"""
+
+
+class Dimension(Distribution, _Width):
+    """How a dimension varies: one of ``tolerance``, ``sigma`` and ``measured``; a number or two alone are a tolerance,
+    normal.
+    """
+
+    bare, short = "tolerance", (fields.NUMBER_FORM, fields.PAIR_FORM)
+    one_of = ("a dimension needs either 'tolerance', 'sigma' or 'measured'", "tolerance", "sigma", "measured")
     leg: fields.PositiveLength | None = None
     """Length of an angle's shorter leg, by which ISO 2768 gives its tolerance. Example: 50 mm"""
     measured: str | None = None
@@ -137,10 +128,8 @@ class Dimension(fields.Model):
 
     @model_validator(mode="after")
     def _fitting(self) -> Self:
-        if (self.distribution == BETA) != (self.shape is not None):
-            raise failure("'distribution: beta' and its 'shape', such as [2, 5], go together")
-        if self.shape is not None and self.tolerance is None:
-            raise failure("a beta distribution lies between two ends: give 'tolerance'")
+        if LAWS[self.distribution].between_ends and self.tolerance is None:
+            raise failure(f"a {self.distribution} distribution lies between two ends: give 'tolerance'")
         if self.measured is not None and "distribution" in self.model_fields_set:
             raise failure("measured values are a distribution of their own: leave 'distribution' out")
         if self.measured is None and (spare := self.given("column", "nominal")):
@@ -166,10 +155,26 @@ class Dimension(fields.Model):
 
     def flaw(self, nominal: Number) -> str:
         """The mistake in its numbers at a nominal value, or at any of several; empty if there is none."""
-        if self.distribution == "lognormal" and np.any(nominal <= 0):
-            return "what is lognormal is positive, and so is its nominal value"
+        if LAWS[self.distribution].positive and np.any(nominal <= 0):
+            return f"what is {self.distribution} is positive, and so is its nominal value"
         low, high = self.ends(nominal)
         return "the lowest deviation is above the highest" if np.any(low > high) else ""
+
+    def law(self, nominal: Number, factor: float = 1.0) -> Marginal:
+        """The law of deviations that are not measured.
+
+        `nominal` is in the core's units (radians, lengths), and `factor` of these are one unit of the study.
+
+        Raises
+        ------
+        ToleranceClassError
+            If the tolerance class does not cover the nominal value.
+        """
+        law = LAWS[self.distribution]
+        low, high = self.ends(nominal)
+        if self.sigma is not None:
+            low, high = -law.reach * self.sigma, law.reach * self.sigma
+        return law(factor * low, factor * high, nominal, **{key: getattr(self, key) for key in law.keys})
 
     def deviations(self, nominal: Number, folder: Folder) -> tuple[Floats, Number]:
         """Measured values, and what they deviate from, in the study's units, by default `nominal`.

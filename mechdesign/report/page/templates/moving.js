@@ -3,6 +3,7 @@
   const SVG = "http://www.w3.org/2000/svg";
   const PLACES = 20, TURNS = 100, CURVES = 10, TIMES = 10000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
+  const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
   const NEAR = 0.005; // a motion passes a pose this near, as a part of the range of what it gives
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -356,10 +357,133 @@
     show(at);
   }
 
+  // A front: a click on its picture, or the arrow keys, choose a design; its linkage moves by a slider or by itself.
+  function front(figure, data) {
+    const [drawing, picture] = figure.querySelectorAll("svg"), words = figure.querySelector(".moving-words");
+    const layer = drawing.querySelector(".moving-design"), told = numbers(figure, data);
+    const controls = figure.querySelector(".moving-controls");
+    const slider = html("input", {type: "range", min: 0, step: "any"});
+    slider.setAttribute("aria-label", "pose of the motion");
+    const button = html("button", {type: "button", textContent: "Play"});
+    const paths = html("input", {type: "checkbox", checked: true});
+    const select = html("select", {}, ...data.choices.map(({number, mark}, k) =>
+      html("option", {value: k, textContent: [number, mark].filter(Boolean).join(", ")})));
+    for (const [x, y] of data.front) x.forEach((place, each) => data.choices[each].mark ||
+      make("circle", {cx: place, cy: y[each], r: 2.6, fill: "#0072B2", stroke: "white", "stroke-width": 0.6}, picture));
+    const rings = data.front.map(() => make("circle", {r: 8, fill: "none", stroke: "#222222", "stroke-width": 2,
+      class: "moving-chosen"}, picture));
+    let k = -1, chosen, moved, times, tracks, share = 0, forward = 1, playing = 0, clock = 0;
+
+    // Shows a design where its motion is as far on as that of the one before.
+    function choose(next) {
+      k = next;
+      chosen = data.choices[k];
+      layer.innerHTML = chosen.drawing;
+      moved = linkage(drawing, chosen);
+      times = decode(chosen.times, chosen.poses, TIMES);
+      tracks = chosen.numbers.map(([decimals, steps]) => [decimals, decode(steps, chosen.poses, 10 ** decimals)]);
+      layer.querySelectorAll(".moving-trace").forEach(trace => trace.classList.toggle("moving-off", !paths.checked));
+      rings.forEach((ring, panel) => {
+        ring.setAttribute("cx", data.front[panel][0][k]);
+        ring.setAttribute("cy", data.front[panel][1][k]);
+      });
+      slider.max = chosen.poses - 1;
+      select.value = k;
+      told.show(k);
+      show(place());
+    }
+
+    const place = () => {
+      let low = 0, high = chosen.poses - 1;
+      while (high - low > 1) {
+        const middle = (low + high) >> 1;
+        if (times[middle] <= share) low = middle; else high = middle;
+      }
+      return low + (share - times[low]) / (times[high] - times[low] || 1);
+    };
+
+    function show(pose) {
+      const broken = chosen.gaps.find(([first, end]) => first <= Math.round(pose) && Math.round(pose) <= end);
+      moved.show(pose);
+      const at = chosen.given.map(([name, unit, which]) => said(name, between(tracks[which][1], pose).toFixed(tracks[which][0]), unit));
+      words.textContent = `${chosen.title}: ${at.join(", ")}${broken ? `: ${broken[2]}` : ""}`;
+      slider.value = pose;
+      slider.setAttribute("aria-valuetext", at.join(", "));
+    }
+
+    // Back from both ends, unless the motion ends where it began.
+    function frame(now) {
+      const step = calm.matches ? (now - clock >= SLOW_PAUSE ? 1 / SLOW_STEPS : 0) : Math.min(now - clock, 100) / FRONT_TIME;
+      if (step) {
+        clock = now;
+        share += forward * step;
+        if (chosen.returns) share %= 1;
+        else if (share > 1 || share < 0) { forward = -forward; share = Math.max(0, Math.min(1, share)); }
+        show(place());
+      }
+      playing = requestAnimationFrame(frame);
+    }
+
+    function stop() {
+      cancelAnimationFrame(playing);
+      playing = 0;
+      button.textContent = "Play";
+    }
+
+    button.addEventListener("click", () => {
+      if (playing) return stop();
+      clock = performance.now();
+      button.textContent = "Pause";
+      playing = requestAnimationFrame(frame);
+    });
+    slider.addEventListener("input", () => {
+      stop();
+      const at = Number(slider.value), low = Math.floor(at);
+      share = times[low] + (at - low) * ((times[low + 1] ?? times[low]) - times[low]);
+      show(at);
+    });
+    select.addEventListener("change", () => choose(Number(select.value)));
+    paths.addEventListener("change", () => choose(k));
+
+    picture.classList.add("moving-map");
+    picture.setAttribute("tabindex", "0");
+    picture.setAttribute("role", "application");
+    picture.setAttribute("aria-label", `${picture.getAttribute("aria-label")}; arrow keys choose a design`);
+    follow(picture, false, (x, y) => {
+      let best = 0, least = Infinity;
+      for (const [xs, ys] of data.front) xs.forEach((place, each) => {
+        const far = Math.hypot(place - x, ys[each] - y);
+        if (far < least) { least = far; best = each; }
+      });
+      if (best !== k) choose(best);
+    });
+    const keys = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1};
+    picture.addEventListener("keydown", event => {
+      const next = event.key === "Home" ? data.first : k + keys[event.key];
+      if (!(next >= 0 && next < data.choices.length)) return;
+      words.setAttribute("aria-live", "polite");
+      event.preventDefault();
+      choose(next);
+    });
+    // Key numbers lead to the design with their variables.
+    for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
+      const wanted = JSON.parse(link.dataset.pose);
+      const far = data.choices.map((_, each) => Math.hypot(...data.given.map(([name, , which, power]) => {
+        const values = told.tracks[which][1], range = Math.max(...values) - Math.min(...values) || 1;
+        return (values[each] - wanted[name] / 10 ** power) / range;
+      })));
+      link.addEventListener("click", () => choose(far.indexOf(Math.min(...far))));
+    }
+    controls.append(slider, button, html("label", {}, "Design", select), html("label", {}, paths, "Paths"),
+      html("span", {className: "moving-pace", textContent: data.pace}));
+    controls.hidden = false;
+    choose(data.first);
+  }
+
   function start() {
     for (const figure of document.querySelectorAll("figure.moving")) {
       const data = JSON.parse(figure.querySelector("script").textContent);
-      if (data.choices) workspace(figure, data); else motion(figure, data);
+      if (data.front) front(figure, data); else if (data.choices) workspace(figure, data); else motion(figure, data);
     }
   }
 
