@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import mechdesign
 from mechdesign.errors import StudyError
+from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.figures.animation import animation
+from mechdesign.report.page.moving import moving
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.expansion import expand
@@ -287,6 +292,7 @@ def test_file_that_is_no_motion_is_told(content: str, words: str, tmp_path: Path
         ("{theta: [{to: 90, time: 1}, {dwell: 1}]}", "a cycle that begins where it ends, and so needs two moves"),
         ("{theta: [{to: 90, time: 1}, {from: 2, to: 0, time: 1}]}", "'from' is for the first one"),
         ("{theta: []}", "an empty motion"),
+        ("{theta: {to: 90, time: 1}}", "segments of a motion stand in a list, [{from: 0, to: 90, time: 0.3}"),
         ("{}", "an empty motion"),
         ("{theta: 30}", "stand still"),
         ("{thet: [{from: 0, to: 90, time: 1}]}", "theta"),
@@ -416,3 +422,22 @@ optimize:
         table = mechdesign.kinematics(many).tables["motion"]
         mean = np.trapezoid(table["P.y"], table["time"]) / table["time"][-1]
         assert designs[goals[1]][k] == pytest.approx(mean, rel=1e-7)
+
+
+def test_animation_and_page_run_over_the_time_of_the_motion(tmp_path: Path) -> None:
+    for factor in (1, 4):
+        cycle = f"{{to: 90, time: {0.3 * factor}}}, {{dwell: {0.1 * factor}}}, {{to: 0, time: {0.4 * factor}}}"
+        study = load(f"kinematics: {{motion: {{theta: [{cycle}]}}, outputs: [P]}}", tmp_path)
+        result = mechdesign.kinematics(study)
+        picture = Image.open(io.BytesIO(animation(DrawnMotion.of(result).shown)))
+        assert picture.n_frames * picture.info["duration"] == pytest.approx(800 * factor, rel=0.12)
+        page = moving(study, result)
+        assert page is not None
+        assert "in the study's motion" in page.data["pace"]
+        # A motion too short to be watched is slowed down, and the page says so.
+        assert page.data["seconds"] == {1: 5.0, 4: 3.2}[factor]
+
+
+def test_radians_in_place_of_degrees_are_doubted(tmp_path: Path) -> None:
+    study = load("kinematics: {motion: {theta: [{from: 0, to: 1.5707963, time: 1}]}}", tmp_path)
+    assert any("if rad is meant" in str(warning) for warning in study.warnings)

@@ -85,6 +85,8 @@ class Course(fields.Model):
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any) -> Any:
+        if isinstance(raw, dict) and not raw.keys().isdisjoint(("to", "dwell")):
+            raise failure(f"segments of a motion stand in a list, {_RIGHT}")
         if isinstance(raw, dict | Course):
             return raw
         return {"segments" if isinstance(raw, list) else "file" if file_of(raw) is not None else "held": raw}
