@@ -98,7 +98,7 @@ class KinematicsSection(MotionSection):
         moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
         if self.instant_centres and drives > 1 and not moved:
             message = (
-                f"with {drives} drives instant centres depend on how fast each moves: give 'rates', a 'speed' or a "
+                f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed', or a "
                 "'motion'"
             )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
