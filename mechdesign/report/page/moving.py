@@ -222,7 +222,8 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
 def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: Numbers) -> dict[str, Any]:
     """Where the pose is in each panel of the curves: places of the cursor, and of a dot on each curve."""
     wide, tall = (72 * inches for inches in figure.get_size_inches())
-    over = abscissa(study, sweep.poses).values[sweep.rows]
+    speed = study.kinematics.speed if study.kinematics is not None else None
+    over = abscissa(study, sweep.poses, speed).values[sweep.rows]
     boxes = [axes.get_position() for axes in figure.axes]
     low, high = figure.axes[0].get_xlim()
     x = wide * (boxes[0].x0 + boxes[0].width * (over - low) / (high - low))
