@@ -441,3 +441,8 @@ def test_animation_and_page_run_over_the_time_of_the_motion(tmp_path: Path) -> N
 def test_radians_in_place_of_degrees_are_doubted(tmp_path: Path) -> None:
     study = load("kinematics: {motion: {theta: [{from: 0, to: 1.5707963, time: 1}]}}", tmp_path)
     assert any("if rad is meant" in str(warning) for warning in study.warnings)
+
+
+def test_pictures_of_velocities_take_the_rates_of_the_motion(tmp_path: Path) -> None:
+    motion = "motion: {theta: [{from: 40, to: 100, time: 0.3}]}, outputs: [P], pictures: [hodographs, polygons]"
+    assert asked(f"kinematics: {{{motion}}}", tmp_path).tables["motion"]["P.x_velocity"].any()

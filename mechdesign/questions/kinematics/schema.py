@@ -77,8 +77,9 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
-        if self.pictures and not self.rates and self.speed is None:
-            message = f"{' and '.join(self.pictures)} show velocities: give 'rates' of the drives, or a 'speed'"
+        if self.pictures and not self.rates and self.speed is None and self.motion is None:
+            shown = " and ".join(self.pictures)
+            message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
             checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
