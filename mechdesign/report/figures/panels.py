@@ -52,6 +52,10 @@ _ABSCISSA_TICK = 0.47  # inches from one to the next
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
 
 
+# Axes with a label that begins so are over a sweep or a path, whose label follows.
+OVER = "over "
+
+
 class Along(NamedTuple):
     """What a sweep or a path runs over."""
 
@@ -145,7 +149,12 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:
-    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees."""
+    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees.
+
+    The axes that share them are marked as panels over what is swept; a page moves a cursor through them.
+    """
+    for panel in axis.get_shared_x_axes().get_siblings(axis):
+        panel.set_label(f"{OVER}{swept.label}")
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
     inches = axis.get_position().width * style.width()
     axis.xaxis.set_major_locator(

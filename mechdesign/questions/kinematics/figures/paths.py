@@ -20,7 +20,7 @@ from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, framed, tiled, windows
+from mechdesign.report.figures.framing import ABOVE, LEFT, PLANE, RIGHT, TITLE, framed, tiled, windows
 from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
@@ -105,6 +105,7 @@ def paths_figure(
     if rows := sum(label.count("\n") + 1 for label in (*kinds, *([steps.words] if steps is not None else []))):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
+    axes.set_label(PLANE)
     for kind in kinds:
         axes.plot([], [], " ", label=kind)
     numbers = _draw_steps(axes, sweep, steps) if steps is not None else []

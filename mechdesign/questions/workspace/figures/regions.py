@@ -18,7 +18,7 @@ from matplotlib.patheffects import withStroke
 from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
+from mechdesign.report.figures.framing import BELOW, LEFT, PLANE, RIGHT, Window, extent, windows
 from mechdesign.report.figures.panels import legend_at_left, round_down
 from mechdesign.report.figures.style import Grid
 from mechdesign.results import Result, Table
@@ -299,6 +299,7 @@ def sheet(
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
+        axes.set_label(PLANE)
         axes.set_title(name, loc="left", fontsize=9.5)
         axes.locator_params(axis="x", nbins=max(1, int(window.width / _TICK)))
         axes.locator_params(axis="y", nbins=max(1, int(2 * window.height / _TICK)))
