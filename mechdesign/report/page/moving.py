@@ -91,7 +91,7 @@ def _motion(
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
-    for given in [table.column(name) for name in sweep.poses.values if name in table]:
+    for given in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(given).unit
         data["given"].append([given.name, unit, numbers.scaled[given.name][0]])
     # What names a pose: the coordinates that are given, or the drives.
