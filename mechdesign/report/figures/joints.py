@@ -25,6 +25,7 @@ from mechdesign.report.figures.panels import (
     tick_abscissa,
 )
 from mechdesign.study import Study
+from mechdesign.study.poses import TIME
 
 MAX_JOINTS = 6  # curves with a look of their own
 NOTHING = 1e-6  # part of the largest force that is rounding, as a force or as a difference of forces
@@ -148,7 +149,8 @@ def place_in_words(study: Study, over: Along, value: float) -> str:
     """Where on an abscissa: the coordinate with its value, or the number of the pose."""
     if not over.name:
         return f"pose {value:g}"
-    return f"{over.name} = {value:.6g} {study.units.label(study.mechanism.quantity(over.name))}".rstrip()
+    unit = study.units.label("time" if over.name == TIME else study.mechanism.quantity(over.name))
+    return f"{over.name} = {value:.6g} {unit}".rstrip()
 
 
 def joint_hodographs(
