@@ -118,6 +118,8 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if along is not None and not along.whole[k]:
         missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
     if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
-        message = f"the moments of {chains} are nan: equilibrium leaves open how slides and clamps of a chain share them"
+        message = (
+            f"the moments of {chains} are nan: equilibrium leaves open how slides and clamps of a chain share them"
+        )
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
