@@ -16,8 +16,8 @@ import numpy as np
 import mechdesign
 from mechdesign.errors import MechdesignError
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.report.page.moving import TIMES, moving
-from mechdesign.report.page.tracks import PLACES, TURNS
+from mechdesign.report.page.moving import moving
+from mechdesign.report.page.tracks import PLACES, TIMES, TURNS
 
 # A moving part lies this far beside its pose at most: units of a drawing that is shown half as large, degrees, lengths.
 _NEAR = {"translate": 1.0, "rotate": 0.5, "scale": 0.01}

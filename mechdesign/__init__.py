@@ -1,4 +1,4 @@
-"""Design studies of planar mechanisms: one description, five questions.
+"""Design studies of planar mechanisms: one description, six questions.
 
 >>> import mechdesign
 >>> from mechdesign.study import template_path

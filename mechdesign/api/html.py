@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
@@ -19,16 +18,15 @@ from mechdesign.report.figures.style import printed
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.pages import harmless
 from mechdesign.report.requirements import Verdict
-from mechdesign.report.tables import cells
-from mechdesign.results import Column, Result, Table
+from mechdesign.results import Result, Table
 from mechdesign.study import Study
+from mechdesign.table_text import readable
 
 # Of the main table, shown in a cell.
 ROWS = 6
 COLUMNS = 8
 _UNIT = "unit"  # column that says the unit of each row
 _DIGITS = 6  # significant digits of its numbers
-_ROUNDING = 1e-13  # of the largest number of that unit: what is less is no more than rounding
 _ENTRIES = 40  # of a list, such as links or warnings
 _LETTERS = 200  # of a text in it
 # Bytes of a PNG that stands in the page; a larger one is left to `Answer.figure`.
@@ -90,7 +88,7 @@ def answer_html(
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,
-        beginning=None if main is None else _beginning(main, answer.seen.main),
+        beginning=None if main is None else _beginning(main),
         others=others,
         also={"pictures": figures, "files": list(answer.files)},
     )
@@ -138,31 +136,16 @@ def _link(link: LinkWords, unit: str) -> str:
     return f"{link.name} ({', '.join(link.points)}{length})"
 
 
-def _largest(columns: Sequence[Column], unit: str) -> float:
-    """The largest number of those columns that have a unit."""
-    floats = [column.values for column in columns if column.unit == unit and column.values.dtype.kind == "f"]
-    return max((float(np.max(np.abs(each), initial=0.0, where=np.isfinite(each))) for each in floats), default=0.0)
-
-
-def _rounded(column: Column, largest: float) -> Column:
-    """A column without numbers that would be zero but for rounding."""
-    values = column.values
-    if values.dtype.kind == "f" and column.unit:
-        values = np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
-    return replace(column, values=values)
-
-
-def _beginning(table: Table, seen: Table) -> _Beginning:
+def _beginning(table: Table) -> _Beginning:
     # The units of rows of several quantities are never left out.
     first = [column for column in table.columns if column.name != _UNIT][: COLUMNS - (_UNIT in table)]
     columns = [column for column in table.columns if column in first or column.name == _UNIT]
-    largest = {column.unit: _largest(seen.columns, column.unit) for column in columns}
     first_rows = table.take(np.arange(min(ROWS, len(table))))
-    shown = Table(table.name, tuple(_rounded(first_rows.column(c.name), largest[c.unit]) for c in columns))
+    shown = Table(table.name, tuple(first_rows.column(column.name) for column in columns))
     left = []
     if len(table) > ROWS:
         left.append(counted(len(table) - ROWS, "more row"))
     if more := [column.name for column in table.columns if column not in columns]:
         left.append(f"{counted(len(more), 'more column')} ({', '.join(more)})")
     heads = [(column.name, printed(column.unit), column.meaning, column.numeric) for column in columns]
-    return _Beginning(heads, [*zip(*cells(shown, _DIGITS), strict=True)], left)
+    return _Beginning(heads, [*zip(*readable(table, shown), strict=True)], left)

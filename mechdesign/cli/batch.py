@@ -29,10 +29,10 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.live_table import LiveTable, Reported
 from mechdesign.cli.options import Options
-from mechdesign.cli.places import PAGE, claim, folder, place
+from mechdesign.cli.places import claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import StudyError
-from mechdesign.files import check_marked, owned
+from mechdesign.files import owned
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from mechdesign.report.page.page import Entry
 
 _SUFFIXES = (".yaml", ".yml")  # of study files in a folder
+_NUMBERS = 4  # key numbers of a study in the index
 
 
 def questions(study: Study) -> tuple[str, ...]:
@@ -130,8 +131,7 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             if own != options:
                 study = load_source(origin, own)
             asked = _places(only or questions(study), root, own)
-            if own.report:
-                check_marked(root / pages.REPORT, PAGE)
+            places.check_reports(root, own)
             for command, directory in asked:
                 places.check(study, command, directory, own)
             tasks.append(Task(number, origin, label, root, asked, own))
@@ -313,11 +313,12 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
 def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
+    pages.remove(task.root / pages.PRINTED)
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None
     left = [command for command, _ in task.questions if command not in {outcome.command for outcome in outcomes}]
-    write_report(task.root, study, outcomes, options, left)
+    numbers = write_report(task.root, study, outcomes, options, left)
     if not several:
         return None
     from mechdesign.report.page.page import Entry, thumbnail
@@ -330,6 +331,7 @@ def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: boo
         met=sum(verdict.met for verdict in verdicts),
         required=sum(number_of(study, command) for command, _ in task.questions),
         warnings=len({warning for outcome in outcomes for warning in outcome.warnings}),
+        numbers=numbers[:_NUMBERS],
         drawing="" if options.no_plots else thumbnail(study),
         link=f"{study.label}/{pages.REPORT}",
     )

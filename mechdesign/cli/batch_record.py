@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 _HEADER = to_csv(summary.summary(())).encode()  # first line of every summary
 _LOST = "run"  # in place of the commands of a study whose process was killed
+_LEFT = "the run ended before it"
 _KILLED = "the process that computed it was killed, as where memory runs out; use fewer --jobs"
 
 
@@ -101,7 +102,7 @@ class BatchRecord:
         if self.options.report and self.several:
             from mechdesign.report.page.page import Entry
 
-            self._entries[number] = Entry(outcome.study, outcome.study, [], failed=outcome.failed)
+            self._entries[number] = Entry(outcome.study, outcome.study, failed=outcome.failed, outcome=outcome.word)
 
     def begin(self, tasks: Sequence[Task]) -> None:
         """Start with the tasks."""
@@ -170,10 +171,8 @@ class BatchRecord:
         terminal.show(table, as_json=options.json)
         first = self._first_to_open()
         if any(entry.link for entry in self._entries.values()):
-            from mechdesign.report.page.page import index
-
             path = self._root / pages.INDEX
-            if self._file(path, index([entry for _, entry in sorted(self._entries.items())]), PAGE):
+            if self._file(path, self._index(), PAGE):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
                 first = path
         told = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
@@ -191,6 +190,17 @@ class BatchRecord:
         reports = [path for path in paths if os.path.exists(path)]
         pictures = (outcome.picture for study in self._outcomes for outcome in study)
         return next((path for path in (*reports, *pictures) if path is not None), None)
+
+    def _index(self) -> bytes:
+        """The page of all studies, also of those that the run did not come to."""
+        from mechdesign.report.page.page import Entry, index
+
+        labels = {number: name_of(path) for number, path in enumerate(self._asked)}
+        labels |= {task.number: task.label for task in self._tasks}
+        return index([
+            self._entries.get(number) or Entry(label, label, failed=_LEFT, outcome="not answered")
+            for number, label in labels.items()
+        ])  # fmt: skip
 
     def _with_left(self) -> Iterator[Outcome]:
         """Outcomes in the order of the studies, with those of questions that were not reached."""

@@ -17,7 +17,7 @@ import mechdesign
 from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
-from mechdesign.cli.options import Options
+from mechdesign.cli.options import PDF, Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
@@ -333,8 +333,10 @@ def tell(outcome: Outcome, study: Study, options: Options) -> None:
 
 def write_report(
     directory: Path, study: Study, outcomes: Sequence[Outcome], options: Options, left: Sequence[str] = ()
-) -> None:
-    """Write a study's report from the files of its questions; `left` are questions that were not answered.
+) -> list[Mapping[str, str]]:
+    """Write a study's report from the files of its questions, and return its key numbers.
+
+    `left` are questions that were not answered.
 
     Raises
     ------
@@ -354,7 +356,14 @@ def write_report(
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
-    terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
+    printed = ""
+    if options.report == PDF:
+        from mechdesign.report.page import printing
+
+        writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
+        printed = f", printed in {directory / pages.PRINTED}"
+    terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
+    return [number for each in told if each.section is not None for number in each.section["headlines"]]
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:

@@ -90,6 +90,10 @@ class Curve:
             )
             self.pieces, _ = search.pieces(self._closed)
 
+    def grid(self, s: Floats) -> tuple[Ints, Floats]:
+        """The same places on every line, line by line, for `solve`."""
+        return np.repeat(np.arange(self.lines), len(s)), np.tile(s, self.lines)
+
     def given(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
         """Poses at places of lines, and what they give (radians, lengths)."""
         poses = self.poses.along(line, s)

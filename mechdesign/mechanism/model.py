@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.algebra import Value
 
 Term = str | float
 Quantity = Literal["length", "angle", "none"]
@@ -55,9 +56,9 @@ class Mass:
     Without a centre it is the middle of the body's points.
     """
 
-    mass: Term
-    center: tuple[Term, Term] | None = None
-    inertia: Term = 0.0
+    mass: Term | Value
+    center: tuple[Term | Value, Term | Value] | None = None
+    inertia: Term | Value = 0.0
 
 
 @dataclass(frozen=True)

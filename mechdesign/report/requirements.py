@@ -122,13 +122,11 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     problems: list[Problem] = []
     judged = {command_of(requirement) for requirement in study.requirements}
     if goals and study.optimize is not None:
-        from mechdesign.questions.optimize.evaluation import Evaluator
-        from mechdesign.questions.optimize.variables import check_choices
+        from mechdesign.questions.optimize.question import designs_question
 
         try:
-            check_choices(study)
             with suppress(AssemblyError):
-                Evaluator(study)
+                designs_question(study)
         except StudyError as error:
             problems += error.problems
             # Its requirements would report the same mistakes.

@@ -14,21 +14,12 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import printable, printable_lines
 from mechdesign.results import Column, Table
+from mechdesign.table_text import texts
 
 _DIGITS = 12
 _BLOCK = 20_000
 # A cell that begins with one of these is a formula to a spreadsheet.
 _FORMULA = ("=", "+", "-", "@")
-
-
-def _texts(values: NDArray[Any], digits: int) -> list[str]:
-    values = np.asarray(values)
-    if values.dtype.kind == "f":
-        # Adding zero turns -0.0 into 0.0: the sign of a zero is an accident of rounding.
-        return [format(value, f".{digits}g") for value in (values + 0.0).tolist()]
-    if values.dtype.kind == "b":
-        return ["1" if value else "0" for value in values.tolist()]
-    return [printable(str(value)) for value in values.tolist()]
 
 
 def _harmless(text: str) -> str:
@@ -46,7 +37,7 @@ def _is_number(text: str) -> bool:
 
 def cells(table: Table, digits: int = _DIGITS) -> list[list[str]]:
     """Text of every cell, column by column; booleans as 1 and 0."""
-    return [_texts(column.values, digits) for column in table.columns]
+    return [texts(column.values, digits) for column in table.columns]
 
 
 def to_csv(table: Table) -> str:
@@ -72,7 +63,7 @@ def _lines(columns: Sequence[NDArray[Any]]) -> str:
     """Lines of a table; tables of numbers only are formatted at once, in a third of the time."""
     if not all(values.dtype.kind in "fiub" for values in columns):
         stream = io.StringIO()
-        cells = [_texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, _texts(v, _DIGITS)) for v in columns]
+        cells = [texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, texts(v, _DIGITS)) for v in columns]
         csv.writer(stream, lineterminator="\n").writerows(zip(*cells, strict=True))
         return stream.getvalue()
     floats = [values.dtype.kind == "f" for values in columns]

@@ -25,6 +25,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.plan import THREAD_CHUNK
 from mechdesign.questions.kinematics.analysis import answers, kinematics
 from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
 from mechdesign.report.tables import csv_blocks
 from mechdesign.study import Study
@@ -188,7 +189,7 @@ def evaluated(text: str, names: Sequence[str], minimised: str, condition: str) -
     ranges = ", ".join(f"{name}: {{from: 0, to: 1, number: 2}}" for name in names)
     section = f"optimize={{variables: {{{ranges}}}, minimize: [{minimised}], subject_to: [{condition}]}}"
     study = study_of(text, section)
-    return Evaluator(study), population(names, study)
+    return Evaluator(designs_question(study)), population(names, study)
 
 
 def four_bar_turn(crank: np.ndarray, rod: np.ndarray, rocker: np.ndarray) -> list[np.ndarray]:

@@ -15,6 +15,7 @@ from helpers.memory import peak_of
 import mechdesign
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 # A coupler point is to follow a rounded triangle, with a point every five degrees of the crank.
@@ -28,7 +29,7 @@ def measure(
     ranges = ", ".join(f"{name}: {{from: 0, to: 1, number: 2}}" for name in variables)
     section = f"optimize={{variables: {{{ranges}}}, minimize: [{result}]}}"
     study = mechdesign.load(CONFIGS / path, [section, *changes])
-    evaluator = Evaluator(study, [goal(result, smallest=True)])
+    evaluator = Evaluator(designs_question(study, [goal(result, smallest=True)]))
     rng = np.random.default_rng(1)
     nominal = {name: study.parameters.nominal.get(name, study.mechanism.nominal.get(name)) for name in variables}
     batch = {name: value * (1 + width * rng.uniform(-1, 1, designs)) for name, value in nominal.items()}

@@ -17,6 +17,7 @@ from helpers.memory import peak_of
 import mechdesign
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 ARM_SAMPLES = 2_000_000
@@ -203,7 +204,7 @@ def test_first_order_of_designs(benchmark: Any, result: str, limits: str) -> Non
     """Milliseconds of one processor a design, in populations of 100, beside NumPy by hand."""
     text = FIVE_BAR.replace("{limits}", limits).replace("{result}", f"reliability.{result}")
     study = mechdesign.load(text=text)
-    evaluator = Evaluator(study, [goal(f"reliability.{result}", smallest=result == "moments.sigma")])
+    evaluator = Evaluator(designs_question(study, [goal(f"reliability.{result}", smallest=result == "moments.sigma")]))
     rng = np.random.default_rng(1)
     batch = {"l1": rng.uniform(35, 45, DESIGNS), "tol": rng.uniform(0.01, 0.03, DESIGNS)}
     seconds: list[float] = []

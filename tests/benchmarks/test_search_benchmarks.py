@@ -16,6 +16,7 @@ import mechdesign
 from mechdesign.numerics.fronts import hypervolume
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 
 STUDY = Path(__file__).parent / "three_variables.yaml"
 INDICES = ("GII", "GRI", "SUI")
@@ -27,7 +28,9 @@ def best_of_a_line(bounds: mechdesign.results.Table) -> float:
     """The best score of symmetrical designs with lower links of length R, l_min in steps of 0.0005, by these bounds."""
     study = mechdesign.load(STUDY, ["workspace.integrate.tolerance=1e-6"])
     l_min = np.arange(1.05, 1.15, 0.0005)
-    found = Evaluator(study, [goal(name) for name in INDICES])({"l_min": l_min, "l_1": l_min**0, "l_2": l_min**0})
+    found = Evaluator(designs_question(study, [goal(name) for name in INDICES]))(
+        {"l_min": l_min, "l_1": l_min**0, "l_2": l_min**0}
+    )
     low, high = bounds["min"][:3], bounds["max"][:3]
     values = found.table[:, : len(INDICES)].T
     return float(((values - low[:, None]) / (high - low)[:, None]).sum(axis=0).max())

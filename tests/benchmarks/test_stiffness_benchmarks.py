@@ -14,6 +14,7 @@ import mechdesign
 from mechdesign.experiments.batches import answers
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs
 
@@ -103,7 +104,7 @@ def test_populations_of_designs(benchmark: Any, name: str) -> None:
     varied = ", ".join(f"{each}: {{from: 1, to: 2, number: 2}}" for each in DESIGNS[name][0])
     section = f"optimize={{variables: {{{varied}}}, maximize: [stiffness.k_min]}}"
     designs = designs_of(name, 100, section, "requirements=null")
-    evaluator = Evaluator(designs.study, [goal("stiffness.k_min")])
+    evaluator = Evaluator(designs_question(designs.study, [goal("stiffness.k_min")]))
     found = benchmark.pedantic(evaluator, (designs.changed,), rounds=5, warmup_rounds=1)
     assert found.reasons == [""] * 100
     benchmark.extra_info["cpu_ms_a_design"] = 1e3 * cpu(lambda: evaluator(designs.changed)) / 100

@@ -11,6 +11,7 @@ import pytest
 
 from mechdesign.errors import AssemblyError, Interrupted
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.report.page import printing
 
 from .conftest import SLIDER, answer
 
@@ -28,7 +29,7 @@ requirements:
 FINE = (
     SLIDER.replace("to: 90, step: 45", "to: 360, step: 1") + "  rates: {theta: 10 rad/s}\n  outputs: [B, rod.angle]\n"
 )
-VOID = {"meta", "img", "br", "link", "input", "hr"}
+VOID = {"meta", "img", "br", "link", "input", "hr", "wbr"}
 
 
 class Page(HTMLParser):
@@ -109,7 +110,7 @@ def test_a_page_holds_all_of_a_study(asks, invoke):
     page = Page("results/both/report.html")
     check(page)
     headings = page.said("h2")
-    assert headings[:3] == ["Mechanism", "Answers", "Requirements"]
+    assert headings[:3] == ["Answers", "Requirements", "Mechanism"]
     assert {"How does it move?", "How stiff is it?"} <= set(headings)
     motion = json.loads(Path("results/both/kinematics/manifest.json").read_text())["tables"]["motion.csv"]["columns"]
     heads = page.said("th")
@@ -189,16 +190,49 @@ def test_an_index_tells_of_every_study(asks, analysis, invoke):
     check(page)
     rows = [" ".join(text.split()) for text in page.said("tr")][1:]
     assert "stiffness: ✗ cannot be assembled" in rows[0]
-    assert "✗ 0 of 2 met" in rows[0]
+    assert "✗ NOT MET0 of 2 requirements met" in rows[0]
     assert "wrong study" in rows[1]
     assert "mechanism.links.crank" in rows[1]
-    assert "kinematics: ✓ done no requirements no warnings" in rows[2]
+    assert "kinematics: ✓ doneno warnings" in rows[2]
     assert [each["href"] for each in page.all("a")] == ["both/report.html", "slider/report.html"]
     assert len(page.all("img")) == 2
     failed = Page("results/both/report.html")
     check(failed)
     assert "cannot be assembled: cannot reach <there>" in " ".join(failed.said("p"))
     assert "not judged" in failed.text
+
+
+def test_an_index_begins_with_what_is_not_met_and_has_key_numbers(asks, invoke):
+    for name, limit in (("c", 30), ("a", 30), ("b", 200), ("z", 200)):
+        gate = f"requirements: [{{result: kinematics.extremes.B.x.range, at_least: {limit}}}]\n"
+        (asks / f"{name}.yaml").write_text(SLIDER.replace("Offset slider-crank", name) + gate)
+    studies = [f"{name}.yaml" for name in ("c", "z", "slider", "a", "b")]
+    done = invoke("run", *studies, "--report", "--no-plots", "--out", "all")
+    assert done.exit_code == 1, done.stderr
+    page = Page("all/index.html")
+    check(page)
+    assert [each["href"].partition("/")[0] for each in page.all("a")] == ["b", "z", "a", "c", "slider"]
+    assert [cell.split(" ")[0] for cell in page.said("td")[1::4]] == ["✗", "✗", "✓", "✓", "nothing"]
+    assert page.said("li")[0].startswith("range of A.x: 40")
+    assert "2 not met" in " ".join(page.said("span"))
+
+
+def test_the_index_of_an_interrupted_run_names_the_studies_that_were_not_answered(asks, analysis, invoke):
+    def interrupt(study, **options):
+        raise KeyboardInterrupt
+
+    analysis(interrupt, "stiffness")
+    (asks / "last.yaml").write_text(SLIDER)
+    done = invoke("run", "slider.yaml", "both.yaml", "last.yaml", "--report", "--no-plots", "--jobs", 1)
+    assert done.exit_code == 130
+    page = Page("results/index.html")
+    check(page)
+    rows = [" ".join(text.split()) for text in page.said("tr")][1:]
+    assert len(rows) == 3
+    assert "✗ interrupted" in rows[0]
+    assert "✗ not answered" in rows[1]
+    assert "✓ done" in rows[2]
+    assert not [*Path("results").glob(".*.tmp")]
 
 
 def test_an_interrupted_run_leaves_a_page_of_what_was_finished(asks, analysis, invoke):
@@ -257,3 +291,41 @@ def test_an_older_page_goes_and_one_of_others_stays(folder, invoke):
     own.write_text("<p>mine")
     invoke("run", "slider.yaml", "--no-plots")
     assert own.exists()
+
+
+def test_without_a_browser_a_printed_report_is_refused_before_anything_is_computed(folder, invoke, monkeypatch):
+    monkeypatch.setattr(printing, "BROWSERS", ("no-such-browser",))
+    for command in ("run", "kinematics"):
+        done = invoke(command, "slider.yaml", "--report", "pdf")
+        assert done.exit_code == 2
+        assert "no browser to print with; install Chromium, Chrome or Edge" in done.stderr
+    assert not (folder / "results").exists()
+    assert "--report takes pdf or nothing, not 'png'" in invoke("run", "slider.yaml", "--report=png").stderr
+
+
+def test_a_browser_prints_the_report_and_an_older_print_goes(folder, invoke, monkeypatch):
+    browser = folder / "chromium"
+    browser.write_text("""#!/bin/sh
+for word; do case $word in --print-to-pdf=*) printf '%%PDF-1.4 (D:20261127101010)\\n' > "${word#*=}";; esac; done
+""")
+    browser.chmod(0o755)
+    monkeypatch.setattr(printing, "BROWSERS", (str(browser),))
+    printed = folder / "results/slider/report.pdf"
+    done = invoke("run", "--report", "pdf", "slider.yaml", "--no-plots")
+    assert done.exit_code == 0, done.stderr
+    assert f"printed in {printed.relative_to(folder)}" in done.stderr
+    assert printed.read_bytes().startswith(b"%PDF-1.4 (D:19700101000000)\n")
+    manifest = json.loads((folder / "results/slider/kinematics/manifest.json").read_text())
+    assert manifest["report"] is True
+    # Without a kind it is the page alone, and a study may follow.
+    assert invoke("run", "--report", "slider.yaml", "--no-plots").exit_code == 0
+    assert printed.with_name("report.html").exists()
+    assert not printed.exists()
+    printed.write_bytes(b"%PDF mine")
+    assert "no result of mechdesign's" in invoke("run", "slider.yaml", "--report", "pdf", "--no-plots").stderr
+    assert printed.read_bytes() == b"%PDF mine"
+    printed.unlink()
+    browser.write_text("#!/bin/sh\necho no display >&2\nexit 1\n")
+    done = invoke("run", "slider.yaml", "--report", "pdf", "--no-plots")
+    assert done.exit_code == 4
+    assert "did not print it: no display" in done.stderr

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.page import Answered, report
+from mechdesign.report.page.printing import pdf
 from mechdesign.report.page.section import section
+from mechdesign.report.page.vector import picture
+from mechdesign.report.requirements import requirements
 from mechdesign.study import load
 
 try:
@@ -23,6 +31,8 @@ except ImportError:
     expect = None
 
 CONFIGS = Path(__file__).parents[2] / "configs"
+# Of a sweep; the last cannot be built.
+FEW_CASES = ("matrix={vary: {mechanism.parameters.l: [5, 4, -1]}, results: [kinematics.extremes.B.x.range]}",)
 PIXELS = 0.2  # of the drawing: a step of the places and of the angles that the page has
 
 pytestmark = pytest.mark.browser
@@ -35,21 +45,35 @@ def answers():
     for name, command, *overrides in (
         ("gallery/slider_crank", kinematics), ("gallery/rrr_platform", kinematics), ("five_bar", workspace),
         ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
+        ("gallery/straight_line_front", optimize, "optimize.evaluations=200"),
+        ("gallery/offset_slider_crank", sweep, *FEW_CASES),
     ):  # fmt: skip
         study = load(CONFIGS / f"{name}.yaml", overrides)
         found[Path(name).name] = study, command(study)
     return found
 
 
+# Pictures that are in a study's report, beside what moves.
+PICTURES = {"four_bar": ("transmission", "paths"), "five_bar": ("inscribed",)}
+
+
+def drawn(study, result, names):
+    """Pictures of a result as they stand in a page."""
+    with style.context():
+        gallery = figures(study, result)
+        return {name: picture(gallery[name], f"{result.command}-{name}", name) for name in names}
+
+
 @pytest.fixture(scope="module")
 def reports(answers, tmp_path_factory):
-    """A folder with the reports of these, without other pictures."""
+    """A folder with the reports of these, with few pictures."""
     folder = tmp_path_factory.mktemp("reports")
     for name, (study, result) in answers.items():
-        part, warnings = section(study, result, {}, "", (), plots=True)
+        part, warnings = section(study, result, drawn(study, result, PICTURES.get(name, ())), "", (), plots=True)
         assert warnings == ()
+        verdicts = requirements(study, result)
         (folder / f"{name}.html").write_bytes(
-            report(study, [Answered(result.command, "done", 0, section=part)], below=False)
+            report(study, [Answered(result.command, "done", 0, verdicts=verdicts, section=part)], below=False)
         )
     return folder
 
@@ -59,8 +83,8 @@ def opened(browser, reports):
     """Open a study's report; at the end nothing was asked of the network, and nothing complained."""
     pages, complaints = [], []
 
-    def look(name, width=1400, **options):
-        page = browser.new_page(viewport={"width": width, "height": 900}, **options)
+    def look(name, width=1400, height=900, **options):
+        page = browser.new_page(viewport={"width": width, "height": height}, **options)
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda request: complaints.append(request.url)
@@ -211,11 +235,11 @@ def test_who_wants_no_motion_sees_steps(opened):
 
 def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
     page, rows, poses = opened("slider_crank"), rows_of(answers, "slider_crank"), poses_of(answers, "slider_crank")
-    curves = page.locator(".moving-curves")
+    curves = page.locator(".moving-beside svg")
     box = curves.bounding_box()
     curves.click(position={"x": 0.5 * box["width"], "y": 0.3 * box["height"]})
     row = int(poses[int(page.get_by_role("slider").input_value())])
-    cursor = float(page.locator(".moving-cursor").get_attribute("x1"))
+    cursor = float(curves.locator(".moving-cursor").first.get_attribute("x1"))
     wide = float(curves.get_attribute("viewBox").split()[2])
     assert cursor == pytest.approx(0.5 * wide, abs=0.01 * wide)
     assert 0 < row < len(rows) - 1
@@ -253,12 +277,219 @@ def test_an_index_says_what_it_is(opened):
     meaning = "smallest over largest singular value of the Jacobian"
     number = page.locator("dl.numbers div", has_text="mean inverse_condition")
     assert f"mean over the region: {meaning}" in number.inner_text()
-    assert page.locator(".moving-numbers th", has_text="inverse_condition").get_attribute("title") == meaning
+    assert meaning in page.locator(".moving-numbers th", has_text="inverse_condition").inner_text()
+
+
+def test_one_cursor_goes_through_every_picture(opened):
+    page = opened("four_bar")
+    page.get_by_role("slider").press("Home")
+    link = page.locator(".required a[data-pose]")
+    assert link.inner_text() == "crank 0"
+
+    def cursors():
+        return page.evaluate("""() => [...document.querySelectorAll("svg[data-axes]")].flatMap(svg =>
+            JSON.parse(svg.dataset.axes).filter(axes => axes[0] === "crank [deg]").map((axes, k) => {
+                const at = Number(svg.querySelectorAll(".moving-cursor")[k].getAttribute("x1"));
+                return axes[5] + (axes[6] - axes[5]) * (at - axes[1]) / (axes[2] - axes[1]);
+            }))""")  # fmt: skip
+
+    def dots():
+        return page.evaluate("""() => [...document.querySelectorAll(".moving-dot")].map(dot => {
+            const axes = JSON.parse(dot.closest("svg").dataset.axes)[0];
+            const [left, right, top, bottom, west, east, south, north] = axes.slice(1);
+            const at = name => Number(dot.getAttribute(name));
+            return [west + (east - west) * (at("cx") - left) / (right - left),
+                    south + (north - south) * (bottom - at("cy")) / (bottom - top)];
+        })""")  # fmt: skip
+
+    transmission = page.locator("#kinematics .pictures svg[aria-label=transmission]")
+    box = transmission.bounding_box()
+    transmission.hover(position={"x": 0.6 * box["width"], "y": 0.4 * box["height"]})
+    angle = float(re.search(r"crank = (\S+) deg", words(page))[1])
+    found = cursors()
+    assert len(found) > 3
+    assert found == pytest.approx([angle] * len(found), abs=0.4)
+    assert 150 < angle < 300
+    # The coupler point in the picture of the paths is where the moving mechanism has it.
+    (dot,), (x, y, error) = dots(), place(page, "C")
+    assert abs(complex(*dot) - complex(x, y)) < 2 * error
+    link.click()
+    assert cursors() == pytest.approx([0.0] * len(found), abs=0.4)
+
+
+def test_a_drag_on_the_linkage_moves_its_nearest_point(opened):
+    page = opened("four_bar")
+    pin = page.locator(".moving [data-at=A]:has(circle)").bounding_box()
+    drawing = page.locator(".moving svg").first.bounding_box()
+    data = page.evaluate("() => JSON.parse(document.querySelector('.moving script').textContent)")
+    page.mouse.move(pin["x"] + pin["width"] / 2, pin["y"] + pin["height"] / 2)
+    page.mouse.down()
+    # To where the crank, 1 long about the origin, points up.
+    scale = drawing["width"] / page.evaluate("() => document.querySelector('.moving svg').viewBox.baseVal.width")
+    up = (data["corner"][1] - 1) * data["scale"] * scale
+    page.mouse.move(drawing["x"] - data["corner"][0] * data["scale"] * scale, drawing["y"] + up, steps=4)
+    page.mouse.up()
+    assert float(re.search(r"crank = (\S+) deg", words(page))[1]) == pytest.approx(90, abs=3)
+
+
+def test_between_rows_of_the_table_pins_are_where_the_solver_has_them(opened, answers):
+    page, poses = opened("four_bar"), poses_of(answers, "four_bar")
+    slider, angles = page.get_by_role("slider"), [45 * each for each in poses[1::5]]
+    assert any(each % 45 for each in angles)
+    fine = load(
+        CONFIGS / "gallery" / "four_bar.yaml",
+        ["kinematics.sweep=null", f"kinematics.poses={json.dumps([{'crank': each} for each in angles])}"],
+    )
+    rows = list(kinematics(fine).tables["motion"])
+    for number, row in zip(range(1, len(poses), 5), rows, strict=True):
+        slider.fill(str(number))
+        x, y, error = place(page, "C")
+        assert abs(complex(x, y) - complex(row["C.x"], row["C.y"])) < error
+    rows = rows_of(answers, "four_bar")
+    assert len(rows) == 9
+    for number, row in enumerate(rows):
+        slider.fill(str(poses.index(number)))
+        x, y, error = place(page, "C")
+        assert abs(complex(x, y) - complex(row["C.x"], row["C.y"])) < error
+
+
+def test_one_map_is_chosen_by_its_index(opened):
+    page = opened("five_bar")
+    shown, legend = page.locator(".moving-region"), page.locator(".moving-legend:not(.moving-off)")
+    assert "inverse condition" in legend.inner_html()
+    boxes = page.get_by_role("radio")
+    assert boxes.count() == 5
+    page.get_by_role("radio", name="sigma min").check()
+    assert page.locator(shown.get_attribute("href")).locator("image").count() == 1
+    assert "sigma_min" in shown.get_attribute("href")
+    assert "sigma min" in legend.inner_html()
+
+
+@pytest.mark.parametrize("name", ["four_bar", "five_bar"])
+def test_the_first_screen_has_mechanism_verdicts_and_key_numbers(opened, name):
+    page = opened(name, 1280, height=800)
+    assert page.locator("#answers dl.numbers > div").count() == 5
+    pieces = [".moving svg", ".moving-words", ".status", "#answers dl.numbers", "#requirements tbody tr >> nth=0"]
+    for piece in pieces if name == "four_bar" else pieces[:-1]:
+        box = page.locator(piece).first.bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 800, piece
+
+
+def test_on_a_dark_screen_pictures_are_dark_and_their_letters_light(opened):
+    page = opened("four_bar", color_scheme="dark")
+    colors = page.evaluate("""() => {
+        const bright = color => color.match(/[.0-9]+/g).slice(0, 3).reduce((sum, each) => sum + Number(each), 0) / 3;
+        const text = document.querySelector(".pictures svg text"), ground = document.querySelector(".moving svg rect");
+        return [bright(getComputedStyle(text).fill), bright(getComputedStyle(ground).fill),
+                bright(getComputedStyle(text.closest("figure")).backgroundColor)];
+    }""")
+    assert colors[0] > 200
+    assert max(colors[1:]) < 60
+    # What a colour of a map means stays.
+    given, seen = (
+        opened("five_bar", color_scheme="dark")
+        .locator(".moving-legend rect")
+        .first.evaluate("each => [each.getAttribute('fill'), getComputedStyle(each).fill]")
+    )
+    assert [int(given[k : k + 2], 16) for k in (1, 3, 5)] == [*map(int, re.findall(r"\d+", seen))]
+
+
+def test_on_a_phone_letters_can_be_read_and_what_is_at_the_side_is_said(opened):
+    page = opened("four_bar", 390)
+    chart = page.locator(".moving-beside")
+    assert (
+        page.evaluate("""() => Math.min(...[...document.querySelectorAll(".pictures svg text")].map(text =>
+        parseFloat(text.getAttribute("font-size") || 10) * text.ownerSVGElement.clientWidth
+        / text.ownerSVGElement.viewBox.baseVal.width))""")
+        > 6.5
+    )
+    assert "more to the side" in chart.evaluate("each => getComputedStyle(each, '::before').content")
+    chart.evaluate("each => { each.scrollLeft = each.scrollWidth; }")
+    expect(chart).not_to_have_class(re.compile("more"))
+    # The linkage stays in sight while the charts are read.
+    chart.scroll_into_view_if_needed()
+    assert page.locator(".moving svg").first.bounding_box()["y"] >= 0
+
+
+def test_it_is_printed_on_few_pages(browser, reports):
+    printed = pdf(reports / "four_bar.html")
+    assert printed.startswith(b"%PDF")
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 5
+    assert pdf(reports / "four_bar.html") == printed
+
+
+def test_a_click_on_a_front_shows_that_linkage_moving(opened, answers):
+    page, table = opened("straight_line_front"), answers["straight_line_front"][1].tables["pareto"]
+    picture, slider = page.locator(".moving-beside svg"), page.get_by_role("slider", name="pose of the motion")
+    assert "knee" in words(page)
+    data = json.loads(page.locator(".moving script").text_content())
+    (x, y), k = data["front"][0], 0
+    wide = float(picture.get_attribute("viewBox").split()[2])
+    box = picture.bounding_box()
+
+    def look():
+        row = data["choices"][k]["number"] - 1
+        assert words(page).startswith(f"design {row + 1} of {len(table)} on the front")
+        chosen = page.locator(".moving-chosen")
+        assert [float(chosen.get_attribute(key)) for key in ("cx", "cy")] == [x[k], y[k]]
+        # The rocker is as long as that of the design, and P is twice as far from A as B.
+        scale, size = data["choices"][0]["scale"], table["l3"][row]
+        pins = {}
+        for point in ("A", "B", "D", "P"):
+            place = page.locator(f".moving-design [data-at={point}]:has(circle)").first.get_attribute("transform")
+            pins[point] = complex(*map(float, re.match(r"translate\((\S+) (\S+)\)", place).groups())) / scale
+        assert abs(pins["B"] - pins["D"]) == pytest.approx(size, abs=2 * PIXELS / scale)
+        assert abs(pins["P"] - pins["A"]) == pytest.approx(2 * size, abs=2 * PIXELS / scale)
+        assert float(page.locator(".moving-numbers tr:has(th:text-is('l3')) td span").inner_text()) == pytest.approx(
+            size, abs=1e-3)  # fmt: skip
+        return pins["P"]
+
+    shown = {data["choices"][k]["number"]}
+    for k, share in ((0, 0.4), (len(x) - 1, 0.8)):
+        scale = box["width"] / wide
+        picture.click(position={"x": scale * x[k], "y": scale * y[k]})
+        first = look()
+        slider.fill(str(share * float(slider.get_attribute("max"))))
+        assert abs(look() - first) > 0.1
+        shown.add(data["choices"][k]["number"])
+    assert len(shown) > 1
+    picture.press("ArrowLeft")
+    k -= 1
+    look()
+    page.locator("dl.numbers div", has_text="best kinematics.P.y_error").get_by_role("link").click()
+    k = 0
+    look()
+    page.get_by_role("button", name="Play").click()
+    before = slider.input_value()
+    page.wait_for_timeout(150)
+    assert slider.input_value() != before
+    page.get_by_role("button", name="Pause").click()
+
+
+def test_a_column_sorts_a_table_by_a_click_and_by_a_key(opened):
+    page = opened("offset_slider_crank")
+    table = page.locator("table.sorted").first
+    cases = table.locator("tbody tr td:first-child")
+    assert cases.all_inner_texts() == ["1", "2", "3"]
+    head = table.locator("th", has_text="mechanism.parameters.l")
+    head.get_by_role("button").click()
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert cases.all_inner_texts() == ["3", "2", "1"]
+    # A case without a number comes last, whichever way.
+    stroke = table.locator("th", has_text="B.x.range")
+    for order in ("ascending", "descending"):
+        stroke.get_by_role("button").press("Enter")
+        assert stroke.get_attribute("aria-sort") == order
+        assert head.get_attribute("aria-sort") is None
+        assert cases.all_inner_texts()[-1] == "3"
+    stroke.get_by_role("button").press("Enter")
+    assert cases.all_inner_texts() == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize("width", [400, 1400])
 def test_nothing_is_wider_than_the_screen(opened, width):
-    for name in ("slider_crank", "five_bar"):
+    for name in ("slider_crank", "five_bar", "straight_line_front", "offset_slider_crank"):
         page = opened(name, width)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 

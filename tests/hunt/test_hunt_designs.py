@@ -19,6 +19,7 @@ from mechdesign.experiments.tally import Tally
 from mechdesign.experiments.wanted import Wanted
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.together import Group
 from mechdesign.results import Result
 
@@ -236,7 +237,7 @@ def test_designs_at_once_are_those_written_out(seeds: Seeds) -> None:
         goals = [goal(name) for name in columns(command, own)]
         variables = {name: {"from": 0, "to": 1000} for name in NOMINAL}
         study = mechdesign.load(data | {"optimize": {"method": "search", "variables": variables, "minimize": "p"}})
-        found = Evaluator(study, goals)(designs)
+        found = Evaluator(designs_question(study, goals))(designs)
         for k in range(COUNT):
             values = {name: float(column[k]) for name, column in designs.items()}
             plain = written_out(data, values)

@@ -10,7 +10,8 @@ from helpers.studies import study_of
 
 import mechdesign
 from mechdesign.errors import AssemblyError, StudyError
-from mechdesign.questions.optimize.variables import check_choices, from_cube, grid
+from mechdesign.questions.optimize.question import designs_question
+from mechdesign.questions.optimize.variables import choice_problems, from_cube, grid
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
 from mechdesign.results import Result
@@ -204,7 +205,7 @@ def test_a_choice_that_fails_only_together_with_another_is_an_infeasible_design(
     named = "stiffness.sections.tube.inner_diameter: {choices: [15, 21]}, stiffness.sections.tube.diameter: "
     changes = "stiffness.elastic.rod=tube", "stiffness.sections.tube={E: 2e5, diameter: 24, inner_diameter: 15}"
     study = press(f"{named}{{choices: [20, 24]}}", *changes)
-    check_choices(study)
+    assert not list(choice_problems(study))
     table = mechdesign.optimize(study).tables["designs"]
     assert [bool(each) for each in table["feasible"]] == [True, True, False, True]
     assert "the inner diameter" in table["reason"][2]
@@ -244,7 +245,7 @@ def test_the_nearest_of_designs_that_miss_a_condition_names_its_choices() -> Non
 def test_wrong_variables_are_told_at_their_place(variables: str, message: str) -> None:
     text = PRESS.partition("  variables:")[0] + f"  variables: {{{variables}}}\n  maximize: stiffness.k_min\n"
     with pytest.raises(StudyError) as raised:
-        check_choices(mechdesign.load(text=text))
+        designs_question(mechdesign.load(text=text))
     assert message in str(raised.value)
     assert {problem.line for problem in raised.value.problems} == {23}
 

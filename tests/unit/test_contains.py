@@ -15,6 +15,7 @@ import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.optimize.evaluation import Evaluator
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.contained import Shape, fitting_scale
 from mechdesign.questions.workspace.question import questions
@@ -234,7 +235,7 @@ def test_held_values_and_the_characteristic_length_follow_the_variables() -> Non
     goals = "optimize={variables: {crank: {from: 150, to: 170, step: 10}}, maximize: [GII, SUI], minimize: [area]}"
     changes = (goals, "workspace.at.platform.angle=crank/5 - 40", "workspace.characteristic_length=crank - 90")
     study = study_of(RRR, *changes)
-    assert Evaluator(study)._regions_together
+    assert Evaluator(designs_question(study)).question.regions_together
     table = mechdesign.optimize(study, jobs=1).tables["designs"]
     for k, crank in enumerate(table["crank"]):
         alone = study_of(RRR, *changes, f"mechanism.parameters.crank={crank}")

@@ -13,6 +13,7 @@ import mechdesign
 from mechdesign.errors import MechdesignError, StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import Goal, goal, goals_of, unit_of
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.optimize.schema import Condition
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
@@ -57,8 +58,8 @@ def one_by_one(study: Study, goals: list[Goal], designs: Designs) -> dict[Goal, 
 
 
 def agree(study: Study, goals: list[Goal], designs: Designs, *, together: bool = True) -> None:
-    evaluator = Evaluator(study, goals)
-    assert bool(evaluator._together) == together
+    evaluator = Evaluator(designs_question(study, goals))
+    assert bool(evaluator.question.together) == together
     found, expected = evaluator(designs), one_by_one(study, goals, designs)
     feasible = np.array([not reason for reason in found.reasons])
     assert feasible.any()
@@ -115,7 +116,7 @@ def test_full_turns_with_derivatives_and_refined_extremes() -> None:
     ]
     designs = around(study, names, 12, 0.3)
     agree(study, goals, designs)
-    reasons = Evaluator(study, goals[:1])(designs).reasons
+    reasons = Evaluator(designs_question(study, goals[:1]))(designs).reasons
     assert "a pose cannot be assembled" in reasons
 
 
@@ -237,9 +238,9 @@ def test_workspaces_where_the_section_depends_on_a_variable() -> None:
     study, other = (varied("two_rrr.yaml", ["l_min"], f"workspace.scan.about=[{x}, 0]") for x in ("0", "0*l_min"))
     goals = [goal("GII"), goal("workspace.area"), goal("sigma_min_mean")]
     designs = {"l_min": np.array([1.5, 2.0, 40.0])}
-    one, two = Evaluator(study, goals), Evaluator(other, goals)
-    assert one._regions_together
-    assert not two._regions_together
+    one, two = Evaluator(designs_question(study, goals)), Evaluator(designs_question(other, goals))
+    assert one.question.regions_together
+    assert not two.question.regions_together
     found, alone = one(designs), two(designs)
     assert found.reasons == alone.reasons
     assert found.reasons[0] == ""
@@ -253,7 +254,7 @@ def test_workspaces_where_the_section_depends_on_a_variable() -> None:
 def test_stiffness_as_an_index_of_the_workspace() -> None:
     study = varied("five_bar.yaml", ["lower_1.length"], "workspace={point: C, integrate: {tolerance: 1e-2}}")
     wanted = goal("workspace.k_min_mean")
-    found = Evaluator(study, [wanted])({"lower_1.length": np.array([100.0, 104.0])})
+    found = Evaluator(designs_question(study, [wanted]))({"lower_1.length": np.array([100.0, 104.0])})
     assert found.reasons == ["", ""]
     assert found.table[0, 0] != found.table[1, 0]
 
@@ -313,8 +314,8 @@ def test_each_kind_of_variable_changes_the_geometry_that_is_evaluated(
     study = study_of(text + section)
     wanted = goal(f"kinematics.extremes.{output}.max")
     designs = {name: np.array([nominal_value(study, name), value])}
-    evaluator = Evaluator(study, [wanted])
-    assert evaluator._together
+    evaluator = Evaluator(designs_question(study, [wanted]))
+    assert evaluator.question.together
     given = evaluator(designs).table[:, 0]
     assert given == pytest.approx(one_by_one(study, [wanted], designs)[wanted], rel=1e-9)
     assert abs(given[1] - given[0]) > 1e-3 * abs(given[0])
@@ -323,14 +324,16 @@ def test_each_kind_of_variable_changes_the_geometry_that_is_evaluated(
 def test_a_limit_that_is_varied_makes_designs_infeasible() -> None:
     section = "optimize: {variables: {limits.0.max: {from: 0, to: 1, number: 2}}, maximize: [kinematics.T.x]}"
     study = study_of(TELESCOPE + section, "kinematics.sweep=", "kinematics.poses=[{jack: 65}, {jack: 110}]")
-    found = Evaluator(study, [goal("kinematics.T.x")])({"limits.0.max": np.array([120.0, 100.0, 50.0])})
+    found = Evaluator(designs_question(study, [goal("kinematics.T.x")]))(
+        {"limits.0.max": np.array([120.0, 100.0, 50.0])}
+    )
     assert found.reasons == ["", "a pose is outside the limits", "limits.0: the maximum is below the minimum"]
 
 
 def test_designs_that_make_no_mechanism_are_told_and_leave_the_others_alone() -> None:
     study = study_of(SLIDE + "optimize: {variables: {r: {from: 0, to: 1, number: 2}}, maximize: [kinematics.P.x]}")
     wanted = goal("kinematics.P.x")
-    found = Evaluator(study, [wanted])({"r": np.array([40.0, -1.0, np.nan, 500.0, 41.0])})
+    found = Evaluator(designs_question(study, [wanted]))({"r": np.array([40.0, -1.0, np.nan, 500.0, 41.0])})
     assert found.reasons == [
         "",
         "crank.length is not positive",
@@ -364,7 +367,7 @@ def test_names_that_no_result_has_are_told_before_anything_is_computed(goals: st
     asked = list(goals_of(section))
     asked += [judged for condition in section.subject_to for judged in bounds_of(condition)]
     with pytest.raises(StudyError, match=message):
-        Evaluator(study, asked)
+        Evaluator(designs_question(study, asked))
 
 
 def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None:
@@ -375,11 +378,11 @@ def test_a_wrong_name_is_told_with_its_place_in_the_file(tmp_path: Path) -> None
     study = mechdesign.load(file)
     line = SLIDE.count("\n") + 5
     with pytest.raises(StudyError, match=rf"wrong\.yaml:{line}:7: optimize\.maximize\.1: .*no column 'W\.x'"):
-        Evaluator(study, [goal("kinematics.P.x"), goal("kinematics.W.x")])
+        Evaluator(designs_question(study, [goal("kinematics.P.x"), goal("kinematics.W.x")]))
     # As an override gives it.
     study = mechdesign.load(file, ["optimize.maximize=[kinematics.V.x]"])
     with pytest.raises(StudyError, match=r"--set optimize\.maximize=.*no column 'V\.x'"):
-        Evaluator(study, [goal("kinematics.V.x")])
+        Evaluator(designs_question(study, [goal("kinematics.V.x")]))
 
 
 @pytest.mark.slow
@@ -389,9 +392,9 @@ def test_blocks_do_not_change_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
     study = varied("gallery/four_bar.yaml", ["crank.length", "coupler.C.x"])
     goals = [goal("kinematics.extremes.C.y.range"), goal("kinematics.C.x")]
     designs = around(study, ["crank.length", "coupler.C.x"], 9, 0.1)
-    whole = Evaluator(study, goals)(designs)
+    whole = Evaluator(designs_question(study, goals))(designs)
     monkeypatch.setattr(poses, "POSES_AT_ONCE", 150)
-    parts = Evaluator(study, goals)(designs)
+    parts = Evaluator(designs_question(study, goals))(designs)
     assert parts.table.tobytes() == whole.table.tobytes()
 
 
@@ -406,7 +409,7 @@ kinematics: {sweep: {arm: {from: 0, to: 80, number: n}}, outputs: [P]}
 optimize: {method: search, variables: {n: {from: 2, to: 9}, r: {from: 1, to: 9}}, minimize: kinematics.motion.P.x}
 """)
     designs = {"n": np.array([3.0, 5.0, 3.0, 2.5]), "r": np.array([10.0, 20.0, 30.0, 40.0])}
-    found = Evaluator(study, [goal("kinematics.P.x")], graded=True)(designs)
+    found = Evaluator(designs_question(study, [goal("kinematics.P.x")], graded=True))(designs)
     np.testing.assert_allclose(found.table[:3, 0], np.array([10, 20, 30]) * np.cos(np.radians(80)))
     assert found.reasons == ["", "", "", "kinematics.sweep.arm.number: expected a whole number, not ..."]
 

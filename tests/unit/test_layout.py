@@ -27,6 +27,7 @@ ORDER = (
     ("mechdesign.questions", "mechdesign.region"),
     ("mechdesign.questions.kinematics",),
     ("mechdesign.questions.stiffness",),
+    ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.reliability",),
     ("mechdesign.questions.workspace",),
     ("mechdesign.questions.optimize",),

@@ -1,6 +1,8 @@
 """The mechanism in the report: what the script is given is the motion of the tables, part by part."""
 
 import json
+import re
+import string
 from functools import cache
 from xml.etree import ElementTree
 
@@ -17,11 +19,16 @@ from mechdesign.report.page.tracks import PLACES, TURNS
 from mechdesign.study import load
 
 
-def decoded(steps, count, unit=1):
-    """Values of a list of steps, as the script reads it."""
-    steps = [*steps, *[0] * (count - len(steps))]
-    known = np.array([step is not None for step in steps])
-    return np.where(known, np.cumsum([step or 0 for step in steps]) / unit, np.nan)
+def decoded(text, count, unit=1):
+    """Values of steps in letters, as the script reads them: a point for none, or digits to the base 32."""
+    digits = string.ascii_uppercase + string.ascii_lowercase + string.digits + "-_"
+    numbers = []
+    for word in re.findall(r"\.|[g-z0-9_-]*[A-Za-f]", text):
+        value = sum((digits.index(letter) % 32) * 32**k for k, letter in enumerate(word) if word != ".")
+        numbers.append(None if word == "." else -(value + 1) // 2 if value % 2 else value // 2)
+    numbers += [0] * (count - len(numbers))
+    known = np.array([step is not None for step in numbers])
+    return np.where(known, np.cumsum([step or 0 for step in numbers]) / unit, np.nan)
 
 
 def places(data, point):

@@ -167,7 +167,7 @@ def test_a_result_shows_what_is_met_and_how_its_main_table_begins() -> None:
     assert len(page.all("img")) == 1
     assert [verdict.met for verdict in result.verdicts] == [True, False]
     assert "range of B.x: 54 mm (from 50 to 104)" in page.text
-    begins = ("[mm]", "2 more columns", "extremes, 7 rows", "pictures: motion, paths")
+    begins = ("[mm]", "2 more columns", "extremes, 7 rows", "pictures: paths, motion")
     for words in (HOSTILE, "How does it move?", "1 of 2 met", "✗ not met", *begins):
         assert words in page.text
     assert next(head["title"] for head in page.all("th") if "title" in head) == result.main.columns[0].meaning
@@ -218,7 +218,7 @@ def test_a_requirement_that_names_nothing_does_not_keep_a_result_from_being_show
 @pytest.mark.nightly
 def test_one_picture_by_its_name_whatever_the_settings() -> None:
     result = mechdesign.kinematics(mechdesign.load(DATA))
-    assert result.figures == ("motion", "paths", "poses", "transmission", "mechanism")
+    assert result.figures == ("paths", "motion", "poses", "transmission", "mechanism")
     usual = result.figure("paths")
     with matplotlib.rc_context({"font.size": 30, "axes.grid": False, "savefig.dpi": 20}):
         mine = dict(matplotlib.rcParams)
@@ -230,7 +230,7 @@ def test_one_picture_by_its_name_whatever_the_settings() -> None:
     assert shown == usual._repr_png_()
     assert shown.startswith(PNG)
     assert result._repr_png_() == result.figure("motion")._repr_png_()
-    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are motion, paths, poses"):
+    with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are paths, motion, poses"):
         result.figure("path")
 
 
@@ -359,3 +359,15 @@ def test_a_table_shows_its_first_rows_with_units():
     some = Table("motion", columns).take(np.arange(10))
     long = LongTable(some, 30, lambda: iter([Table("motion", columns, "one row a pose")]))
     assert long._repr_html_().replace("motion<", "motion: one row a pose<") == html
+
+
+def test_a_table_shows_no_rounding_error():
+    columns = (
+        Column("x", np.array([1.0, 6.1e-17, np.nan]), "mm"),
+        Column("y", np.array([-3e-16, 2.0, np.inf]), "mm"),
+        Column("part", np.array([1.0, 6.1e-17, 0.5])),
+    )
+    rows = Page(Table("motion", columns)._repr_html_()).all("tr")
+    assert len(rows) == 4
+    text = Page(Table("motion", columns)._repr_html_()).text
+    assert text.endswith("part101026.1e-17\N{EN DASH}\N{INFINITY}0.5")

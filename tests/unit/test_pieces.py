@@ -13,6 +13,7 @@ import mechdesign
 from mechdesign.errors import AssemblyError, StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.question import questions
 from mechdesign.region.curves import workspace_nodes
@@ -224,7 +225,7 @@ def values(names: Sequence[str], changes: dict[str, np.ndarray], text: str) -> d
     ranges = ", ".join(f"{name}: {{from: 0, to: 400, number: 2}}" for name in changes)
     study = study_of(text, f"optimize={{variables: {{{ranges}}}, maximize: [{', '.join(names)}]}}")
     goals = [goal(name, smallest=False) for name in names]
-    found = Evaluator(study, goals)(changes)
+    found = Evaluator(designs_question(study, goals))(changes)
     assert not any(found.reasons)
     return dict(zip(names, found.table.T, strict=False))
 

@@ -11,7 +11,9 @@ import pytest
 import mechdesign
 from mechdesign.experiments.ranking import Ranking
 from mechdesign.report.cases import best_of
+from mechdesign.report.page.cases import MOST_CELLS, gates, telling_rows
 from mechdesign.report.page.headlines import headlines
+from mechdesign.results import Column, Table
 from tests.unit.test_cases import SLIDER_CRANK
 
 STROKE, ANGLE = "kinematics.extremes.B.x.range", "kinematics.rod.angle.max"
@@ -95,13 +97,16 @@ def test_what_is_best_is_told_in_words():
     ranked, front = int((table["exit_code"] == 0).sum()), int(table["front"].sum())
     case = f"case {row + 1} (r {table[R][row]:g}, l {table[L][row]:g})"
     assert str(best) == f"best of {ranked} ranked cases is {case}; {front} of them are on the Pareto front"
-    first, second = headlines(result)
-    assert (first.label, first.value, first.note) == (
-        "best case",
-        str(row + 1),
-        f"r {table[R][row]:g}, l {table[L][row]:g}",
-    )
-    assert (second.value, second.note) == (str(front), f"of {ranked} ranked cases")
+    told = {
+        each.label: (each.value, each.unit, each.note.replace("\N{NO-BREAK SPACE}", " ")) for each in headlines(result)
+    }
+    assert told == {
+        "best case": (str(row + 1), "", f"r = {table[R][row]:g} mm, l = {table[L][row]:g} mm"),
+        f"{STROKE} of the best case": (f"{table[STROKE][row]:.4g}", "mm", ""),
+        f"{ANGLE} of the best case": (f"{table[ANGLE][row]:.4g}", "deg", ""),
+        "cases on the Pareto front": (str(front), "", f"of {ranked} ranked cases"),
+        "cases that meet every requirement": (str(ranked), "", f"of {len(table)} cases"),
+    }
     alike = best_of(swept({"maximize": STROKE}, {R: [36, 40], L: [100, 120]}).main)
     assert str(alike) == "best of 4 ranked cases is case 3 (r 40, l 100) and 1 more as good"
 
@@ -112,7 +117,42 @@ def test_where_no_case_meets_every_requirement_none_is_ranked():
     assert not result.main["front"].any()
     assert str(result.warnings[-1]) == "no case is ranked: none was answered and meets every requirement"
     assert best_of(result.main) is None
-    assert headlines(result) == []
+    assert [(each.label, each.value, each.note) for each in headlines(result)] == [
+        ("cases that meet every requirement", "0", "of 2 cases")
+    ]
+    told = gates(result)
+    assert told is not None
+    assert told["case"] is None
+    assert {row["name"]: row["kept"] for row in told["rows"] if row["limit"]} == {
+        name: f"{result.main[f'{name}_met'].sum()} of 2" for name in result.main.names if f"{name}_met" in result.main
+    }
+
+
+@pytest.mark.slow
+def test_a_page_says_which_limits_the_best_case_keeps_and_how_many_cases_do():
+    result = swept({"maximize": STROKE, "minimize": ANGLE})
+    table, told = result.main, gates(result)
+    assert told is not None
+    row = int(np.flatnonzero(table["rank"] == 1)[0])
+    assert told["case"] == row + 1
+    rows = {each["name"]: each for each in told["rows"]}
+    assert rows["r"]["value"] == f"{table[R][row]:g}"
+    assert rows[STROKE]["sense"] == "more is better"
+    for name in [name for name in table.names if f"{name}_met" in table]:
+        assert rows[name]["met"] is True
+        assert rows[name]["kept"] == f"{table[f'{name}_met'].sum()} of {len(table)}"
+
+
+def test_of_many_cases_a_page_has_the_best_or_else_the_first():
+    count = MOST_CELLS
+    columns = (Column("case", np.arange(1, count + 1)), Column("rank", np.arange(count, 0, -1.0)))
+    table, words = telling_rows(Table("sweep", columns))
+    assert words == f"the best {count // 2} of"
+    assert table["rank"].tolist() == [*range(1, count // 2 + 1)]
+    table, words = telling_rows(Table("sweep", (*columns[:1], Column("met", np.zeros(count)))))
+    assert words == f"the first {count // 2} of"
+    assert table["case"].tolist() == [*range(1, count // 2 + 1)]
+    assert telling_rows(table)[1] == "all"
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import mechdesign
 from mechdesign.questions.optimize import stacked
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.poses import study_poses
 from mechdesign.study.designs import Designs
 
@@ -165,7 +166,7 @@ def test_a_design_whose_tolerances_are_none_does_not_spoil_the_others():
     ).replace("r: 30", "r: 2.5").replace("P: [20, 25]", "P: [2, 1.5]").replace("10*sqrt(r) + 40", "80")  # fmt: skip
     study = mechdesign.load(text=text + "optimize: {method: search, variables: {r: {from: 2, to: 4}, t: {from: -0.1, "
                             "to: 0.1}}, minimize: [reliability.moments.sigma]}")  # fmt: skip
-    evaluator = Evaluator(study, [goal("reliability.moments.sigma", smallest=True)])
+    evaluator = Evaluator(designs_question(study, [goal("reliability.moments.sigma", smallest=True)]))
     found = evaluator({"r": np.array([2.5, 2.6, 3.2, 2.9]), "t": np.array([0.02, 0.03, 0.02, -0.07])})
     assert [bool(reason) for reason in found.reasons] == [False, False, True, True]
     assert "gives no j8 of ... mm here" in found.reasons[2]

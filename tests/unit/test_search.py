@@ -17,6 +17,7 @@ from mechdesign.questions.optimize.analysis import _doubts
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.explorer import Explorer, Known, Part, Spent
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.optimize.search import Ending, search
 from mechdesign.questions.optimize.variables import from_cube
 
@@ -179,7 +180,7 @@ def test_rows_of_goals_are_those_of_the_tables():
     study = study_of(ARM, "kinematics={sweep: {theta1: {from: 0, to: 50, step: 10}, theta2: 60}, outputs: [P]}")
     goals = [goal("kinematics.P.x", smallest=True), goal("kinematics.P.y"), goal("kinematics.extremes.P.x.max")]
     designs = {"r1": np.array([3.0, 4.0, 5.0]), "r2": np.array([6.0, 5.0, 6.0])}
-    evaluator = Evaluator(study, goals, graded=True)
+    evaluator = Evaluator(designs_question(study, goals, graded=True))
     found = evaluator(designs)
     # An extreme is one row.
     places = evaluator.layout.rows
@@ -189,7 +190,7 @@ def test_rows_of_goals_are_those_of_the_tables():
     assert found.table[:, places[goals[0]]] == pytest.approx(path.real)
     assert found.table[:, places[goals[1]]] == pytest.approx(path.imag)
     assert found.table[:, 0] == pytest.approx(path.real.max(axis=1))
-    evaluator.limit_rows(evaluator.layout.width - evaluator.layout.head - 1)
+    evaluator = Evaluator(evaluator.question.limited(evaluator.layout.width - evaluator.layout.head - 1))
     assert not evaluator.layout.rows
     assert evaluator(designs).table.shape == (3, evaluator.layout.head)
 
@@ -372,7 +373,9 @@ def test_what_a_method_needs(change, told):
 def test_designs_that_do_not_assemble_have_a_slope():
     """The longer the links of a tray's five-bar, the less its poses miss; none where all assemble."""
     problem = tray(None)
-    evaluator = Evaluator(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], graded=True)
+    evaluator = Evaluator(
+        designs_question(study_of(problem.study), [goal("kinematics.S.x", smallest=True)], graded=True)
+    )
     l1 = np.linspace(60, 140, 30)
     designs = {"l1": l1, "l2": l1 + 10, "y0": 0 * l1 + 150}
     found = evaluator(designs)
@@ -389,9 +392,9 @@ def test_residuals_are_what_a_root_mean_square_is_of():
     problem = timed_path(6, lambda t: 30 * np.cos(t) + 20j * np.sin(t) + 60j, {"a": (10, 20), "b": (90, 99)},
                          more={"c": 80, "u": 30, "v": 20, "x0": 3, "y0": 4})  # fmt: skip
     each = goal(problem.goal, smallest=True)
-    evaluator = Evaluator(study_of(problem.study), [each], graded=True)
+    evaluator = Evaluator(designs_question(study_of(problem.study), [each], graded=True))
     found = evaluator({"a": np.array([12.0, 18.0]), "b": np.array([95.0, 91.0])})
-    assert evaluator.squares == {each}
+    assert evaluator.question.squares == {each}
     rows = found.table[:, evaluator.layout.rows[each]]
     assert rows.shape == (2, 12)
     exact = problem.cost(np.array([12.0, 18.0]), np.array([95.0, 91.0]))

@@ -12,6 +12,7 @@ import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import Goal, goals_of
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.report.requirements import Verdict
 from mechdesign.statistics import STATISTICS, Interval
 
@@ -306,7 +307,7 @@ GOALS = [
 def test_goals_of_many_designs_are_those_of_each_alone() -> None:
     study = study_of(FOUR_BAR + OPTIMIZE % ", ".join(GOALS))
     assert study.optimize is not None
-    evaluator = Evaluator(study)
+    evaluator = Evaluator(designs_question(study))
     goals = list(evaluator.goals)
     lengths = np.linspace(22.0, 38.0, 7)
     found = evaluator({"a": lengths})

@@ -15,6 +15,7 @@ from helpers.studies import study_of
 from mechdesign.errors import AssemblyError
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.goals import goal
+from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.stiffness.analysis import answers, stiffness
 from mechdesign.results import Result
 from mechdesign.study.designs import Designs
@@ -309,7 +310,7 @@ def test_goals_of_designs_are_those_of_their_own_answers(
         table, _, name = column.removeprefix("stiffness.").rpartition(".")
         values = stiffness(designs.one(k)).tables[table or "stiffness"][name]
         largest.append(values.max())
-    evaluator = Evaluator(study, [goal(column, smallest=True)])
+    evaluator = Evaluator(designs_question(study, [goal(column, smallest=True)]))
     monkeypatch.setattr(Designs, "one", None)
     found = evaluator(designs.changed)
     assert found.reasons == [""] * COUNT
@@ -332,5 +333,5 @@ def test_a_leg_that_has_a_spring_in_one_design_only() -> None:
     for text, tables in (("leg_1", springs), ("near+far", springs[1:2])):
         asked = goal("stiffness.springs.stiffness", where={"leg": text})
         least = [table["stiffness"][table["leg"] == text].min() for table in tables]
-        values = Evaluator(study, [asked])(designs.changed).table[:, 0]
+        values = Evaluator(designs_question(study, [asked]))(designs.changed).table[:, 0]
         np.testing.assert_allclose(values[np.isfinite(values)], least, rtol=1e-12)

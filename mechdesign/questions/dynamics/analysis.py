@@ -6,7 +6,7 @@ carry the forces along.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -25,7 +25,7 @@ from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
-from mechdesign.results import Drawn, Result, Scope
+from mechdesign.results import Drawn, Result, Scope, Table
 from mechdesign.statistics import Asked
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -33,6 +33,7 @@ from mechdesign.work.threads import one_thread
 
 # Tables with a row a pose, or several.
 A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
+TABLES = (*A_ROW_A_POSE, "extremes")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +55,7 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
         raise result
     if not passage.long:
         return result
-    long = {
-        name: passage.table(make, jobs, result.tables[name].scope)
-        for name, make in A_ROW_A_POSE.items() if name == "dynamics"
-    }  # fmt: skip
+    long = {name: passage.table(make, jobs, result.tables[name].scope) for name, make in A_ROW_A_POSE.items()}
     return replace(result, tables={**result.tables, **long})
 
 
@@ -73,21 +71,36 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
     return {"singular": motion.valid & ~np.isfinite(motion.arrays[effort])}
 
 
+def tables(
+    motion: Motion, question: MotionQuestion, wanted: Collection[str], outputs: Collection[str] | None = None,
+    asked: Collection[Asked] = (),
+) -> tuple[dict[str, Table], Along | None]:  # fmt: skip
+    """Some tables of a motion, and the motion between its poses, which is that of the question.
+
+    Of the extremes those of some `outputs`, or all; columns that are `asked` are followed besides.
+    """
+    names = [static.name for static in asked_of(motion).statics if outputs is None or static.name in outputs]
+    integrals = [Asked(name, integral=True) for name in names] if "extremes" in wanted else []
+    along = along_of(question, names, asked=[*asked, *integrals])
+    found = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in wanted}
+    if "extremes" in wanted:
+        found["extremes"] = extremes_table(motion, along, names)
+    return found, along
+
+
 def _group(passage: Passage) -> Group:
     """The answers of all designs."""
-    question, motion, poses = passage.question, passage.motion, passage.question.poses
-    statics = asked_of(motion).statics
-    along = along_of(question, asked=[Asked(static.name, integral=True) for static in statics])
-    tables = {name: make(motion) for name, make in A_ROW_A_POSE.items()} | {"extremes": extremes_table(motion, along)}
+    question, poses = passage.question, passage.question.poses
+    found, along = tables(passage.motion, question, TABLES)
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
     a_pose = replace(whole, course=cache(partial(_follow, question)))
-    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in tables.items()}
+    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in found.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends
-        drawn = DrawnForces(passage.shown, motion)
+        drawn = DrawnForces(passage.shown, passage.motion)
         result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
 
@@ -118,8 +131,6 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if along is not None and not along.whole[k]:
         missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
     if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
-        message = (
-            f"the moments of {chains} are nan: equilibrium leaves open how slides and clamps of a chain share them"
-        )
+        message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)

@@ -6,12 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, angle_of, quiet
+from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
+from mechdesign.mechanism.model import Mass
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
@@ -19,6 +21,7 @@ from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
+from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -75,7 +78,8 @@ class ForceQuestion:
         Loading(study, section.loads, poses, rows).add(forces, moving)
         description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
         energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
-        energy += inertia(forces, mechanism.geometry, description.masses, moving, gravity, study.units.inertia_factor)
+        masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
+        energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
         held = balance(linear, forces)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
@@ -90,6 +94,26 @@ class ForceQuestion:
         for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
             columns |= self._parts(name, reaction)
         return columns
+
+    def _beams(self, poses: Poses, rows: Ints, places: Mapping[str, Value]) -> dict[str, Mass]:
+        """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""
+        stiffness, mechanism = self.study.stiffness, self.study.mechanism
+        if stiffness is None:
+            return {}
+        sections, masses = poses.section(stiffness, rows).sections, dict[str, Mass]()
+        for name, profile in stiffness.elastic.items():
+            link, section = mechanism.description.links[name], sections[profile]
+            if section.density is None or link.telescopic:
+                continue
+            corners = [mechanism.geometry.place(name, point, places) for point in corners_of(link)]
+            spans = [(b - a, (a + b) / 2) for a, b in pairwise(corners)]
+            bars = [section.density * section.extent[0] * np.abs(along) for along, _ in spans]
+            mass = sum(bars)
+            center = sum(bar * middle for bar, (_, middle) in zip(bars, spans, strict=True)) / mass
+            turning = sum(bar * (norm2(along) / 12 + norm2(middle - center))
+                          for bar, (along, middle) in zip(bars, spans, strict=True))  # fmt: skip
+            masses[name] = Mass(mass, (center.real, center.imag), turning)
+        return masses
 
     def _parts(self, name: str, reaction: Reaction) -> Mapping[str, Value]:
         force = np.asarray(reaction.force, dtype=complex)

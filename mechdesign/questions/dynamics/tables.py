@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -57,13 +58,13 @@ def joint_table(motion: Motion) -> Table:
     return JOINT_FORCES.table([*given, *columns, VALID.column(each(motion.valid))])
 
 
-def extremes_table(motion: Motion, along: Along | None) -> Table:
-    """``extremes.csv``: smallest and largest values, peaks and means of every column over the motion.
+def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) -> Table:
+    """``extremes.csv``: smallest and largest values, peaks and means of some columns over the motion.
 
     Along a motion they are those of all of it, between its poses too; elsewhere those of the valid poses.
     """
     question, poses = motion.question, motion.question.poses
-    statics, swept = asked_of(motion).statics, poses.swept
+    statics, swept = [static for static in asked_of(motion).statics if static.name in names], poses.swept
     at = (poses.values[swept] if swept is not None else poses.numbers).reshape(poses.designs, -1)
     valid = motion.valid.reshape(poses.designs, -1)
     numbers = np.full((len(statics), poses.designs, 8), np.nan)

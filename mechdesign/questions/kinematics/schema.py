@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field
 
@@ -16,6 +16,12 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 
 HELP_PAGE = "reference/study/kinematics"
+
+# Drawn where they are asked for.
+PICTURES = {
+    "hodographs": "velocities and accelerations of points over the motion, as the ways of their vectors' tips",
+    "polygons": "velocity and acceleration polygons of a few poses, or of the listed ones",
+}
 
 
 class KinematicsSection(MotionSection):
@@ -39,6 +45,8 @@ class KinematicsSection(MotionSection):
     """Pairs of links whose instant centre of velocity is found in every pose; of a telescopic leg the body at its begin
     counts. With more than one drive it depends on their rates. Example: [[rod, ground], [crank, rocker]]
     """
+    pictures: tuple[Annotated[str, fields.choice(PICTURES, "picture")], ...] = ()
+    """Pictures beside those that are always drawn; both need rates. Example: [hodographs, polygons]"""
     mechanical_advantage: dict[fields.CoordinateName, fields.CoordinateName] = Field(default_factory=dict)
     """Outputs, each with its input: the force (of an angle the moment) that the output gives over that put in, without
     friction; other drives are held. Example: {T.y: grip}
@@ -48,6 +56,9 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
+        if self.pictures and not self.rates and self.speed is None:
+            message = f"{' and '.join(self.pictures)} show velocities: give 'rates' of the drives, or a 'speed'"
+            checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
         rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]

@@ -22,8 +22,9 @@ from mechdesign.questions.optimize import search as searching
 from mechdesign.questions.optimize.evaluation import Evaluator, missing
 from mechdesign.questions.optimize.explorer import Explorer
 from mechdesign.questions.optimize.files import design_files
-from mechdesign.questions.optimize.goals import Goal, goals_of, shape_of
+from mechdesign.questions.optimize.goals import Goal, shape_of
 from mechdesign.questions.optimize.judge import Designs, Judge
+from mechdesign.questions.optimize.question import DesignsQuestion, designs_question
 from mechdesign.questions.optimize.tables import (
     best_table,
     bounds_table,
@@ -32,14 +33,12 @@ from mechdesign.questions.optimize.tables import (
     optimum_table,
     sensitivity_table,
 )
-from mechdesign.questions.optimize.variables import Design, check_choices, from_cube, grid, in_words, parted, study_of
+from mechdesign.questions.optimize.variables import Design, from_cube, grid, in_words, parted, study_of
 from mechdesign.questions.poses import Shown, solve_shown
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.contained import Shape, fitting_scale
 from mechdesign.questions.workspace.question import questions, split
-from mechdesign.questions.workspace.schema import Over
-from mechdesign.questions.workspace.tables import index_columns
 from mechdesign.region.rays import SINGLE
 from mechdesign.results import Drawn, Result
 from mechdesign.study import Study
@@ -66,24 +65,22 @@ def optimize(
     section = study.optimize
     if section is None or not section.variables:
         raise StudyError((study.problem("an optimisation needs variables", "optimize", "variables"),))
-    goals = tuple(goals_of(section))
-    if not goals:
+    if not (section.maximize or section.minimize):
         message = "what is to be best? e.g. maximize: [GII, GRI, SUI], or minimize"
         raise StudyError((study.problem(message, "optimize", "maximize"),))
-    check_choices(study)
+    question = designs_question(study, graded=section.method != "grid")
+    goals = question.objectives
     weights = np.array(section.weights or [[1.0] * len(goals)], dtype=float).reshape(-1, len(goals))
-    evaluator = Evaluator(study, graded=section.method != "grid")
-    meanings = _meanings(study, evaluator)
     budget = section.evaluations or (
-        pareto.allowance(len(goals), alone=evaluator.alone)
+        pareto.allowance(len(goals), alone=bool(question.alone))
         if section.method == "pareto"
-        else searching.allowance(len(section.variables), len(weights), alone=evaluator.alone)
+        else searching.allowance(len(section.variables), len(weights), alone=bool(question.alone))
     )
-    evaluator.limit_rows(MAX_KEPT_ROWS // budget)
-    with workers(evaluator, jobs, processes=True, travels=True) as compute:
-        judge = Judge(study, evaluator, compute, progress, journal)
+    question, meanings = question.limited(MAX_KEPT_ROWS // budget), question.meanings
+    with workers(Evaluator(question), jobs, processes=True, travels=True) as compute:
+        judge = Judge(question, compute, progress, journal)
         try:
-            doubts = _ask(study, judge, evaluator, weights, budget, study.seed if seed is None else seed)
+            doubts = _ask(study, judge, weights, budget, study.seed if seed is None else seed)
             designs = judge.designs(weights, meanings)
             if not designs.feasible.any():
                 raise _nothing_feasible(study, designs, judge.nearest())
@@ -99,7 +96,7 @@ def optimize(
                 raise
             raise Interrupted(_finished_part(partial)) from None
     tables = [
-        optimum_table(designs, _places(designs, evaluator)), designs_table(designs), bounds_table(designs),
+        optimum_table(designs, _places(designs, question)), designs_table(designs), bounds_table(designs),
         best_table(designs), sensitivity,
     ]  # fmt: skip
     if section.method == "pareto":
@@ -108,13 +105,13 @@ def optimize(
         doubts += tuple(pareto.doubts(growth, budget))
     files, wrong = design_files(study, designs, _optima(designs))
     counts = {"designs": len(designs), "infeasible": int((~designs.feasible).sum())}
-    warnings = (*doubts, *_warnings(evaluator, designs), *wrong)
+    warnings = (*doubts, *_warnings(question, designs), *wrong)
     named = {table.name: table for table in tables}
     return Result("optimize", named, warnings, counts, files=files, drawn=DrawnDesigns(designs))
 
 
 def _ask(
-    study: Study, judge: Judge, evaluator: Evaluator, weights: Floats, budget: int, seed: int
+    study: Study, judge: Judge, weights: Floats, budget: int, seed: int
 ) -> tuple[Caution, ...]:  # fmt: skip
     """Evaluate the designs of the study's method; returns warnings."""
     assert study.optimize is not None
@@ -126,10 +123,8 @@ def _ask(
         return ()
     dimensions, signs = len(section.variables), np.array([goal.sign for goal in judge.goals])
     judge.progress.start(budget, "designs")
-    # Values of a workspace are known to a tolerance only.
-    rough = bool(evaluator.questions)
     explorer = Explorer(
-        judge.known, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=rough
+        judge.known, dimensions, budget, judge.parts(), snap=lambda u: from_cube(study, u).u, rough=judge.rough
     )
     if section.method == "search":
         use_all = section.evaluations is not None
@@ -223,7 +218,7 @@ def _finished_part(designs: Designs) -> Result:
     return Result("optimize", {table.name: table}, (partly,), {"designs": len(designs)}, interrupted=message)
 
 
-def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
+def _warnings(question: DesignsQuestion, designs: Designs) -> Iterator[Caution]:
     reasons = designs.counted()
     for reason, count, first in reasons[:MAX_REASONS]:
         place = in_words(designs.design(first))
@@ -241,16 +236,16 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
                 "designs",
             )
     for goal in filter(lambda goal: goal.unassembled, designs.goals):
-        optimum = ask(study_of(evaluator.study, designs.design(designs.best)), goal.command)
+        optimum = ask(study_of(question.study, designs.design(designs.best)), goal.command)
         if part := missing(goal, optimum):
             words = (
                 f"{goal.name} of the optimum is that of a part of the motion, as 'unassembled: allowed' lets it: {part}"
             )
             yield Caution("unassembled", words, "optimum")
-    if not evaluator.questions or evaluator.questions[0].rule != "gauss":
+    if not question.regions or question.regions[0].rule != "gauss":
         return
     for goal, error in designs.errors.items():
-        loose = designs.feasible & (error > 2 * evaluator.questions[0].tolerance * np.abs(designs.found[goal]))
+        loose = designs.feasible & (error > 2 * question.regions[0].tolerance * np.abs(designs.found[goal]))
         if loose.any():
             yield Caution(
                 "unconverged",
@@ -258,25 +253,6 @@ def _warnings(evaluator: Evaluator, designs: Designs) -> Iterator[Caution]:
                 f"{goal.name}_error, or allow a larger workspace.integrate.tolerance",
                 "designs", int(loose.argmax()),
             )  # fmt: skip
-
-
-def _meanings(study: Study, evaluator: Evaluator) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each number of the workspace, by its column."""
-    if not evaluator.questions:
-        return {}
-    assert study.workspace is not None
-    columns = index_columns(study, evaluator.questions[0])
-    found = {name: (column.unit, column.meaning) for name, column in columns.items()}
-    for goal in evaluator.goals:
-        if goal.outline is not None:
-            shape = goal.column.removeprefix("scale of ")
-            meaning = f"largest factor by which the {shape} may be scaled for the workspace to hold it"
-            found[goal.column] = "", f"{meaning}: contained from 1 on, negative where its centre lies outside"
-    if len(evaluator.questions) > 1:
-        held = [f"{name} = {', '.join(f'{v:g}' for v in values)}"
-                for name, values in study.workspace.at.items() if not isinstance(values, Over)]  # fmt: skip
-        return {name: (unit, f"{meaning}; the worst at {'; '.join(held)}") for name, (unit, meaning) in found.items()}
-    return found
 
 
 def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
@@ -287,14 +263,14 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
     return [complex(fitting_scale(shape, panels)[1][0]) for shape in shapes]
 
 
-def _places(designs: Designs, evaluator: Evaluator) -> dict[str, Complexes]:
+def _places(designs: Designs, question: DesignsQuestion) -> dict[str, Complexes]:
     """Places of shapes without a given centre in the workspaces of the optima; none where there are several regions."""
     free = [
         condition
         for condition in designs.conditions
         if condition.outline is not None and condition.outline.center is None
     ]
-    if not free or len(evaluator.questions) > 1:
+    if not free or len(question.regions) > 1:
         return {}
     rows = []
     for k in designs.winners.tolist():

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from typing import Any
@@ -11,29 +10,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.errors import AssemblyError, MechdesignError, Problem, StudyError
+from mechdesign.errors import AssemblyError, MechdesignError
 from mechdesign.numerics.arrays import Floats, Ints
-from mechdesign.questions.look import ask, look
+from mechdesign.questions.look import ask
 from mechdesign.questions.optimize import stacked
-from mechdesign.questions.optimize.batch import FAILED, Batch, Evaluated, Layout, first_reason, without_numbers
-from mechdesign.questions.optimize.goals import Goal, conditions_of, goals_of, shape_of, unit_of
+from mechdesign.questions.optimize.batch import FAILED, Batch, Evaluated, first_reason, without_numbers
+from mechdesign.questions.optimize.goals import Goal, shape_of
+from mechdesign.questions.optimize.question import DesignsQuestion, designs_question, regions_of
 from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import entry_of, shown
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.contained import fitting_scale
-from mechdesign.questions.workspace.question import GRID_TOLERANCE, Question, batched, questions, shared, split
-from mechdesign.questions.workspace.tables import index_columns
+from mechdesign.questions.workspace.question import Question, split
 from mechdesign.region.rays import BATCH
 from mechdesign.results import Result
-from mechdesign.rows import Chosen, UnknownColumnError
-from mechdesign.statistics import Asked
+from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.poses import Poses
-from mechdesign.study.text.units import Amount, QuantityError
-from mechdesign.study.variants import remeasured, with_entries
-from mechdesign.terms import Sum, terms_of
+from mechdesign.study.variants import with_entries
+from mechdesign.terms import terms_of
 
 NO_REGION = "nothing of the workspace can be reached"
 BETWEEN = "the motion cannot be assembled between its poses"
@@ -44,158 +41,18 @@ MAX_OTHERS = 256
 class Evaluator:
     """Evaluates goals for designs of one study, which differ in parameters or single places.
 
-    Without `goals` it evaluates the study's goals and conditions. If `graded`, it also gives the rows whose worst is a
-    goal, or whose root mean square is one (goals in `squares`), and how far poses are from assembling.
-
-    Raises
-    ------
-    StudyError
-        If no result has the column of a goal, or the study lacks a section that it needs.
+    Where the question is graded, it also gives the rows whose worst is a goal, or whose root mean square is one, and
+    how far poses are from assembling.
     """
 
-    def __init__(self, study: Study, goals: Sequence[Goal] = (), *, graded: bool = False) -> None:
-        assert study.optimize is not None
-        # Each goal and the place in the study that names it.
-        moved = study.parameters.moved(study.optimize.variables)
-        self._keys = goals_of(study.optimize) | conditions_of(study.optimize, moved)
-        self.study, self.goals, self._graded = study, tuple(dict.fromkeys(goals or self._keys)), graded
-        self.squares: set[Goal] = set()
-        self._rows: dict[Goal, int] = {}
-        # Goals by command and table where tables of all designs are computed at once; goals by command where they are
-        # not.
-        self._together: dict[str, dict[str, list[Goal]]] = {}
-        self._alone: dict[str, list[Goal]] = {}
-        # Outputs whose extremes are needed, and columns that are followed between the poses.
-        self._outputs: set[str] = set()
-        self._asked: set[Asked] = set()
+    def __init__(self, question: DesignsQuestion) -> None:
+        self.question, self.study, self.goals, self.layout = question, question.study, question.goals, question.layout
         # Evaluators of studies of another structure, by the values that decide it.
         self._others: dict[tuple[float, ...], Evaluator] = {}
-        # Goals with their bounds in the unit of their column.
-        self._bounded: dict[Goal, Goal] = {}
-        self._regional = [goal for goal in self.goals if goal.regional]
-        whole = [goal for goal in self._regional if goal.outline is None]
-        self._columns = tuple(dict.fromkeys(("area", *(goal.column for goal in whole))))
-        # One question for each value of the held coordinates; the worst answer of a design counts.
-        self.questions: list[Question] = []
-        self._regions_together = True
-        if self._regional:
-            self.questions = questions(study, GRID_TOLERANCE, self._columns)
-            together = shared(study, self.questions, moved) and not remeasured(study, study.optimize.variables)
-            self._regions_together = together and all(batched(goal.column) for goal in whole)
-        commands = dict.fromkeys(goal.command for goal in self.goals if not goal.regional and not goal.expression)
-        problems = [*self._misfits(), *(problem for command in commands for problem in self._look(command))]
-        if problems:
-            # A condition with two bounds has the same problem twice.
-            raise StudyError([*dict.fromkeys(problems)])
-        self.goals = tuple(self._bounded.get(goal, goal) for goal in self.goals)
-        # Number of assembly margins, by the commands of which every pose must be valid.
-        clear: dict[str, int] = {}
-        for command, tables in self._together.items() if graded else ():
-            poses = study_poses(study, command)
-            # Extremes may be those of a part of the poses.
-            if poses.listed or set(tables) != {"extremes"}:
-                clear[command] = stacked.assembly_margins(study, poses, solve_poses(study, poses)).shape[1]
-        self.layout = Layout(self.goals, self._rows, clear)
-        if not graded:
-            self.limit_rows(0)
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy in another process reads its questions from the study again."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("questions", "_others")}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._others = {}
-        self.questions = questions(self.study, GRID_TOLERANCE, self._columns) if self._regional else []
-
-    @property
-    def alone(self) -> bool:
-        """Whether some goals are computed design by design."""
-        return bool(self._alone)
-
-    @property
-    def slow(self) -> bool:
-        """Whether a design costs as much in a batch as alone: where not all goals are tables of all designs at once."""
-        return bool(self._alone) or bool(self._regional)
-
-    def limit_rows(self, most: int) -> None:
-        """Leave out the rows of goals and the assembly margins where a design has more than `most` of them."""
-        if self.layout.width - self.layout.head > most:
-            self.squares.clear()
-            self.layout = Layout(self.goals, {}, {})
-
-    def _misfits(self) -> Iterator[Problem]:
-        """Problems of bounds whose unit does not fit the bounded number of the workspace or expression."""
-        columns = index_columns(self.study, self.questions[0]) if self.questions else {}
-        units = {goal: columns[goal.column].unit for goal in self._regional if goal.column in columns}
-        units |= {goal: unit for goal in self.goals if goal.expression and (unit := unit_of(self.study, goal.column))}
-        for goal, unit in units.items():
-            try:
-                Amount.of(goal.bound).within(unit)
-            except QuantityError as error:
-                yield self.study.problem(str(error), *self._keys.get(goal, ()))
-
-    def _look(self, command: str) -> Iterator[Problem]:
-        """Problems of a command's goals, whose tables are found by a look at the study's own design."""
-        goals = [goal for goal in self.goals if goal.command == command and not goal.regional]
-        if command == "optimize":
-            mistake = "an optimisation cannot judge itself; name a result of another command"
-            yield self.study.problem(mistake, *self._keys.get(goals[0], ()))
-            return
-        assert self.study.optimize is not None
-        together = command in stacked.TABLES and stacked.complete(self.study, command)
-        if together:
-            poses = study_poses(self.study, command)
-            stack = stacked.tables(self.study, command, stacked.TABLES[command], poses)
-            named: dict[Goal, Chosen | Sum] = {}
-            for goal in goals:
-                with suppress(UnknownColumnError):
-                    named[goal] = self._named(goal, stack.result)
-            for goal, terms in named.items():
-                for chosen in terms.parts:
-                    if chosen.table.name == "extremes":
-                        self._outputs.update(chosen.table["output"][chosen.counts].tolist())
-                    elif (asked := goal.asked_of(chosen)) is not None:
-                        self._asked.add(asked)
-            tables = {chosen.table.name for terms in named.values() for chosen in terms.parts}
-            stack = stacked.tables(self.study, command, {"motion", *tables}, poses, self._outputs, self._asked)
-            for named_goal, terms in named.items():
-                goal = self._count(named_goal, terms, stack.result)
-                goals.remove(named_goal)
-                tables_of = self._together.setdefault(command, {})
-                wanted = [tables_of.setdefault(chosen.table.name, []) for chosen in terms.parts]
-                wanted[0].append(goal)
-        if not goals:
-            return
-        # Other designs may have a result where the study's own design does not assemble.
-        with suppress(AssemblyError):
-            result = look(self.study, command)
-            for k, goal in enumerate(goals):
-                try:
-                    goals[k] = self._count(goal, self._named(goal, result), result)
-                except UnknownColumnError as error:
-                    yield self.study.problem(str(error), *self._keys.get(goal, ()))
-        self._alone.setdefault(command, []).extend(goals)
-
-    def _named(self, goal: Goal, result: Result) -> Chosen | Sum:
-        """The rows, or the sum, that a goal names."""
-        terms = terms_of(result, goal.column, dict(goal.where))
-        if terms.missing:
-            raise UnknownColumnError(terms.missing)
-        terms.bound(goal.bound)
-        if isinstance(terms, Sum):
-            terms.numbers()
-        return terms
-
-    def _count(self, goal: Goal, terms: Chosen | Sum, result: Result) -> Goal:
-        """A goal with its bound in the unit of its column; notes how many rows the study's own design has for it."""
-        self._bounded[goal] = bounded = replace(goal, bound=terms.bound(goal.bound))
-        judgement = bounded.judge(result)
-        if judgement.squares:
-            self.squares.add(bounded)
-        if judgement.rows is not None and (judgement.squares or judgement.rows.size > 1):
-            self._rows[bounded] = judgement.rows.size
-        return bounded
+        """A copy in another process makes evaluators of other studies by itself."""
+        return self.__dict__ | {"_others": {}}
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
@@ -233,7 +90,7 @@ class Evaluator:
                 self._others.pop(next(iter(self._others)))
             design = {name: shown(self.study, name, np.array(value)).item() for name, value in values.items()}
             study = with_entries(self.study, [entry_of(self.study, name, value) for name, value in design.items()])
-            self._others[key] = Evaluator(study, self.goals, graded=self._graded)
+            self._others[key] = Evaluator(designs_question(study, self.goals, graded=self.question.graded))
         return self._others[key]
 
     def _alike(self, designs: Mapping[str, Floats]) -> Evaluated:
@@ -245,12 +102,12 @@ class Evaluator:
                 found = np.asarray(goal.expression.evaluate(values))
                 found = np.where(np.isfinite(found), found, np.nan)
                 batch.table[:, self.layout.column[goal]] = np.abs(found) if goal.absolute else found
-        if self.questions and self._regions_together:
-            self._regions(batch, batch.feasible, self.questions)
-        for command, tables in self._together.items():
+        if self.question.regions and self.question.regions_together:
+            self._regions(batch, batch.feasible, self.question.regions)
+        for command, tables in self.question.together.items():
             for rows, study, poses in grouped(batch.designs, command, batch.feasible, batch.failed):
                 self._tables(batch, command, tables, rows, study, poses)
-        if self._alone or not self._regions_together:
+        if self.question.alone or not self.question.regions_together:
             for k in batch.feasible.tolist():
                 batch.reasons[k] = self._one(batch, k)
         for goal, column in zip(self.goals, batch.table[:, self.layout.values].T, strict=True):
@@ -264,7 +121,7 @@ class Evaluator:
         """
         if not len(rows):
             return
-        numbers, own = batch.designs.take(rows).numbers, asked is self.questions
+        numbers, own = batch.designs.take(rows).numbers, asked is self.question.regions
         try:
             given = [answer(question, question.places(numbers) if own else {}, len(rows), BATCH) for question in asked]
         except AssemblyError as error:
@@ -276,7 +133,7 @@ class Evaluator:
             there = question.where if len(asked) > 1 else ""
             batch.note(rows, ~(region.panels.closes & (region.values["area"] > 0)), NO_REGION + there)
         lanes = np.arange(len(rows))
-        for goal in self._regional:
+        for goal in self.question.regional:
             column, outline = self.layout.column[goal], goal.outline
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
@@ -293,9 +150,9 @@ class Evaluator:
     def _tables(
         self, batch: Batch, command: str, tables: Mapping[str, Sequence[Goal]], rows: Ints, study: Study, poses: Poses
     ) -> None:
-        wanted = {*tables, "motion"} if self.squares.intersection(chain(*tables.values())) else set(tables)
+        wanted = {*tables, "motion"} if self.question.squares.intersection(chain(*tables.values())) else set(tables)
         try:
-            stack = stacked.tables(study, command, wanted, poses, self._outputs, self._asked)
+            stack = stacked.tables(study, command, wanted, poses, self.question.outputs, self.question.asked)
         except MechdesignError as error:
             for half in batch.halves(rows, error):
                 own = study_poses(study, command, batch.designs.take(half).numbers)
@@ -307,8 +164,8 @@ class Evaluator:
         batch.note(rows, wrong.all(axis=1) if partly else wrong.any(axis=1), failed)
         batch.note(rows, ~stack.whole & (not partly), BETWEEN)
         clear = self.layout.assembly.get(command)
-        if self._graded and (clear is not None or (batch.reasons[rows] != "").any()):
-            margins = stacked.assembly_margins(study, poses, stack.solved or solve_poses(study, poses))
+        if self.question.graded and (clear is not None or (batch.reasons[rows] != "").any()):
+            margins = stacked.assembly_margins(study, poses, stack.solved)
             batch.table[rows, self.layout.shortfall] = stacked.shortfall(margins)
             if clear is not None and margins.shape[1] == clear.stop - clear.start:
                 batch.table[rows, clear] = margins
@@ -333,12 +190,12 @@ class Evaluator:
         command = ""
         try:
             other = batch.designs.one(k)
-            if not self._regions_together:
-                self._regions(batch, row, questions(other, GRID_TOLERANCE, self._columns))
+            if not self.question.regions_together:
+                self._regions(batch, row, regions_of(other, self.goals))
                 if batch.reasons[k]:
                     return str(batch.reasons[k])
             other = self._needed(other)
-            for command, goals in self._alone.items():
+            for command, goals in self.question.alone.items():
                 result = ask(other, command)
                 partly = [not goal.unassembled and missing(goal, result) for goal in goals]
                 values = [batch.judge(goal, result, row) for goal in goals]
@@ -358,7 +215,7 @@ class Evaluator:
             return NO_REGION
         poses = study_poses(study, command)
         solved = list(solve_poses(study, poses))
-        if self._graded:
+        if self.question.graded:
             batch.table[k, self.layout.shortfall] = stacked.shortfall(stacked.assembly_margins(study, poses, solved))[0]
         return str(FAILED[first_reason(np.concatenate([part.configuration.reason for part in solved])[None])[0]])
 

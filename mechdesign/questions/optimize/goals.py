@@ -204,7 +204,8 @@ def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -
     """
     if isinstance(condition, Containment):
         name = condition.contains.named(moved)
-        yield Goal(f"{name} contained", "workspace", f"scale of {name}", bound=1 - ROUNDING, outline=condition.contains)
+        scale = f"scale of {name}"
+        yield Goal(f"{name} contained", "workspace", scale, bound=1 - ROUNDING, outline=condition.contains, gate=True)
         return
     _, command, column, expression = _parts(condition.result)
     for bound, upper in ((condition.at_least, False), (condition.at_most, True)):

@@ -16,9 +16,9 @@ from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import Progress
 from mechdesign.questions.optimize.batch import Evaluated
 from mechdesign.questions.optimize.columns import CPI, DESIGNS, EXPRESSION, RESULT, VARIABLE, WORST_ROW
-from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.explorer import ASSEMBLY, Known, Part
-from mechdesign.questions.optimize.goals import Goal, goals_of, unit_of
+from mechdesign.questions.optimize.goals import Goal, unit_of
+from mechdesign.questions.optimize.question import DesignsQuestion
 from mechdesign.questions.optimize.variables import Batch, from_cube, shown
 from mechdesign.questions.optimize.variables import unit_of as variable_unit
 from mechdesign.questions.reliability.schema.limits import SUFFIXES
@@ -231,16 +231,18 @@ class Judge:
     """
 
     def __init__(
-        self, study: Study, evaluator: Evaluator, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]],
+        self, question: DesignsQuestion, compute: Callable[[Iterable[Batch]], Iterator[Evaluated]],
         progress: Progress, journal: Journal | None,
     ) -> None:  # fmt: skip
+        study = question.study
         assert study.optimize is not None
-        self.study, self.progress, self.layout = study, progress, evaluator.layout
-        count = len(goals_of(study.optimize))
-        self.goals, self.conditions = evaluator.goals[:count], evaluator.goals[count:]
+        self.study, self.progress, self.layout = study, progress, question.layout
+        self.goals, self.conditions = question.objectives, question.conditions
         self._names = tuple(study.optimize.variables)
-        self._squares, self._compute, self._journal = evaluator.squares, compute, journal
-        self._chunk = SLOW_DESIGNS_AT_ONCE if evaluator.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
+        # Values of a workspace are known to a tolerance only.
+        self.rough = bool(question.regional)
+        self._squares, self._compute, self._journal = question.squares, compute, journal
+        self._chunk = SLOW_DESIGNS_AT_ONCE if question.slow and study.optimize.method != "grid" else DESIGNS_AT_ONCE
         # Reasons of an earlier run keep their numbers, as this run meets them in the same order.
         self._words = {word: k for k, word in enumerate(journal.words if journal and journal.words else [""])}
         self._asked: list[Floats] = []

@@ -15,6 +15,8 @@ from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.dynamics import analysis as dynamics
+from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import course_of
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
@@ -22,7 +24,7 @@ from mechdesign.questions.kinematics.loops import loops_table, measured
 from mechdesign.questions.kinematics.motion import move
 from mechdesign.questions.kinematics.question import motion_question
 from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
-from mechdesign.questions.poses import SolvedPoses, alike, study_poses
+from mechdesign.questions.poses import SolvedPoses, alike, solve_poses, study_poses
 from mechdesign.questions.reliability import analysis as reliability
 from mechdesign.questions.stiffness import analysis as stiffness
 from mechdesign.questions.stiffness.body import ask
@@ -37,6 +39,7 @@ TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
     # A design may have more springs than another.
     "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
+    "dynamics": dynamics.TABLES,
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 
@@ -53,7 +56,7 @@ class Stack(NamedTuple):
     along : Along, optional
         The motions of the designs between their poses.
     solved : list of SolvedPoses
-        The solved poses of a motion; else empty.
+        The solved poses.
     """
 
     result: Result
@@ -139,11 +142,17 @@ def tables(
         if motion.errors and "targets" in wanted:
             found["targets"] = targets_table(motion, along)
         reason = motion.reason
+    elif command == "dynamics":
+        motion = move(force_question(study, poses), also=solved.append)
+        found, along = dynamics.tables(motion, motion.question, wanted, outputs, asked)
+        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        found = {name: replace(table, scope=scope) for name, table in found.items()}
+        reason = motion.reason
     elif command == "reliability":
-        found, reason = reliability.first_order_tables(study, poses, wanted)
+        found, reason, solved = reliability.first_order_tables(study, poses, wanted)
     else:
-        body = ask(study)
-        held = stiffness.solve(study, body, poses, effects=not {"forces", "displacements"}.isdisjoint(wanted))
+        body, solved = ask(study), list(solve_poses(study, poses))
+        held = stiffness.solve(study, body, poses, solved, effects=not {"forces", "displacements"}.isdisjoint(wanted))
         found, reason = stiffness.tables(study, body, poses, held, wanted), held.reason
     whole = np.ones(poses.designs, dtype=bool) if along is None else along.whole | along.curve.spent
     return Stack(Result(command, found, absent=absent), reason.reshape(poses.designs, -1), whole, along, solved)

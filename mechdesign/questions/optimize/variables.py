@@ -5,13 +5,13 @@ A design is a number for each variable; for a variable whose choices are words i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mechdesign.errors import StudyError
+from mechdesign.errors import Problem, StudyError
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.study import Study
 from mechdesign.study.designs import variant
@@ -208,27 +208,17 @@ def study_of(study: Study, design: Design) -> Study:
     return variant(*parted(study, design))
 
 
-def check_choices(study: Study) -> None:
-    """Load the study with each choice of an entry, alone.
+def choice_problems(study: Study) -> Iterator[Problem]:
+    """Problems of the choices of entries: the study is loaded with each choice alone.
 
-    Raises
-    ------
-    StudyError
-        Where the entry itself is wrong, every mistake in one go. A mistake that needs several choices makes a design
-        infeasible.
+    A mistake that needs several choices makes a design infeasible.
     """
-    # Choices are tried as they are written: the units must fit the entry.
-    choices = {
-        name: study.resolved["optimize"]["variables"][name]["choices"]
-        for name, variable in variables_of(study).items()
-        if variable.choices is not None and name not in study.parameters.known()
-    }
-    problems = [
-        study.problem(message, "optimize", "variables", name, "choices", k)
-        for name, values in choices.items() for k, message in faults(study, name, values)
-    ]  # fmt: skip
-    if problems:
-        raise StudyError(problems)
+    for name, variable in variables_of(study).items():
+        if variable.choices is not None and name not in study.parameters.known():
+            # Choices are tried as they are written: the units must fit the entry.
+            choices = study.resolved["optimize"]["variables"][name]["choices"]
+            for k, message in faults(study, name, choices):
+                yield study.problem(message, "optimize", "variables", name, "choices", k)
 
 
 def in_words(row: Design) -> str:

@@ -45,11 +45,11 @@ _Groups = Sequence[tuple[SolvedPoses, DriveRates]]
 def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Errors of a study's outputs from its tolerances and clearances; see `mechdesign.reliability`."""
     keep_freed_memory()
+    poses = study_poses(study, "reliability")
     sources, warnings = find_sources(study)
     section = study.reliability
     assert section is not None
-    task, groups, doubts = _first_order(study, study_poses(study, "reliability"), sources)
-    poses = task.poses
+    task, groups, doubts = _first_order(study, poses, sources)
     warnings += [*doubts, *ambiguous_points(study, task.question)]
     failures, failed = judge_failures(study, poses, task.reason)
     task = replace(
@@ -114,15 +114,17 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
 
 def first_order_tables(
     study: Study, poses: Poses, wanted: Collection[str]
-) -> tuple[dict[str, Table], NDArray[np.int8]]:
-    """The `wanted` tables of the first-order analysis at poses, which may be of several designs, and why poses fail.
+) -> tuple[dict[str, Table], NDArray[np.int8], list[SolvedPoses]]:
+    """The `wanted` tables of the first-order analysis at poses of one or several designs.
+
+    Returns them, why poses fail, and the solved poses.
 
     Raises
     ------
     StudyError
         If nothing varies.
     """
-    task, _, _ = _first_order(study, poses, find_sources(study, poses)[0])
+    task, groups, _ = _first_order(study, poses, find_sources(study, poses)[0])
     results = [MethodResult(normal=(task.linear.shift(), task.linear.covariance()), method="analytic")]
     if "reliability" in wanted:
         results = [with_cycle(methods.run("analytic", task), task, ())]
@@ -133,7 +135,7 @@ def first_order_tables(
         built.append(tables.capability(task, results))
     if "contributions" in wanted:
         built.append(tables.contributions(task, {}))
-    return {table.name: table for table in built}, task.reason
+    return {table.name: table for table in built}, task.reason, [solved for solved, _ in groups]
 
 
 def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[Caution]]:

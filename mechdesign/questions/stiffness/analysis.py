@@ -63,8 +63,8 @@ Pose = tuple[int, Configuration]
 @one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Stiffness of a body or a pin at every pose of the study [S4]; see `mechdesign.stiffness`."""
-    body = ask(study)
     poses = study_poses(study, "stiffness")
+    body = ask(study)
     progress.start(poses.count, "poses")
     result = _group(study, body, poses, jobs, progress).of(0)
     if isinstance(result, Exception):
@@ -83,7 +83,7 @@ def answers(study: Study, poses: Poses) -> Answers:
 
 def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: Progress) -> Group:
     """The result of all designs, each with its warnings, counts and errors."""
-    solved = solve(study, body, poses, jobs, progress)
+    solved = solve(study, body, poses, solve_poses(study, poses), jobs, progress)
     count, designs = poses.count // poses.designs, poses.designs
     cautions, ends = _Cautions(study, poses, body, solved.held), []
     for k, reason in enumerate(solved.reason.reshape(designs, count)):
@@ -187,9 +187,13 @@ def _drawn_pose(body: Body, solved: Solved, pose: Pose | None) -> DrawnPose | No
 
 
 def solve(
-    study: Study, body: Body, poses: Poses, jobs: int | None = 1, progress: Progress = NULL, *, effects: bool = True
-) -> Solved:
-    """Solve all poses; one that cannot be assembled is nan. `effects` adds the effects of the study's loads."""
+    study: Study, body: Body, poses: Poses, all_solved: Iterable[SolvedPoses], jobs: int | None = 1,
+    progress: Progress = NULL, *, effects: bool = True,
+) -> Solved:  # fmt: skip
+    """How the body is held in all solved poses; one that cannot be assembled is nan.
+
+    `effects` adds the effects of the study's loads.
+    """
     held = Held.unknown(poses.count, body.size)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
@@ -198,7 +202,7 @@ def solve(
     first: Pose | None = None
     loose: Pose | None = None
     keeper = Keeper(study, poses)
-    for solved in solve_poses(study, poses):
+    for solved in all_solved:
         configuration = solved.configuration
         keeper.keep(solved)
         reason[solved.rows] = configuration.reason

@@ -44,7 +44,8 @@ def frames(drawn: DrawnMotion, table: Table, marked: Sequence[float]) -> tuple[S
     if along is None or along.curve.spent.any():
         return sweep, table
     rows = sweep.poses.numbers[sweep.rows]
-    places = _near_the_paths(along.curve, sweep, np.union1d(rows, along.snapped(np.array(marked, dtype=float))))
+    begin = np.union1d(rows, along.snapped(np.array(marked, dtype=float)))
+    places = near_the_paths(along.curve, [*sweep.places], begin, MAX_POSES)
     if len(places) == len(rows):
         return sweep, table
     poses, configuration, solved = _solved(along, places)
@@ -61,19 +62,29 @@ def frames(drawn: DrawnMotion, table: Table, marked: Sequence[float]) -> tuple[S
 
 
 @quiet
-def _near_the_paths(curve: Curve, sweep: Sweep, places: Floats) -> Floats:
-    """Places of a motion with more between them, as far as the chords of the pins' paths need them."""
-    mechanism, poses = sweep.mechanism, curve.poses
+def near_the_paths(curve: Curve, points: Sequence[str], places: Floats, most: int) -> Floats:
+    """Places of motions with more between them, as far as the chords of the points' paths need them.
+
+    Parameters
+    ----------
+    curve : Curve
+        Motions that all get the same places.
+    places : ndarray
+        In rows of the poses of each motion.
+    most : int
+        With so many places none is added.
+    """
+    mechanism, poses = curve.mechanism, curve.poses
 
     def pins(s: Floats) -> Complexes:
-        _, configuration = curve.solve(np.zeros(len(s), dtype=np.intp), s, turning=False)
-        paths = [np.where(configuration.valid, configuration.point(pin), np.nan) for pin in sweep.places]
+        _, configuration = curve.solve(*curve.grid(s), turning=False)
+        paths = [np.where(configuration.valid, configuration.point(point), np.nan) for point in points]
         return np.array(paths).reshape(-1, len(s))
 
     if poses.closed:
         places = np.append(places, poses.end)
     for _ in range(_HALVINGS):
-        if len(places) >= MAX_POSES:
+        if len(places) >= most:
             break
         middles, ends = (places[:-1] + places[1:]) / 2, pins(places)
         chords = (ends[:, :-1] + ends[:, 1:]) / 2

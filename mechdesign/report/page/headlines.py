@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.errors import counted
 from mechdesign.questions.columns import DRIVE, GIVEN, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
+from mechdesign.questions.optimize.columns import OPTIMUM
 from mechdesign.questions.workspace.columns import HELD
-from mechdesign.report.cases import best_of
+from mechdesign.report.cases import RANK, best_of, short, text_of
 from mechdesign.report.figures.style import printed, raised
-from mechdesign.results import Column, KeyNumber, Result, Table
+from mechdesign.report.requirements import DrawnCases
+from mechdesign.results import VARIED, Column, KeyNumber, Result, Table
 from mechdesign.rows import unit_of
 from mechdesign.statistics import Asked
 
 # Largest number of headlines of a question.
 MOST = 8
+_MOST_GOALS = 4  # of the best case of a sweep
 # Rates and forces: their extremes are not shown, of some the largest absolute value is.
 _RATES_AND_FORCES = [
     MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
@@ -73,8 +77,11 @@ def shown(value: float) -> str:
 
 def headlines(result: Result) -> list[Headline]:
     """The headlines of a result, at most `MOST`, no name twice."""
-    numbers = {each.label: each for each in _best(result.main)}
-    for rule in key_numbers(result.command):
+    numbers = {each.label: each for each in _of_cases(result)}
+    front = "pareto" in result.tables
+    if front:
+        numbers |= {each.label: each for each in _of_front(result.tables[OPTIMUM.name])}
+    for rule in () if front else key_numbers(result.command):
         table = result.tables.get(rule.table.name)
         if table is None or not len(table):
             continue
@@ -86,13 +93,46 @@ def headlines(result: Result) -> list[Headline]:
     return list(numbers.values())[:MOST]
 
 
-def _best(table: Table) -> Iterator[Headline]:
-    """The best case of a sweep, and the front."""
+def _of_cases(result: Result) -> Iterator[Headline]:
+    """The best case of a sweep with its goals, the front, and how many cases meet every requirement."""
+    table = result.main
     if (best := best_of(table)) is not None:
+        row = int(np.flatnonzero(table[RANK] == 1)[0])
         more = [f"{best.equals - 1} more as good"] * (best.equals > 1)
-        yield Headline("best case", str(best.case), "", "; ".join([best.changes, *more]))
+        changes = [column for column in table.columns if column.meaning == VARIED]
+        yield Headline("best case", str(best.case), "", "; ".join([_in_words(changes, row), *more]))
+        for name in [*DrawnCases.of(result).goals][:_MOST_GOALS]:
+            yield Headline(f"{name} of the best case", shown(table[name][row]), table.column(name).unit)
         if best.front > best.equals:
             yield Headline("cases on the Pareto front", shown(best.front), "", f"of {best.ranked} ranked cases")
+    if any(f"{name}_met" in table for name in table.names):
+        met = int((table["exit_code"] == 0).sum())
+        yield Headline("cases that meet every requirement", shown(met), "", f"of {counted(len(table), 'case')}")
+
+
+def _of_front(table: Table) -> Iterator[Headline]:
+    """The knee of a front with each goal, and the best of each goal, and which designs these are."""
+    goals = [name.removeprefix("w_") for name in table.names if name.startswith("w_")]
+    variables = [column for column in table.columns if column.kind == OPTIMUM["<variable>"]]
+    for row, what in enumerate(table["what"].tolist()):
+        design = _in_words(variables, row)
+        known = [column for column in (*variables, *map(table.column, goals)) if column.numeric]
+        given = {column.name: float(column.values[row]) for column in known}
+        for goal in goals:
+            own, others = table.column(goal), [table.column(name) for name in goals if name != goal]
+            if what == "knee":
+                yield Headline(f"{goal} of the knee", shown(own.values[row]), own.unit, design, design, given)
+            elif what == f"best {goal}":
+                note = f"{design}; there {_in_words(others, row)}"
+                yield Headline(what, shown(own.values[row]), own.unit, note, design, given)
+
+
+def _in_words(columns: Iterable[Column], row: int) -> str:
+    """``r = 35 mm, section = tube``; a line may be broken between the quantities only."""
+    values = [(column, column.values[row].item()) for column in columns]
+    words = [f"{short(column.name)} = {shown(value) if column.numeric else text_of(value)} {printed(column.unit)}"
+             for column, value in values]  # fmt: skip
+    return ", ".join(word.strip().replace(" ", _TOGETHER) for word in words)
 
 
 def _asked(result: Result, rule: KeyNumber, column: Column) -> bool:

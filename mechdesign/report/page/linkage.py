@@ -154,15 +154,15 @@ class Sketcher:
         add(self.root, "path", **{"class": "moving-trace"}, d=self.sheet.path(places), stroke=color,
             stroke_width=width, opacity=share)  # fmt: skip
 
-    def names(self, scenes: Sequence[Scene]) -> None:
-        """Names of the points and links, each where it covers least, averaged over some poses of the motion.
+    def names(self, scenes: Sequence[Scene], *, links: bool = True) -> None:
+        """Names of the points and of the links, each where it covers least, averaged over some poses of the motion.
 
         Those of links stay level; the script shows them on request.
         """
         first = self.scene
         labels = [replace(label, size=_NAME) for label in shapes.point_labels(first)]
         owners = [(label.text, GROUND) for label in labels]
-        for label in shapes.link_labels(first, self.colors, driven=True):
+        for label in shapes.link_labels(first, self.colors, driven=True) if links else ():
             labels.append(replace(label, size=_NAME - 2, optional=False))
             owners.append((first.link_points(label.text)[0], label.text))
 

@@ -25,10 +25,11 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
+from mechdesign.report.page.axes import box
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import CURVES, PLACES, Cell, Moving, Numbers, deltas, meanings, places
+from mechdesign.report.page.tracks import PLACES, TIMES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -39,7 +40,6 @@ _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid th
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
-TIMES = 10_000  # integers in the time of a motion
 _ARROW = 70.0  # length of the arrow of a usual velocity
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",
@@ -58,7 +58,7 @@ def moving(
     Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn.
     """
-    name = f"{result.command}-curves"
+    command = result.command
     if isinstance(result.drawn, DrawnDesigns):
         best = result.drawn.best
         judged = best.region or best.motion
@@ -67,8 +67,8 @@ def moving(
         study, result = best.study, judged
     with style.context():
         if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
-            return _motion(study, result, result.drawn, name, before, marked)
-        return roaming(study, result) if "local" in result.tables else None
+            return _motion(study, result, result.drawn, f"{command}-curves", before, marked)
+        return roaming(study, result, command) if "local" in result.tables else None
 
 
 def _motion(
@@ -89,19 +89,30 @@ def _motion(
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
-    data |= {"gaps": _gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
+    data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
     for given in [table.column(name) for name in sweep.poses.values if name in table]:
         unit = numbers.cell(given).unit
-        which, _, power = numbers.scaled[given.name]
-        data["given"].append([given.name, unit, which, power])
+        data["given"].append([given.name, unit, numbers.scaled[given.name][0]])
+    # What names a pose: the coordinates that are given, or the drives.
+    keys = dict.fromkeys(
+        tuple(name for name in names if name in table) for names in (sweep.poses.values, study.mechanism.drives)
+    )
+    data["keys"] = [[[name, *numbers.scaled[name][::2]] for name in key] for key in keys if key]
+    speed = study.kinematics.speed if study.kinematics is not None else None
+    over, looks = abscissa(study, sweep.poses, speed), path_looks(whole)
+    own = table.column(over.name) if over.name in table else Column(over.label, over.values, "")
+    which = numbers.add(own)
+    data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
+    data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
     figure, beside = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
-        data["curves"] = _curves(study, sweep, figure, table, numbers)
+        data["dots"] = _dots(figure, table, numbers)
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
-    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table))
+    replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
 def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
@@ -117,7 +128,7 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
     return tostring(root, encoding="unicode")
 
 
-def _gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
+def gaps(sweep: Sweep) -> list[tuple[int, int, str]]:
     """Runs of poses that are not valid: the first, the last, why in words."""
     reason = sweep.configuration.reason
     ends = np.flatnonzero(np.diff(reason)) + 1
@@ -218,16 +229,11 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
 
 
-def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: Numbers) -> dict[str, Any]:
-    """Where the pose is in each panel of the curves: places of the cursor, and of a dot on each curve."""
-    wide, tall = (72 * inches for inches in figure.get_size_inches())
-    over = abscissa(study, sweep.poses).values[sweep.rows]
-    boxes = [axes.get_position() for axes in figure.axes]
-    low, high = figure.axes[0].get_xlim()
-    x = wide * (boxes[0].x0 + boxes[0].width * (over - low) / (high - low))
-    dots = []
-    for axes, box in zip(figure.axes, boxes, strict=True):
-        bottom, top = axes.get_ylim()
+def _dots(figure: Figure, table: Table, numbers: Numbers) -> list[list[Any]]:
+    """Dots on the curves at the pose: panel, number, slope and place at 0 of its height, colour."""
+    dots: list[list[Any]] = []
+    for panel, axes in enumerate(figure.axes):
+        (_, _, upper, lower), (bottom, top) = box(axes), axes.get_ylim()
         for line in axes.get_lines():
             drawn = np.asarray(line.get_ydata(), dtype=float)
             column = next((each for each in table.columns if each.values.dtype.kind == "f"
@@ -235,9 +241,7 @@ def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: N
             if column is None or axes.get_yscale() != "linear":
                 continue
             which = numbers.add(column)
-            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.scaled[column.name][2]
-            start = tall * (1 - box.y0) + tall * box.height * bottom / (top - bottom)
-            dots.append([which, slope, round(start, 2), round(tall * (1 - box.y1), 1), round(tall * (1 - box.y0), 1),
-                         to_hex(line.get_color())])  # fmt: skip
-    ends = [round(tall * (1 - max(box.y1 for box in boxes)), 1), round(tall * (1 - min(box.y0 for box in boxes)), 1)]
-    return {"x": deltas(x, CURVES), "ends": ends, "dots": dots}
+            slope = (upper - lower) / (top - bottom)
+            scaled = slope * 10.0 ** numbers.scaled[column.name][2]
+            dots.append([panel, which, scaled, round(lower - slope * bottom, 2), to_hex(line.get_color())])
+    return dots

@@ -10,25 +10,29 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import explain
+from mechdesign.questions.optimize.analysis import DrawnDesigns
+from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
+from mechdesign.report.page.cases import gates, telling_rows
+from mechdesign.report.page.front import front
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.moving import moving
-from mechdesign.report.tables import cells, json_text, plain
+from mechdesign.report.page.tracks import Moving
+from mechdesign.report.requirements import DrawnCases
+from mechdesign.report.tables import json_text, plain
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
+from mechdesign.table_text import readable
 
 HELP_PAGE = "howto/report"
 
-# Beside a moving mechanism this picture of the same curves is left out.
-CURVES = "motion"
 # Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
 # A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
-_DIGITS = 6
-_NO_NUMBER = {"nan": "\N{EN DASH}", "inf": "\N{INFINITY}", "-inf": "\N{MINUS SIGN}\N{INFINITY}"}
+MOST_ON_PAPER = 8  # columns of a table that is printed
 
 
 def section(
@@ -52,24 +56,35 @@ def section(
     if plots and not result.interrupted:
         try:
             marked = [number.place for number in numbers if number.place is not None]
-            part = moving(study, result.seen, before, marked)
+            part = _moving(study, result.seen, before, marked)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
-    doubled = CURVES if part is not None and part.beside else ""
-    shown = {name: html for name, html in pictures.items() if name != doubled}
+    shown = {name: html for name, html in pictures.items() if part is None or name not in part.replaces}
+    swept = isinstance(result.drawn, DrawnCases)
     return {
         "command": result.command,
         "headlines": [dataclasses.asdict(number) for number in numbers],
         "mechanism": mechanism,
         "pictures": [{"name": name, "html": html} for name, html in shown.items()],
         "moving": None if part is None else dataclasses.asdict(part),
-        "tables": [_table(table) for table in result.tables.values()],
+        "gates": gates(result) if swept else None,
+        "tables": [_cases(table) if swept else _table(table) for table in result.tables.values()],
         "files": list(result.files),
         "counts": plain(dict(result.counts)),
         "warnings": [*map(str, (*result.warnings, *warnings))],
         "interrupted": result.interrupted,
     }, warnings
+
+
+def _moving(study: Study, result: Result, before: Before | None, marked: Sequence[float]) -> Moving | None:
+    """The mechanism of a result moving; of a front any of its designs, where these have a motion."""
+    part = None
+    if isinstance(result.drawn, DrawnDesigns) and "pareto" in result.tables:
+        # In the width of half a page the texts of the picture are large enough.
+        with style.context("paper"):
+            part = front(result.drawn.designs, result.tables["pareto"], f"{result.command}-front")
+    return part or moving(study, result, before, marked)
 
 
 def encoded(part: Mapping[str, Any]) -> bytes:
@@ -78,18 +93,35 @@ def encoded(part: Mapping[str, Any]) -> bytes:
 
 
 def _table(table: Table) -> dict[str, Any]:
+    """A table that is folded; where it is long its first rows alone."""
     count = len(table)
     turned = 0 < count <= FEW_ROWS and len(table.columns) >= MANY_COLUMNS
-    first = table.take(np.arange(count if count <= MOST_ROWS else FIRST_ROWS))
-    texts = [[_NO_NUMBER.get(text, text) for text in column] for column in cells(first, _DIGITS)]
+    first = count if count <= MOST_ROWS else FIRST_ROWS
+    which = "all" if first == count else f"the first {first} of"
+    return _part(table, table.take(np.arange(first)), which, turned=turned)
+
+
+def _cases(table: Table) -> dict[str, Any]:
+    """The table of a sweep, open."""
+    some, which = telling_rows(table)
+    return _part(table, some, which, turned=False, opened=True)
+
+
+def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool = False) -> dict[str, Any]:
+    """Some rows of a table; `which`, in words. All rows and those of an open table can be sorted."""
+    texts = readable(table, some)
     return {
         "name": table.name,
         "meaning": table.meaning,
-        "rows": count,
+        "rows": len(table),
+        "which": which,
         "turned": turned,
+        "narrow": turned or len(table.columns) <= MOST_ON_PAPER,
+        "open": opened,
+        "sorted": not turned and len(some) > 1 and (opened or len(some) == len(table)),
         "columns": [
             {"name": column.name, "unit": column.unit, "meaning": column.meaning, "numeric": column.numeric}
-            for column in table.columns
+            for column in some.columns
         ],
         "cells": texts if turned else [list(row) for row in zip(*texts, strict=True)],
     }

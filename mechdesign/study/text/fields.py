@@ -524,6 +524,7 @@ Force = Annotated[float, number("force")]
 Acceleration = Annotated[float, number("acceleration")]
 Moment = Annotated[float, number("moment")]
 PositiveStress = Annotated[float, number("stress", 0.0, exclusive=True)]
+PositiveDensity = Annotated[float, number("density", 0.0, exclusive=True)]
 PositiveArea = Annotated[float, number("area", 0.0, exclusive=True)]
 PositiveInertia = Annotated[float, number("inertia", 0.0, exclusive=True)]
 
