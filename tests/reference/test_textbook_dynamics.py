@@ -216,3 +216,30 @@ dynamics:
     # The moment is not balanced, nor is the driving torque.
     assert np.abs(result.main["shaking_moment"]).max() > largest
     assert cmath.isfinite(force(result, "A", "rod"))
+
+
+def test_a_turn_at_constant_speed_takes_no_work() -> None:
+    """The mean effort over a turn is that of the load alone; extremes and means are those between the poses too."""
+    text = """
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [160, 20]}
+    crank: {from: O, to: A, length: 50, mass: 0.6, center: [20, 5], inertia: 400}
+    rod: {from: A, to: B, length: 150, mass: 0.9, inertia: 900}
+    rocker: {from: D, to: B, length: 120, mass: 0.7, inertia: 700}
+  springs: {back: {between: [O, B], stiffness: 0.3, free_length: 90}}
+  drives: [crank]
+  sketch: {A: [30, 40], B: [140, 130]}
+dynamics:
+  gravity: [0, -9.81 m/s^2]
+  sweep: {crank: {from: 0, to: 360, number: %d}}
+  rates: {crank: 3000}
+  loads: [{link: crank, moment: -250}]
+"""
+    extremes, fine = asked(text % 13).tables["extremes"], asked(text % 20001)
+    (row,) = np.flatnonzero(extremes["output"] == "crank_effort")
+    effort = fine.main["crank_effort"]
+    assert extremes["mean"][row] == pytest.approx(250, rel=1e-9)
+    assert extremes["max"][row] == pytest.approx(effort.max(), rel=1e-6)
+    assert extremes["min"][row] == pytest.approx(effort.min(), rel=1e-6)
+    assert extremes["rms"][row] == pytest.approx(np.sqrt(np.mean(effort[1:] ** 2)), rel=1e-9)
