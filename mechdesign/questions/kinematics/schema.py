@@ -56,8 +56,9 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
-        if self.pictures and not self.rates and self.speed is None:
-            message = f"{' and '.join(self.pictures)} show velocities: give 'rates' of the drives, or a 'speed'"
+        if self.pictures and not self.rates and self.speed is None and self.motion is None:
+            shown = " and ".join(self.pictures)
+            message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
             checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
@@ -65,8 +66,7 @@ class KinematicsSection(MotionSection):
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
             what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
             checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
-        moving = bool(self.rates or self.accelerations or self.speed)
-        check_loads(checker, self.loads, ("kinematics", "loads"), moving=moving, timed=False)
+        check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 
     def _check_centres(self, checker: Checker) -> None:
@@ -81,8 +81,12 @@ class KinematicsSection(MotionSection):
                 checker.report(path, f"{' and '.join(pair)} are listed twice")
             seen.add(frozenset(pair))
         drives = len(checker.mechanism.drives)
-        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
-            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+        moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
+        if self.instant_centres and drives > 1 and not moved:
+            message = (
+                f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed', or a "
+                "'motion'"
+            )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
 
     def _check_advantage(self, checker: Checker) -> None:

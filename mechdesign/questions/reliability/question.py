@@ -175,7 +175,7 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     listed = [output.name for output in outputs]
     outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in listed)))
     places = [output.name for output in outputs]
-    orders = 3 if section.rates or section.accelerations or section.speed else 1
+    orders = 3 if section.rated else 1
     bands, discs = [], []
     for base, order, limit in limits:
         begin = order * len(outputs)

@@ -131,7 +131,8 @@ def _numbers(load: dict[str, Any], section: dict[str, Any]) -> list[Any]:
         raise failure("a load is [fx, fy, mz], {at: point, force: [fx, fy]} or {link: name, moment: mz}")
     for key, place in (("at", force), ("link", moment)):
         if (place is None) != (load.get(key) is None) or (place is not None and load[key] != section.get(key)):
-            raise failure(f"a load of stiffness is at its {key!r}, {section.get(key)}; loads elsewhere: see dynamics")
+            what = f"its point, at: {section.get('at')}" if key == "at" else f"its link, link: {section.get('link')}"
+            raise failure(f"a force or moment of stiffness acts on {what}; for loads elsewhere ask dynamics")
     if force is not None and (not isinstance(force, list) or len(force) != 2):
         raise failure(f"a force is [fx, fy], not {fields.shown(force)}")
     return [*(force or [0.0, 0.0]), 0.0 if moment is None else moment][: 3 if section.get("link") else 2]

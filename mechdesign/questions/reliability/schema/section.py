@@ -251,8 +251,8 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
     known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
     name = split_link(mechanism, name)[1]
     base, order = split_order(name, known.__contains__)
-    if order and not (section.rates or section.accelerations or section.speed):
-        report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
+    if order and not section.rated:
+        report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])

@@ -35,8 +35,9 @@ def prepare(study: Study) -> Evaluate:
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
     question, rates = question.narrowed, constant_rates(study, study.reliability, mechanism.drives)
-    if of_given(study, study.reliability) and any(channel.order for channel in question.channels):
-        message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
+    moved = of_given(study, study.reliability) or study.reliability.motion is not None
+    if moved and any(channel.order for channel in question.channels):
+        message = "the index 'reliability' of velocities needs 'rates' of the drives: a path or a motion has none here"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     bent = elasticity(study)[0]
 
