@@ -14,6 +14,7 @@ closed form. What is left at the given coordinates are the efforts of the drives
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -201,22 +202,10 @@ class Joints:
 
     def _pins(self) -> list[Contact]:
         contacts = []
-        clamps = [(name, joint) for name, joint in self.description.joints.items() if isinstance(joint, Fixed)]
         for node, members in self._members().items():
-            point, free = self.graph.nodes[node], list(members)
-            for name, joint in clamps:
-                if joint.point != point:
-                    continue
-                # The second link hangs on the first, and the others on that.
-                one, other = (self.holder(link, point) for link in joint.links)
-                hanging = [member for member in free if member.name == other and not member.slot]
-                first = [member for member in free if member.name == one and not member.slot]
-                if hanging and first:
-                    contacts.append(_borne(name, hanging[0], one, node, turns=False))
-                    free.remove(hanging[0])
-                    free[free.index(first[0])] = _Member(
-                        one, first[0].edges + hanging[0].edges, first[0].bodies + hanging[0].bodies
-                    )
+            point = self.graph.nodes[node]
+            clamped, free = self._clamped(node, members)
+            contacts += clamped
             if len(free) == 1:
                 self.sole[node] = free[0].name
             # The pin that a ground's origin would be bears nothing.
@@ -241,6 +230,33 @@ class Joints:
                     Contact(member.slot, pin, member.name, node, member.edges) for member in free if member.slot
                 ]
         return contacts
+
+    def _clamped(self, node: int, members: Sequence[_Member]) -> tuple[list[Contact], list[_Member]]:
+        """The clamps at a node, and its members: of links clamped together one, the ground or a first, with all edges.
+
+        Each clamp holds what hangs on it, seen from this one.
+        """
+        apart = {member.name: member for member in members if not member.slot}
+        clamps = {
+            name: self.ties[name] for name, joint in self.description.joints.items()
+            if isinstance(joint, Fixed) and joint.point == self.graph.nodes[node]
+        }  # fmt: skip
+        contacts = []
+
+        def hold(member: _Member) -> _Member:
+            for name, pair in clamps.items():
+                other = pair[1 - pair.index(member.name)] if member.name in pair else ""
+                if other in apart:
+                    hanging = hold(apart.pop(other))
+                    contacts.append(_borne(name, hanging, member.name, node, turns=False))
+                    edges, bodies = member.edges + hanging.edges, member.bodies + hanging.bodies
+                    member = _Member(member.name, edges, bodies)
+            return member
+
+        second = {pair[1] for pair in clamps.values()}
+        order = sorted(apart, key=lambda name: (name != GROUND, name in second))
+        held = [hold(apart.pop(name)) for name in order if name in apart]
+        return contacts, held + [member for member in members if member.slot]
 
     def _tie_order(self) -> tuple[list[tuple[str, str]], frozenset[str]]:
         """Joints of `ties` from the outside in, each with the body that it holds; and those of closed chains."""
@@ -313,5 +329,8 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         if contact.slide is not None:
             k = next(k for k, edge in enumerate(linear.graph.edges) if edge.slide == contact.slide)
             normal = cross(linear.direction(k), force)
-        found.append(Reaction(force, 0.0 if contact.turns else moments[contact.joint], normal))
+        moment = 0.0 if contact.turns else moments[contact.joint]
+        if contact.joint in joints.ties and contact.on == joints.ties[contact.joint][0]:
+            moment = -1.0 * moment
+        found.append(Reaction(force, moment, normal))
     return found

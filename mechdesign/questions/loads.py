@@ -16,6 +16,7 @@ from mechdesign.questions.poses import in_study_units
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.loads import TIME, VELOCITY, Load, Quantity
+from mechdesign.study.text.fields import MAX_NUMBER
 from mechdesign.study.text.units import Amount
 
 
@@ -54,7 +55,9 @@ class Loading:
 
     def _value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
         if isinstance(quantity, Expression):
-            return quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
+            value = quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
+            # Beyond what a study takes as a number it has no value.
+            return np.where(np.abs(value) <= MAX_NUMBER, value, np.nan)
         return quantity
 
     def _variable(self, name: str, forces: Forces, moving: Moving) -> Number:

@@ -14,6 +14,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import force_question
@@ -66,9 +67,11 @@ def answers(study: Study, poses: Poses) -> Answers:
 
 
 def _marks(motion: Motion) -> Mapping[str, Flags]:
-    """Poses of which something is to be said: those that assemble where the drives hold the mechanism no longer."""
+    """Poses of which something is to be said: where the drives hold the mechanism no longer, or a load is nan."""
     (effort, *_) = (static.name for static in asked_of(motion).statics)
-    return {"singular": motion.valid & ~np.isfinite(motion.arrays[effort])}
+    unknown = ~np.isfinite(sum(motion.arrays[name] for name in (effort, "shaking", "shaking_moment")))
+    regular = motion.arrays["conditioning"] >= STALLED
+    return {"singular": motion.valid & unknown & ~regular, "undefined": motion.valid & unknown & regular}
 
 
 def tables(
@@ -127,6 +130,10 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
             "singular", f"{mark.number} of {count} poses are singular: the drives hold the mechanism no longer, and "
             "efforts and joint forces are nan there", "dynamics", mark.first,
         ))  # fmt: skip
+    mark = passage.marks[k]["undefined"]
+    if mark.number:
+        message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
+        warnings.append(Caution("undefined", message, "dynamics", mark.first))
     missing = [invalid_in_words(reason)]
     if along is not None and not along.whole[k]:
         missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")

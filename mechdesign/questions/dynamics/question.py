@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -10,10 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
-from mechdesign.mechanism.model import Mass
+from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
@@ -36,6 +38,7 @@ class ForceQuestion:
     study: Study
     section: DynamicsSection
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
+    tempo: float  # about how fast; see `MotionQuestion.tempo`
 
     @cached_property
     def joints(self) -> Joints:
@@ -59,16 +62,41 @@ class ForceQuestion:
     def statics(self) -> list[Static]:
         """Columns of a row a pose, and of the size of each joint's force."""
         label, mechanism = self.study.units.label, self.study.mechanism
+        moment = self.size * mechanism.size
+        sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo}
         columns = []
         for drive in mechanism.drives:
-            effort = label("moment" if mechanism.quantity(drive) == "angle" else "force")
-            columns.append(Static(f"{drive}_effort", effort, "<drive>_effort", {"drive": drive}))
+            kind, words = "moment" if mechanism.quantity(drive) == "angle" else "force", {"drive": drive}
+            columns.append(Static(f"{drive}_effort", label(kind), "<drive>_effort", words, sizes[kind]))
             if self.moves:
-                columns.append(Static(f"{drive}_power", label("power"), "<drive>_power", {"drive": drive}))
+                columns.append(Static(f"{drive}_power", label("power"), "<drive>_power", words, sizes["power"]))
         kinds = {"shaking.x": "force", "shaking.y": "force", "shaking": "force", "shaking_moment": "moment"}
         kinds |= {"kinetic_energy": "moment"} if self.moves else {}
         kinds |= {"potential_energy": "moment"} | dict.fromkeys(self.forces, "force")
-        return columns + [Static(name, label(kind), name, {}) for name, kind in kinds.items()]
+        return columns + [Static(name, label(kind), name, {}, sizes[kind]) for name, kind in kinds.items()]
+
+    @cached_property
+    def size(self) -> float:
+        """About how large the forces are: weights, inertia, springs and constant loads, all in the same direction.
+
+        What is balanced is the rounding of these.
+        """
+        mechanism, length = self.study.mechanism, self.study.mechanism.size or 1.0
+
+        def size(term: Term | Value) -> float:
+            return abs(float(mechanism.geometry.term(term, {})))
+
+        pull = self.study.units.inertia_factor * (math.hypot(*self.section.gravity) + length * self.tempo**2)
+        forces = [pull * size(mass.mass) for mass in mechanism.description.masses.values()]
+        for spring in mechanism.description.springs.values():
+            way, arm = (np.pi, length) if spring.turning else (length, 1.0)
+            give = (size(spring.stiffness) + size(spring.damping) * self.tempo) * way
+            forces.append((size(spring.preload) + size(spring.push) + give) / arm)
+        for load in self.section.loads:
+            for _, quantity, kind in load.numbers:
+                if not isinstance(quantity, Expression):
+                    forces.append(abs(quantity) / (length if kind == "moment" else 1.0))
+        return sum(forces)
 
     @quiet
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
@@ -133,5 +161,5 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         asked, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, pace.rated),
+        borne=ForceQuestion(study, section, pace.rated, asked.tempo),
     )  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mechdesign.mechanism.algebra import quiet
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import VALID
 from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
@@ -58,6 +59,7 @@ def joint_table(motion: Motion) -> Table:
     return JOINT_FORCES.table([*given, *columns, VALID.column(each(motion.valid))])
 
 
+@quiet
 def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) -> Table:
     """``extremes.csv``: smallest and largest values, peaks and means of some columns over the motion.
 

@@ -65,7 +65,7 @@ class Along:
         mechanism, sizes = question.study.mechanism, question.sizes
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
         columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
-        columns |= {static.name: 0.0 for static in question.statics}
+        columns |= {static.name: static.size for static in question.statics}
         self._asked, self._within = asked, dict[Part, Along]()
         whole = [each for each in asked if not each.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
@@ -109,7 +109,7 @@ class Along:
         zeros = [*lines, *(f"group {k}" for k in self._groups), *(name for name in self._others if name in judged)]
         # Means are of the quotient itself where a function has poles.
         self._means = {name: f"{_MEAN_OF}{name}" if name in divisors else name for name in columns if name in integrals}
-        functions |= {f"{_MEAN_OF}{name}": 0.0 for name in self._means if name in divisors}
+        functions |= {f"{_MEAN_OF}{name}": columns[name] for name in self._means if name in divisors}
         means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
         self._names = list(functions)
         self._follow = partial(

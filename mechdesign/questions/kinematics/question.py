@@ -45,6 +45,7 @@ class Static:
     unit: str
     kind: str
     words: Mapping[str, str]  # at the places of the kind
+    size: float = 0.0  # least size, by which its rounding is judged
 
 
 class Borne(Protocol):

@@ -295,11 +295,14 @@ def _springs(builder: Builder) -> dict[str, Spring]:
     section, found = builder.section, dict[str, Spring]()
     for name, spring in section.springs.items():
         path: KeyPath = ("springs", name)
-        turning = all(end in section.links for end in spring.between)
-        if not turning and not builder.check_named("point", spring.between, (*path, "between")):
+        one, other = spring.between
+        turning = any(end in section.links for end in spring.between)
+        turning &= not any(end in section.owners or end in section.ends for end in spring.between)
+        if not builder.check_named("link" if turning else "point", spring.between, (*path, "between")):
             continue
-        if spring.between[0] == spring.between[1]:
-            builder.report((*path, "between"), f"a spring between {spring.between[0]!r} and itself does nothing")
+        if one.rpartition(".")[2] == other.rpartition(".")[2]:
+            what = f"{one!r} and itself" if one == other else f"{one!r} and {other!r}, which are one place,"
+            builder.report((*path, "between"), f"a spring between {what} does nothing")
             continue
         wrong = ("free_length", "force", "rise") if turning else ("free_angle",)
         for key in spring.given(*wrong):

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
@@ -94,9 +95,16 @@ def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, mov
             for point in given:
                 if point is not None:
                     checker.known(point, points, "point", (*path, key))
+        if load.between is not None and len({end.rpartition(".")[2] for end in load.between}) == 1:
+            message = (
+                f"{load.between[0]!r} and {load.between[1]!r} are one place: a force between them has no direction"
+            )
+            checker.report((*path, "between"), message)
         for key, link in (("in", load.in_), ("link", load.link)):
             if link is not None:
-                checker.known(link, mechanism.moving if key == "link" else mechanism.links, "link", (*path, key))
+                checker.known(link, mechanism.links, "link", (*path, key))
+        if load.link == GROUND:
+            checker.report((*path, "link"), "the ground does not move: a moment on it does nothing; leave it out")
         for keys, quantity, kind in load.numbers:
             if isinstance(quantity, Amount):
                 checker.kind((*path, *keys), kind)
