@@ -29,7 +29,9 @@ def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
 class Loading:
     """Loads at some poses; `time` is that of each, nan without one."""
 
-    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints, time: Value = np.nan) -> None:
+    def __init__(
+        self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice, time: Value = np.nan
+    ) -> None:
         self.study, self.loads, self.poses, self.rows, self.time = study, loads, poses, rows, time
 
     @quiet

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -176,6 +176,15 @@ class MotionSection(PoseSection):
             _check_rates(checker, self)
         return super().checked(checker)
 
+    @property
+    def paced(self) -> bool:
+        """Whether it says how fast the mechanism moves."""
+        return bool(self.rates or self.accelerations or self.speed)
+
+    def of_given(self, drives: Collection[str]) -> bool:
+        """Whether its rates are those of the coordinates that the poses give rather than of the drives."""
+        return self.speed is not None or not {*self.rates, *self.accelerations} <= {*drives}
+
 
 def _check_rates(checker: Checker, section: MotionSection) -> None:
     """Check that rates and accelerations are those of drives, or of all coordinates that the poses give.
@@ -183,7 +192,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
     Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
     """
     drives = checker.mechanism.driven_kinds
-    source = _source(checker, section)
+    source = source_of(checker, section)
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
     parts = (("rates", section.rates), ("accelerations", section.accelerations))
@@ -218,7 +227,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         if getattr(section, key):
             message = f"'speed' and {key!r} are both given; a path is passed at one of them"
             checker.report((section.command, key), message, at_key=True)
-    path = _source(checker, section).path
+    path = source_of(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
         checker.report((section.command, "speed"), message, at_key=True)
@@ -231,7 +240,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         checker.report((section.command, "speed"), message, at_key=True)
 
 
-def _source(checker: Checker, section: PoseSection) -> PoseSection:
+def source_of(checker: Checker, section: PoseSection) -> PoseSection:
     """The section that gives the poses of another: itself, or kinematics."""
     return section if section.source is not None else checker.parts.get("kinematics") or section
 
