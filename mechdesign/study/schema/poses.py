@@ -152,8 +152,9 @@ class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
 
     outputs: fields.CoordinateNames | None = None
-    """Coordinates, measures and points (their x and y) that are asked for. Left out: every moving point, link and
-    slide; in reliability what is limited, if anything is. Example: [C, rod.angle, mu]
+    """Coordinates, measures and points (their x and y) that are asked for; in reliability columns of dynamics as well
+    (theta_effort, A_force). Left out: every moving point, link and slide; in reliability what is limited, if anything
+    is. Example: [C, rod.angle, mu]
     """
     rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     """Velocities of drives, or of all coordinates that the poses give; velocities and accelerations of the outputs (or

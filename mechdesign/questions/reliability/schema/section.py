@@ -91,8 +91,9 @@ class ReliabilitySection(MotionSection):
 
     command: ClassVar[str] = "reliability"
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
-    """What varies, by the name of a parameter, of one place (rod.length, ground.G.y, guide.direction, slider.B.x;
-    ``*.length`` for all such), of a drive (its positioning error) or of the load (load.fx, load.fy, load.mz).
+    """What varies, by the name of a parameter, of one place (rod.length, ground.G.y, guide.direction, slider.B.x,
+    crank.mass, return.stiffness; ``*.length`` for all such), of a drive (its positioning error) or of the load
+    (load.fx, load.fy, load.mz).
     Example: {r1: {tolerance: 0.03, distribution: uniform}, '*.length': 0.02,
     theta: 0.01}
     """
@@ -106,7 +107,7 @@ class ReliabilitySection(MotionSection):
     """
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
     """What errors may be in each pose, by coordinate, measure or point; of velocities and accelerations C.x_velocity
-    and so on. The reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]}
+    and so on; of efforts and forces by the column of dynamics (theta_effort, shaking, A_force). The reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]}
     Example: {P: {radius: 0.05}}
     """
     load: tuple[fields.Number, ...] | None = None
