@@ -17,7 +17,8 @@ GROUPS = {
     "Four-bars": ("four_bar", "parallelogram", "wiper", "pumpjack", "function_generator", "path_synthesis",
                   "straight_line_synthesis", "straight_line_front"),
     "Sliders": ("slider_crank", "offset_slider_crank", "inverted_slider_crank", "oscillating_cylinder", "scotch_yoke",
-                "whitworth", "shaper", "oldham", "trammel", "rapson_slide", "v_twin", "sine_generator"),
+                "whitworth", "shaper", "oldham", "trammel", "rapson_slide", "v_twin", "sine_generator",
+                "rise_dwell_return"),
     "Six-bars and more": ("watt", "stephenson", "stephenson_ii", "jansen", "klann", "toggle", "toggle_clamp",
                           "scissor_lift", "excavator"),
     "Straight lines": ("chebyshev", "hoeken", "hart", "peaucellier", "watt_parallel_motion", "pantograph"),
@@ -32,7 +33,7 @@ HOME = ("four_bar", "jansen", "shaper", "five_bar", "scissor_lift", "v_twin", "p
         "pantograph", "klann", "trammel")  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
 PICTURES = ("optimum", "allocation", "deflections", "failure_map", "density_contours", "springs", "workspace", "paths",
-            "bands", "density", "reliability")  # fmt: skip
+            "bands", "reliability")  # fmt: skip
 
 
 def studies() -> dict[str, Path]:

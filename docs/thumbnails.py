@@ -6,7 +6,7 @@ It moves by style rules, without a script, and stands still where the reader's s
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, fromstring, tostring
@@ -17,7 +17,7 @@ import mechdesign
 from mechdesign.errors import MechdesignError
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import PLACES, TIMES, TURNS
+from mechdesign.report.page.tracks import PLACES, TIMES, TURNS, steps
 
 # A moving part lies this far beside its pose at most: units of a drawing that is shown half as large, degrees, lengths.
 _NEAR = {"translate": 1.0, "rotate": 0.5, "scale": 0.01}
@@ -68,7 +68,7 @@ class Tracks:
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data, count = data, data["poses"]
-        times = _values(data["times"], count + 1, TIMES)
+        times = steps(data["times"], count + 1) / TIMES
         # Behind the last pose of a closed motion comes the first again.
         poses = np.arange(count + (times[count] > times[count - 1])) % count
         valid = np.ones(count, dtype=bool)
@@ -101,14 +101,8 @@ class Tracks:
     def _turn(self, link: str) -> Floats:
         return np.unwrap(self._track("turn", link, TURNS), period=360)[:, None]
 
-    def _track(self, kind: str, name: str, steps: int) -> Floats:
-        return _values(self.data[kind][name], self.data["poses"], steps)[self.poses]
-
-
-def _values(deltas: Sequence[int | None], count: int, steps: int) -> Floats:
-    """The numbers whose steps `tracks.deltas` has written, those of poses that are not valid as any."""
-    values = np.cumsum([step or 0 for step in deltas] + [0] * (count - len(deltas)))
-    return values / steps
+    def _track(self, kind: str, name: str, unit: int) -> Floats:
+        return steps(self.data[kind][name], self.data["poses"])[self.poses] / unit
 
 
 def _rule(name: str, motion: Mapping[str, Floats], times: Floats) -> str:

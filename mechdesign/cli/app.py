@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from mechdesign.cli import options as given
 from mechdesign.cli import process
@@ -68,6 +69,13 @@ def _start(
     """Options before the command."""
 
 
+class _Command(TyperCommand):
+    """A command whose `--report` may stand without a kind."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        return super().parse_args(ctx, given.with_kinds(args))
+
+
 def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], short: str, long: str) -> None:
     """Add a command: what it does, its arguments and options, and its help."""
 
@@ -76,7 +84,7 @@ def _add(action: Callable[..., int], name: str, takes: Sequence[Parameter], shor
             raise typer.Exit(action(**said))
 
     command.__signature__ = Signature(takes)  # type: ignore[attr-defined]
-    app.command(name, short_help=short, help=long)(command)
+    app.command(name, cls=_Command, short_help=short, help=long)(command)
 
 
 # The actions of the commands.

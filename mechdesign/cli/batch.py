@@ -29,10 +29,10 @@ from mechdesign.cli.execution import (
 )  # fmt: skip
 from mechdesign.cli.live_table import LiveTable, Reported
 from mechdesign.cli.options import Options
-from mechdesign.cli.places import PAGE, claim, folder, place
+from mechdesign.cli.places import claim, folder, place
 from mechdesign.commands import COMMANDS, MERGE, QUESTIONS, SENSITIVITIES, SWEEP
 from mechdesign.errors import StudyError
-from mechdesign.files import check_marked, owned
+from mechdesign.files import owned
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
 from mechdesign.report.requirements import command_of, number_of
@@ -131,8 +131,7 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             if own != options:
                 study = load_source(origin, own)
             asked = _places(only or questions(study), root, own)
-            if own.report:
-                check_marked(root / pages.REPORT, PAGE)
+            places.check_reports(root, own)
             for command, directory in asked:
                 places.check(study, command, directory, own)
             tasks.append(Task(number, origin, label, root, asked, own))
@@ -314,6 +313,7 @@ def _question(study: Study, command: str, directory: Path, options: Options, pro
 def _page(study: Study, task: Task, outcomes: Sequence[Outcome], *, several: bool) -> Entry | None:
     """Write a study's report and return its line of the index; without `--report` remove an older report."""
     options = task.options
+    pages.remove(task.root / pages.PRINTED)
     if not options.report:
         pages.remove(task.root / pages.REPORT)
         return None

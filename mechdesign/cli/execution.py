@@ -17,7 +17,7 @@ import mechdesign
 from mechdesign.cautions import Caution
 from mechdesign.cli import places, terminal
 from mechdesign.cli.annotations import annotate, of_error, of_verdicts, of_warnings
-from mechdesign.cli.options import Options
+from mechdesign.cli.options import PDF, Options
 from mechdesign.cli.places import RESUMED, extras, folder, place
 from mechdesign.commands import DIVIDED, MERGE, SWEEP
 from mechdesign.errors import AssemblyError, Interrupted, MechdesignError, StudyError, counted
@@ -356,7 +356,13 @@ def write_report(
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
     writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
-    terminal.say(f"{study.label}: report in {path}", quiet=options.quiet)
+    printed = ""
+    if options.report == PDF:
+        from mechdesign.report.page import printing
+
+        writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
+        printed = f", printed in {directory / pages.PRINTED}"
+    terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
     return [number for each in told if each.section is not None for number in each.section["headlines"]]
 
 

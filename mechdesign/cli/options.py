@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from inspect import Parameter
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +18,9 @@ from mechdesign.files import FORMATS, formats_of
 if TYPE_CHECKING:
     from mechdesign.work.shards import Shard
 
+# Kinds of reports.
+HTML, PDF = "html", "pdf"
+_REPORT = "--report"
 # Styles of pictures: width of the page and size of the type.
 STYLES = ("screen", "paper")
 # Default relative tolerance of `compare`: above the rounding differences between machines, below any real change.
@@ -69,6 +73,20 @@ def _text(kind: Any, flag: str, metavar: str, meaning: str, **more: Any) -> Para
 
 def _flag(flag: str, meaning: str, *short: str) -> Parameter:
     return _parameter(_name(flag), bool, False, typer.Option(flag, *short, help=meaning))
+
+
+def _report(meaning: str) -> Parameter:
+    return _text(str, _REPORT, "[pdf]", meaning, autocompletion=_one_of([PDF]))
+
+
+def with_kinds(words: Sequence[str]) -> list[str]:
+    """Words of a command line with the kind of the report after a `--report` that stands alone."""
+    told = []
+    for word, follower in zip_longest(words, words[1:]):
+        told.append(word)
+        if word == _REPORT and follower not in (HTML, PDF):
+            told.append(HTML)
+    return told
 
 
 def _out(meaning: str) -> Parameter:
@@ -129,9 +147,10 @@ STYLE = _text(
     autocompletion=_one_of(STYLES),
 )
 ANIMATE = _flag("--animate", "Also draw the motion of a sweep or path: motion.gif.")
-REPORT = _flag("--report", "Also write report.html: one page with all of it, which moves.")
-REPORTS = _flag(
-    "--report", "Also write report.html, a page a study with all of it; of several studies also index.html."
+REPORT = _report("Also write report.html: one page with all of it, which moves; pdf: report.pdf as well.")
+REPORTS = _report(
+    "Also write report.html, a page a study with all of it;"
+    " pdf: report.pdf as well; of several studies also index.html."
 )
 ALLOW_FILES = _flag("--allow-files", "Also read files that the study names and that lie outside its folder.")
 ALL_MODES = _flag("--all-modes", "Follow every way in which the mechanism can be assembled: modes.csv.")
@@ -273,7 +292,7 @@ class Options:
     no_plots: bool = False
     formats: str | None = None
     style: str | None = None
-    report: bool = False
+    report: str | None = None  # `HTML`, or `PDF` for both
     animate: bool = False
     all_modes: bool = False
     before: Path | None = None
@@ -292,6 +311,13 @@ class Options:
                 raise StudyError(f"{option} and --no-plots contradict each other")
         if self.shard is not None and self.report:
             raise StudyError("--shard and --report contradict each other; merge takes --report")
+        if self.report not in (None, HTML, PDF):
+            raise StudyError(f"--report takes {PDF} or nothing, not {self.report!r}")
+        if self.report == PDF:
+            from mechdesign.report.page.printing import browser
+
+            # Told before anything is computed.
+            browser()
         if self.style is not None and self.style not in STYLES:
             raise StudyError(f"--style takes {' or '.join(STYLES)}, not {self.style!r}")
         formats_of(self.formats, "--format")

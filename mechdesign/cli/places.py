@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from mechdesign.cli.options import STYLES, Options
+from mechdesign.cli.options import PDF, STYLES, Options
 from mechdesign.commands import SWEEP
 from mechdesign.errors import StudyError
 from mechdesign.files import check_marked
@@ -56,7 +56,7 @@ def extras(command: str, options: Options) -> Extras:
     """Pictures and reports that the options ask of a command."""
     animate = options.animate and command == "kinematics"
     look = options.style or STYLES[0]
-    return Extras(not options.no_plots, options.kinds, animate, options.all_modes, options.report, look)
+    return Extras(not options.no_plots, options.kinds, animate, options.all_modes, bool(options.report), look)
 
 
 def check(study: Study, command: str, directory: Path, options: Options) -> None:
@@ -77,5 +77,16 @@ def check(study: Study, command: str, directory: Path, options: Options) -> None
         check_marked(part, shards.MARK)
     if command in RESUMED:
         check_marked(directory / NAME, MARK)
-    if options.report:
-        check_marked(directory / pages.REPORT, PAGE)
+    check_reports(directory, options)
+
+
+def check_reports(directory: Path, options: Options) -> None:
+    """Check that the reports that are asked replace no other files.
+
+    Raises
+    ------
+    StudyError
+        If they would; it names the file.
+    """
+    for name in [pages.REPORT] * bool(options.report) + [pages.PRINTED] * (options.report == PDF):
+        check_marked(directory / name, PAGE)

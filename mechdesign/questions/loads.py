@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechdesign.expressions import Expression, Number
-from mechdesign.mechanism.algebra import Value, norm2, quiet
+from mechdesign.mechanism.algebra import norm2, quiet
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import first
@@ -27,12 +27,10 @@ def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
 
 
 class Loading:
-    """Loads at some poses; `time` is that of each, nan without one."""
+    """Loads at some rows of poses."""
 
-    def __init__(
-        self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice, time: Value = np.nan
-    ) -> None:
-        self.study, self.loads, self.poses, self.rows, self.time = study, loads, poses, rows, time
+    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice) -> None:
+        self.study, self.loads, self.poses, self.rows = study, loads, poses, rows
 
     @quiet
     def add(self, forces: Forces, moving: Moving) -> None:
@@ -64,7 +62,8 @@ class Loading:
         if name in study.parameters.nominal:
             return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
         if name == TIME:
-            return np.asarray(self.time, dtype=np.float64)
+            assert self.poses.times is not None
+            return self.poses.times[self.rows]
         coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
         if coordinate.name == name:
             return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)

@@ -65,6 +65,7 @@ def write(
     files |= {name: (text.encode(),) for name, text in result.files.items()}
     own, more = manifest.own(directory), (asked.plots or asked.report) and not result.interrupted
     pages.remove(directory / pages.REPORT)
+    pages.remove(directory / pages.PRINTED)
     warnings: tuple[Caution, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ import pytest
 
 from mechdesign.errors import AssemblyError, Interrupted
 from mechdesign.questions.kinematics.analysis import kinematics
+from mechdesign.report.page import printing
 
 from .conftest import SLIDER, answer
 
@@ -109,7 +110,7 @@ def test_a_page_holds_all_of_a_study(asks, invoke):
     page = Page("results/both/report.html")
     check(page)
     headings = page.said("h2")
-    assert headings[:3] == ["Mechanism", "Answers", "Requirements"]
+    assert headings[:3] == ["Answers", "Requirements", "Mechanism"]
     assert {"How does it move?", "How stiff is it?"} <= set(headings)
     motion = json.loads(Path("results/both/kinematics/manifest.json").read_text())["tables"]["motion.csv"]["columns"]
     heads = page.said("th")
@@ -290,3 +291,41 @@ def test_an_older_page_goes_and_one_of_others_stays(folder, invoke):
     own.write_text("<p>mine")
     invoke("run", "slider.yaml", "--no-plots")
     assert own.exists()
+
+
+def test_without_a_browser_a_printed_report_is_refused_before_anything_is_computed(folder, invoke, monkeypatch):
+    monkeypatch.setattr(printing, "BROWSERS", ("no-such-browser",))
+    for command in ("run", "kinematics"):
+        done = invoke(command, "slider.yaml", "--report", "pdf")
+        assert done.exit_code == 2
+        assert "no browser to print with; install Chromium, Chrome or Edge" in done.stderr
+    assert not (folder / "results").exists()
+    assert "--report takes pdf or nothing, not 'png'" in invoke("run", "slider.yaml", "--report=png").stderr
+
+
+def test_a_browser_prints_the_report_and_an_older_print_goes(folder, invoke, monkeypatch):
+    browser = folder / "chromium"
+    browser.write_text("""#!/bin/sh
+for word; do case $word in --print-to-pdf=*) printf '%%PDF-1.4 (D:20261127101010)\\n' > "${word#*=}";; esac; done
+""")
+    browser.chmod(0o755)
+    monkeypatch.setattr(printing, "BROWSERS", (str(browser),))
+    printed = folder / "results/slider/report.pdf"
+    done = invoke("run", "--report", "pdf", "slider.yaml", "--no-plots")
+    assert done.exit_code == 0, done.stderr
+    assert f"printed in {printed.relative_to(folder)}" in done.stderr
+    assert printed.read_bytes().startswith(b"%PDF-1.4 (D:19700101000000)\n")
+    manifest = json.loads((folder / "results/slider/kinematics/manifest.json").read_text())
+    assert manifest["report"] is True
+    # Without a kind it is the page alone, and a study may follow.
+    assert invoke("run", "--report", "slider.yaml", "--no-plots").exit_code == 0
+    assert printed.with_name("report.html").exists()
+    assert not printed.exists()
+    printed.write_bytes(b"%PDF mine")
+    assert "no result of mechdesign's" in invoke("run", "slider.yaml", "--report", "pdf", "--no-plots").stderr
+    assert printed.read_bytes() == b"%PDF mine"
+    printed.unlink()
+    browser.write_text("#!/bin/sh\necho no display >&2\nexit 1\n")
+    done = invoke("run", "slider.yaml", "--report", "pdf", "--no-plots")
+    assert done.exit_code == 4
+    assert "did not print it: no display" in done.stderr

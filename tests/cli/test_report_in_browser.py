@@ -14,10 +14,15 @@ from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
+from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.page import Answered, report
+from mechdesign.report.page.printing import pdf
 from mechdesign.report.page.section import section
+from mechdesign.report.page.vector import picture
+from mechdesign.report.requirements import requirements
 from mechdesign.study import load
 
 try:
@@ -48,15 +53,27 @@ def answers():
     return found
 
 
+# Pictures that are in a study's report, beside what moves.
+PICTURES = {"four_bar": ("transmission", "paths"), "five_bar": ("inscribed",)}
+
+
+def drawn(study, result, names):
+    """Pictures of a result as they stand in a page."""
+    with style.context():
+        gallery = figures(study, result)
+        return {name: picture(gallery[name], f"{result.command}-{name}", name) for name in names}
+
+
 @pytest.fixture(scope="module")
 def reports(answers, tmp_path_factory):
-    """A folder with the reports of these, without other pictures."""
+    """A folder with the reports of these, with few pictures."""
     folder = tmp_path_factory.mktemp("reports")
     for name, (study, result) in answers.items():
-        part, warnings = section(study, result, {}, "", (), plots=True)
+        part, warnings = section(study, result, drawn(study, result, PICTURES.get(name, ())), "", (), plots=True)
         assert warnings == ()
+        verdicts = requirements(study, result)
         (folder / f"{name}.html").write_bytes(
-            report(study, [Answered(result.command, "done", 0, section=part)], below=False)
+            report(study, [Answered(result.command, "done", 0, verdicts=verdicts, section=part)], below=False)
         )
     return folder
 
@@ -66,8 +83,8 @@ def opened(browser, reports):
     """Open a study's report; at the end nothing was asked of the network, and nothing complained."""
     pages, complaints = [], []
 
-    def look(name, width=1400, **options):
-        page = browser.new_page(viewport={"width": width, "height": 900}, **options)
+    def look(name, width=1400, height=900, **options):
+        page = browser.new_page(viewport={"width": width, "height": height}, **options)
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda request: complaints.append(request.url)
@@ -218,11 +235,11 @@ def test_who_wants_no_motion_sees_steps(opened):
 
 def test_a_click_in_the_curves_chooses_the_pose(opened, answers):
     page, rows, poses = opened("slider_crank"), rows_of(answers, "slider_crank"), poses_of(answers, "slider_crank")
-    curves = page.locator(".moving-curves")
+    curves = page.locator(".moving-beside svg")
     box = curves.bounding_box()
     curves.click(position={"x": 0.5 * box["width"], "y": 0.3 * box["height"]})
     row = int(poses[int(page.get_by_role("slider").input_value())])
-    cursor = float(page.locator(".moving-cursor").get_attribute("x1"))
+    cursor = float(curves.locator(".moving-cursor").first.get_attribute("x1"))
     wide = float(curves.get_attribute("viewBox").split()[2])
     assert cursor == pytest.approx(0.5 * wide, abs=0.01 * wide)
     assert 0 < row < len(rows) - 1
@@ -260,7 +277,146 @@ def test_an_index_says_what_it_is(opened):
     meaning = "smallest over largest singular value of the Jacobian"
     number = page.locator("dl.numbers div", has_text="mean inverse_condition")
     assert f"mean over the region: {meaning}" in number.inner_text()
-    assert page.locator(".moving-numbers th", has_text="inverse_condition").get_attribute("title") == meaning
+    assert meaning in page.locator(".moving-numbers th", has_text="inverse_condition").inner_text()
+
+
+def test_one_cursor_goes_through_every_picture(opened):
+    page = opened("four_bar")
+    page.get_by_role("slider").press("Home")
+    link = page.locator(".required a[data-pose]")
+    assert link.inner_text() == "crank 0"
+
+    def cursors():
+        return page.evaluate("""() => [...document.querySelectorAll("svg[data-axes]")].flatMap(svg =>
+            JSON.parse(svg.dataset.axes).filter(axes => axes[0] === "crank [deg]").map((axes, k) => {
+                const at = Number(svg.querySelectorAll(".moving-cursor")[k].getAttribute("x1"));
+                return axes[5] + (axes[6] - axes[5]) * (at - axes[1]) / (axes[2] - axes[1]);
+            }))""")  # fmt: skip
+
+    def dots():
+        return page.evaluate("""() => [...document.querySelectorAll(".moving-dot")].map(dot => {
+            const axes = JSON.parse(dot.closest("svg").dataset.axes)[0];
+            const [left, right, top, bottom, west, east, south, north] = axes.slice(1);
+            const at = name => Number(dot.getAttribute(name));
+            return [west + (east - west) * (at("cx") - left) / (right - left),
+                    south + (north - south) * (bottom - at("cy")) / (bottom - top)];
+        })""")  # fmt: skip
+
+    transmission = page.locator("#kinematics .pictures svg[aria-label=transmission]")
+    box = transmission.bounding_box()
+    transmission.hover(position={"x": 0.6 * box["width"], "y": 0.4 * box["height"]})
+    angle = float(re.search(r"crank = (\S+) deg", words(page))[1])
+    found = cursors()
+    assert len(found) > 3
+    assert found == pytest.approx([angle] * len(found), abs=0.4)
+    assert 150 < angle < 300
+    # The coupler point in the picture of the paths is where the moving mechanism has it.
+    (dot,), (x, y, error) = dots(), place(page, "C")
+    assert abs(complex(*dot) - complex(x, y)) < 2 * error
+    link.click()
+    assert cursors() == pytest.approx([0.0] * len(found), abs=0.4)
+
+
+def test_a_drag_on_the_linkage_moves_its_nearest_point(opened):
+    page = opened("four_bar")
+    pin = page.locator(".moving [data-at=A]:has(circle)").bounding_box()
+    drawing = page.locator(".moving svg").first.bounding_box()
+    data = page.evaluate("() => JSON.parse(document.querySelector('.moving script').textContent)")
+    page.mouse.move(pin["x"] + pin["width"] / 2, pin["y"] + pin["height"] / 2)
+    page.mouse.down()
+    # To where the crank, 1 long about the origin, points up.
+    scale = drawing["width"] / page.evaluate("() => document.querySelector('.moving svg').viewBox.baseVal.width")
+    up = (data["corner"][1] - 1) * data["scale"] * scale
+    page.mouse.move(drawing["x"] - data["corner"][0] * data["scale"] * scale, drawing["y"] + up, steps=4)
+    page.mouse.up()
+    assert float(re.search(r"crank = (\S+) deg", words(page))[1]) == pytest.approx(90, abs=3)
+
+
+def test_between_rows_of_the_table_pins_are_where_the_solver_has_them(opened, answers):
+    page, poses = opened("four_bar"), poses_of(answers, "four_bar")
+    slider, angles = page.get_by_role("slider"), [45 * each for each in poses[1::5]]
+    assert any(each % 45 for each in angles)
+    fine = load(
+        CONFIGS / "gallery" / "four_bar.yaml",
+        ["kinematics.sweep=null", f"kinematics.poses={json.dumps([{'crank': each} for each in angles])}"],
+    )
+    rows = list(kinematics(fine).tables["motion"])
+    for number, row in zip(range(1, len(poses), 5), rows, strict=True):
+        slider.fill(str(number))
+        x, y, error = place(page, "C")
+        assert abs(complex(x, y) - complex(row["C.x"], row["C.y"])) < error
+    rows = rows_of(answers, "four_bar")
+    assert len(rows) == 9
+    for number, row in enumerate(rows):
+        slider.fill(str(poses.index(number)))
+        x, y, error = place(page, "C")
+        assert abs(complex(x, y) - complex(row["C.x"], row["C.y"])) < error
+
+
+def test_one_map_is_chosen_by_its_index(opened):
+    page = opened("five_bar")
+    shown, legend = page.locator(".moving-region"), page.locator(".moving-legend:not(.moving-off)")
+    assert "inverse condition" in legend.inner_html()
+    boxes = page.get_by_role("radio")
+    assert boxes.count() == 5
+    page.get_by_role("radio", name="sigma min").check()
+    assert page.locator(shown.get_attribute("href")).locator("image").count() == 1
+    assert "sigma_min" in shown.get_attribute("href")
+    assert "sigma min" in legend.inner_html()
+
+
+@pytest.mark.parametrize("name", ["four_bar", "five_bar"])
+def test_the_first_screen_has_mechanism_verdicts_and_key_numbers(opened, name):
+    page = opened(name, 1280, height=800)
+    assert page.locator("#answers dl.numbers > div").count() == 5
+    pieces = [".moving svg", ".moving-words", ".status", "#answers dl.numbers", "#requirements tbody tr >> nth=0"]
+    for piece in pieces if name == "four_bar" else pieces[:-1]:
+        box = page.locator(piece).first.bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= 800, piece
+
+
+def test_on_a_dark_screen_pictures_are_dark_and_their_letters_light(opened):
+    page = opened("four_bar", color_scheme="dark")
+    colors = page.evaluate("""() => {
+        const bright = color => color.match(/[.0-9]+/g).slice(0, 3).reduce((sum, each) => sum + Number(each), 0) / 3;
+        const text = document.querySelector(".pictures svg text"), ground = document.querySelector(".moving svg rect");
+        return [bright(getComputedStyle(text).fill), bright(getComputedStyle(ground).fill),
+                bright(getComputedStyle(text.closest("figure")).backgroundColor)];
+    }""")
+    assert colors[0] > 200
+    assert max(colors[1:]) < 60
+    # What a colour of a map means stays.
+    given, seen = (
+        opened("five_bar", color_scheme="dark")
+        .locator(".moving-legend rect")
+        .first.evaluate("each => [each.getAttribute('fill'), getComputedStyle(each).fill]")
+    )
+    assert [int(given[k : k + 2], 16) for k in (1, 3, 5)] == [*map(int, re.findall(r"\d+", seen))]
+
+
+def test_on_a_phone_letters_can_be_read_and_what_is_at_the_side_is_said(opened):
+    page = opened("four_bar", 390)
+    chart = page.locator(".moving-beside")
+    assert (
+        page.evaluate("""() => Math.min(...[...document.querySelectorAll(".pictures svg text")].map(text =>
+        parseFloat(text.getAttribute("font-size") || 10) * text.ownerSVGElement.clientWidth
+        / text.ownerSVGElement.viewBox.baseVal.width))""")
+        > 6.5
+    )
+    assert "more to the side" in chart.evaluate("each => getComputedStyle(each, '::before').content")
+    chart.evaluate("each => { each.scrollLeft = each.scrollWidth; }")
+    expect(chart).not_to_have_class(re.compile("more"))
+    # The linkage stays in sight while the charts are read.
+    chart.scroll_into_view_if_needed()
+    assert page.locator(".moving svg").first.bounding_box()["y"] >= 0
+
+
+def test_it_is_printed_on_few_pages(browser, reports):
+    printed = pdf(reports / "four_bar.html")
+    assert printed.startswith(b"%PDF")
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 5
+    assert pdf(reports / "four_bar.html") == printed
 
 
 def test_a_click_on_a_front_shows_that_linkage_moving(opened, answers):

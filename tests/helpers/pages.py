@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
@@ -14,6 +15,8 @@ from matplotlib.transforms import Bbox
 SHARED = 2.0
 # Of a letter's height: the part of a box that letters without strokes above and below leave free.
 LOOSE = 0.15
+# Letters of a number along an axis.
+MOST_DIGITS = 8
 
 
 def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
@@ -21,7 +24,7 @@ def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
     renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
     # Tick labels beyond the limits of their axis are there, but not drawn.
     hidden: set[Text] = set()
-    for axis in (axis for axes in figure.axes for axis in axes._axis_map.values()):
+    for axis in (axis for axes in figure.findobj(Axes) for axis in axes._axis_map.values()):  # type: ignore[attr-defined]
         # In space Matplotlib moves the labels of ticks as it draws them, and back.
         seen = set(axis._update_ticks()) if axis.axes.get_visible() and axis.axes.name != "3d" else set()
         ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
@@ -49,10 +52,25 @@ def faults(figure: Figure) -> Iterator[str]:
         across, down = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
         if across > SHARED and down > SHARED and turn % 90 == 0 and also % 90 == 0:
             yield f"{one!r} over {other!r}"
+    for axes in figure.findobj(Axes):
+        assert isinstance(axes, Axes)
+        yield from _lost_digits(axes)
     for axes in figure.axes:
         labels = axes.get_xlabel(), axes.get_ylabel()
-        if _place(labels) and axes.get_aspect() != 1.0:
+        if _place(labels) and axes.get_aspect() != 1.0 and not any("times larger" in words for words, _, _ in found):
             yield f"unequal axes of a place: {' and '.join(labels)}"
+
+
+def _lost_digits(axes: Axes) -> Iterator[str]:
+    """Axes with a label whose power of ten stands apart from it, numbers that are alike, and those of many digits."""
+    for axis in (axes.xaxis, axes.yaxis) if axes.get_visible() and axes.name != "3d" else ():
+        label = axis.get_label_text()
+        if label and axis.offsetText.get_visible() and axis.offsetText.get_text():
+            yield f"{axis.offsetText.get_text()!r} apart from {label!r}"
+        drawn = [tick.label1.get_text() for tick in axis._update_ticks() if tick.label1.get_visible()]
+        numbers = [text for text in drawn if text.strip("-\N{MINUS SIGN}.0123456789") == "" and text]
+        if len(set(numbers)) < len(numbers) or any(len(text) > MOST_DIGITS for text in numbers):
+            yield f"numbers {numbers} along {label!r}"
 
 
 def _place(labels: tuple[str, str]) -> bool:

@@ -8,6 +8,7 @@ from helpers.studies import study_of
 from scipy.optimize import brentq
 
 import mechdesign
+from mechdesign.questions.workspace.inscribed import crossed
 
 LEGS = """
 units: {length: dimensionless}
@@ -107,3 +108,36 @@ def test_a_side_along_which_one_margin_ends_the_region() -> None:
     assert (width, height) == pytest.approx((1, np.sqrt(4 - 1.5**2)), rel=1e-7)
     assert main["rectangle_y"][0] == pytest.approx(height / 2, abs=1e-7)
     assert main["circle_radius"][0] == pytest.approx(0.75, rel=1e-7)
+
+
+CROSSED = """
+units: {length: mm}
+mechanism:
+  links:
+    ground: {O1: [-100, 0], O2: [100, 0]}
+    upper_1: [O1, A1, 80]
+    upper_2: [O2, A2, 80]
+    lower_1: [A1, P, 110]
+    lower_2: [A2, P, 110]
+  drives: {q1: {angle: upper_1}, q2: {angle: upper_2}}
+  sketch: {A1: [-90, 79], A2: [90, 79], P: [0, 142]}
+workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: inverse_condition}
+"""
+
+
+@pytest.mark.slow
+def test_a_shape_that_a_singularity_crosses_is_told() -> None:
+    """In any assembly of a five-bar the rods come in line inside the region; in the sketch's they bound it."""
+    warnings = [str(warning) for warning in mechdesign.workspace(study_of(CROSSED)).warnings]
+    (told,) = (words for words in warnings if "crossed" in words)
+    assert "parallel singularity" in told
+    assert "lower_1" in told
+    same = mechdesign.workspace(study_of(CROSSED, "workspace.assembly=same"))
+    assert not any("crossed" in str(warning) for warning in same.warnings)
+
+
+def test_a_place_on_the_border_crosses_nothing() -> None:
+    shapes = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 4.0, 0.5])
+    assert crossed(shapes, np.array([0.25j])) == ["circle"]
+    assert crossed(shapes, np.array([1j, 2 + 0.25j])) == []
+    assert crossed(np.full(7, np.nan), np.array([0j])) == []

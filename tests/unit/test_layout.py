@@ -20,6 +20,7 @@ ORDER = (
     ("mechdesign.questions.reliability.laws",),
     (
         "mechdesign.study.schema", "mechdesign.study.poses", "mechdesign.study.point_paths",
+        "mechdesign.study.motion_program",
         *(f"mechdesign.questions.{name}.schema" for name in COMMANDS), "mechdesign.experiments.schema",
     ),
     ("mechdesign.study",),

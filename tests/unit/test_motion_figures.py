@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 from helpers.studies import study_of
+from matplotlib.patches import Polygon
 from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.questions.kinematics.figures.animation import in_order
-from mechdesign.questions.kinematics.figures.curves import curves_figure
+from mechdesign.questions.kinematics.figures.centrodes import centrodes
+from mechdesign.questions.kinematics.figures.curves import curves_figure, motion_figure
+from mechdesign.questions.kinematics.figures.hodographs import hodographs_figure
+from mechdesign.questions.kinematics.figures.paths import path_looks
+from mechdesign.questions.kinematics.figures.polygons import centripetal, images
+from mechdesign.questions.kinematics.figures.poses import place_of
 from mechdesign.questions.kinematics.figures.transmission import transmission_figure
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
@@ -26,6 +32,19 @@ mechanism:
   sketch: {A: [0, 30], B: [75, 55]}
 kinematics:
   sweep: {theta: {from: 0, to: 360, step: 5}}
+"""
+FIVE_BAR = """
+units: {length: mm, time: s}
+mechanism:
+  links:
+    ground: {O1: [-50, 0], O2: [50, 0]}
+    left: [O1, A, 100]
+    left_rod: [A, C, 140]
+    right: [O2, B, 100]
+    right_rod: [B, C, 140]
+  drives: {q1: {angle: left}, q2: {angle: right}}
+  sketch: {A: [-110, 80], B: [110, 80], C: [0, 165]}
+kinematics: {path: {C: {circle: {center: [0, 160], radius: 20}, points: 12}}, speed: 50, outputs: [C]}
 """
 ROCKER = """
 mechanism:
@@ -270,12 +289,134 @@ def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
     middles = np.array([path.vertices.mean(axis=0) @ [1, 1j] for path in ticks.get_paths()])
     path = sweep_of(study_of(FOUR_BAR)).places["C"]
     np.testing.assert_allclose(middles, path[:-1:3], atol=1e-9)
-    assert axes.get_legend().get_texts()[0].get_text() == "ticks every 0.0417 s (15 deg of theta)"
-    assert (
-        not drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 6}", "kinematics.accelerations={theta: 1}"))["paths"]
-        .axes[0]
-        .collections
-    )
+    legend = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert legend == ["four-bar O A B D: crank-rocker", "ticks every 0.0417 s (15 deg of theta); numbers: theta"]
+    # Of what speeds up equal steps are not equal times.
+    faster = study_of(FOUR_BAR, "kinematics.rates={theta: 6}", "kinematics.accelerations={theta: 1}")
+    (axes,) = drawn(faster)["paths"].axes
+    assert axes.get_legend().get_texts()[-1].get_text() == "ticks every 15 deg of theta; numbers: theta"
+
+
+@pytest.mark.nightly
+def test_crank_angles_stand_beside_their_places_on_the_coupler_curve():
+    (axes,) = drawn(study_of(FOUR_BAR))["paths"].axes
+    path = sweep_of(study_of(FOUR_BAR)).places["C"]
+    numbers = {text.get_text(): text.xy for text in axes.texts if text.get_text().endswith("\N{DEGREE SIGN}")}
+    assert len(numbers) > 6
+    for angle, (x, y) in numbers.items():
+        assert complex(x, y) == pytest.approx(path[int(angle[:-1]) // 5])
+
+
+def test_a_path_passed_at_a_speed_has_the_time_on_its_axis():
+    study = study_of(FIVE_BAR)
+    with style.context():
+        figure = motion_figure(MotionView(study, mechdesign.kinematics(study)))
+    axes = figure.axes[-1]
+    assert axes.get_xlabel() == "time [s]"
+    # Twelve places of a circle, of which the last is an eleventh of a twelfth from the first.
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), np.arange(12) * 2 * np.pi * 20 / 12 / 50)
+
+
+@pytest.mark.slow
+def test_plates_lie_below_the_paths_of_points_and_arrows_below_names():
+    (axes,) = drawn(study_of(FOUR_BAR))["paths"].axes
+    plates = [patch.get_zorder() for patch in axes.patches if isinstance(patch, Polygon)]
+    paths = [line.get_zorder() for line in axes.lines if len(line.get_xdata()) == 73]
+    assert plates
+    assert max(plates) < min(paths)
+
+
+def test_paths_of_several_points_of_a_link_have_colours_of_their_own():
+    looks = {look.point: look for look in path_looks(sweep_of(study_of(FOUR_BAR, "kinematics.outputs=[A, B, C]")))}
+    assert len({looks[point].color for point in "BC"}) == 2
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["jansen", "toggle_clamp"])
+def test_a_picture_on_paper_is_no_taller_than_a_page(name):
+    study = mechdesign.load(f"configs/gallery/{name}.yaml")
+    with style.context("paper"):
+        found = figures(study, mechdesign.kinematics(study))
+        heights = [figure.get_figheight() for figure in found.values()]
+    assert max(heights) * 0.8 * 25.4 < 231
+
+
+def centrodes_of(study):
+    result = mechdesign.kinematics(study)
+    return centrodes(Sweep.of(result.drawn.shown), result.tables["instant_centres"])
+
+
+@pytest.mark.parametrize("pair", ["[crank, rocker]", "[rod, ground]"])
+def test_centrodes_touch_at_the_instant_centre_and_roll_without_slip(pair):
+    fine = study_of(FOUR_BAR, "kinematics.sweep.theta.step=0.25", f"kinematics.instant_centres=[{pair}]")
+    (found,) = centrodes_of(fine)
+    k = found.pose
+    assert found.on_fixed[k] == pytest.approx(found.centre)
+    assert found.on_moving[k] == pytest.approx(found.centre)
+    # A common tangent, and equal arcs: small chords are as long as they.
+    tangents = [path[k + 1] - path[k - 1] for path in (found.on_fixed, found.on_moving)]
+    assert abs((tangents[0] * np.conj(tangents[1])).imag) < 0.02 * abs(tangents[0] * tangents[1])
+    near = slice(max(k - 60, 0), k + 60)
+    arcs = [np.abs(np.diff(path[near])) for path in (found.on_fixed, found.on_moving)]
+    np.testing.assert_allclose(*arcs, rtol=2e-3)
+
+
+def test_the_centrodes_of_a_bar_on_two_guides_are_cardan_s_circles():
+    (found,) = centrodes_of(mechdesign.load("configs/gallery/trammel.yaml"))
+    np.testing.assert_allclose(np.abs(found.on_fixed), 60, rtol=1e-9)
+    middle = (found.on_moving.max() + found.on_moving.min()) / 2
+    box = found.on_moving
+    assert [np.ptp(box.real), np.ptp(box.imag)] == pytest.approx([60, 60], rel=2e-2)
+    assert abs(middle) < 60
+
+
+def test_a_pin_has_no_centrodes():
+    assert not centrodes_of(study_of(FOUR_BAR, "kinematics.instant_centres=[[crank, rod]]"))
+
+
+RATES = ("kinematics.rates={theta: 60 rpm}", "kinematics.outputs=[A, B, C]")
+ASKED = (*RATES, "kinematics.pictures=[hodographs, polygons]")
+
+
+def test_a_velocity_polygon_ends_at_the_velocities_of_the_table():
+    study = study_of(FOUR_BAR, *ASKED)
+    view = MotionView(study, mechdesign.kinematics(study))
+    motion, shown = view.result.tables["motion"], view.drawn.special.shown
+    for each in shown:
+        if each.row % 1:
+            continue
+        for order, kind in enumerate(("velocity", "acceleration")):
+            tips = {}
+            for points in images(view, each, order).values():
+                tips |= points
+            assert tips["O"] == tips["D"] == 0
+            for point in "ABC":
+                row = int(each.row)
+                parts = [motion[f"{point}.{axis}_{kind}"][row] for axis in "xy"]
+                assert tips[point] == pytest.approx(complex(*parts))
+            # Two points of a link: what one has against the other is across their line, or -omega^2 along it besides.
+            arm = place_of(each, "B") - place_of(each, "A")
+            along = ((tips["B"] - tips["A"]) * np.conj(arm)).real / abs(arm)
+            wanted = (centripetal(each, "A", "B") * np.conj(arm)).real / abs(arm) if order else 0.0
+            assert along == pytest.approx(wanted, abs=1e-9 * max(map(abs, tips.values())))
+
+
+@pytest.mark.nightly
+def test_hodographs_and_polygons_are_drawn_where_they_are_asked_for():
+    assert {"hodographs", "polygons"} <= set(drawn(study_of(FOUR_BAR, *ASKED)))
+    assert not {"hodographs", "polygons"} & set(drawn(study_of(FOUR_BAR, *RATES)))
+    with pytest.raises(mechdesign.StudyError, match="hodographs show velocities: give 'rates'"):
+        study_of(FOUR_BAR, "kinematics.pictures=[hodographs]")
+
+
+def test_the_tip_of_a_hodograph_is_the_velocity():
+    study = study_of(FOUR_BAR, *ASKED)
+    result = mechdesign.kinematics(study)
+    with style.context():
+        axes, _ = hodographs_figure(MotionView(study, result)).axes
+    curve = next(line for line in axes.lines if line.get_label() == "C")
+    np.testing.assert_array_equal(curve.get_xdata(), result.tables["motion"]["C.x_velocity"])
+    np.testing.assert_array_equal(curve.get_ydata(), result.tables["motion"]["C.y_velocity"])
 
 
 @pytest.mark.nightly

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.gallery import FOLDER, result_of, study_named
 from helpers.studies import study_of
+from helpers.tracks import decoded
 
 import mechdesign
 from mechdesign.questions.workspace.analysis import workspace
@@ -15,13 +16,6 @@ from mechdesign.report.page.frames import frames
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS
 from mechdesign.study import load
-
-
-def decoded(steps, count, unit=1):
-    """Values of a list of steps, as the script reads it."""
-    steps = [*steps, *[0] * (count - len(steps))]
-    known = np.array([step is not None for step in steps])
-    return np.where(known, np.cumsum([step or 0 for step in steps]) / unit, np.nan)
 
 
 def places(data, point):

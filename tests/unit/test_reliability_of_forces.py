@@ -180,18 +180,31 @@ def test_a_pose_that_the_drives_do_not_hold_is_not_valid():
 
 def test_designs_of_optimize_have_the_errors_of_each_alone():
     section = """  dimensions: {arm.mass: 0.06, lift: 0.06}
-  limits: {arm_effort: {usl: 2}}
+  limits: {arm_effort: {usl: 1.5}}
 optimize:
-  variables: {lift: {choices: [2, 3]}, arm.mass: {choices: [1, 2]}}
-  minimize: [{result: reliability.moments.sigma, where: {method: analytic}}]
-  subject_to: [{result: reliability.failure, where: {method: analytic}, at_most: 1}]
+  variables: {lift: {choices: [2, 2.2]}, arm.center.x: {choices: [0.29, 0.3]}}
+  minimize: [{result: reliability.moments.sigma, where: {method: analytic}},
+             {result: reliability.failure, where: {method: analytic}}]
 """
     study = arm(section)
     designs = mechdesign.optimize(study).tables["designs"]
-    for lift, mass, sigma, failure in zip(*(designs[name] for name in designs.names[:4]), strict=True):
-        alone = load(text=study.text, overrides={"mechanism.parameters.lift": lift, "mechanism.links.arm.mass": mass})
-        tables = mechdesign.reliability(alone).tables
-        moments = tables["moments"]
-        assert sigma == pytest.approx(moments["sigma"][moments.where(method="analytic")].max(), rel=1e-9)
-        table = tables["reliability"]
-        assert failure == pytest.approx(table["failure"][table.where(method="analytic")].max(), rel=1e-6)
+    assert np.ptp(designs[designs.names[3]]) > 0.1
+    for lift, center, sigma, failure in zip(*(designs[name] for name in designs.names[:4]), strict=True):
+        changes = {"mechanism.parameters.lift": lift, "mechanism.links.arm.center": [center, 0]}
+        tables = mechdesign.reliability(load(text=study.text, overrides=changes)).tables
+        for name, column, value in (("moments", "sigma", sigma), ("reliability", "failure", failure)):
+            table = tables[name]
+            assert value == pytest.approx(table[column][table.where(method="analytic")].max(), rel=1e-6)
+
+
+def test_loads_over_time_are_those_of_each_pose():
+    motion = "motion: {arm: [{from: 20, to: 65, time: 2}]}"
+    text = ARM.replace("SPRINGS", "").replace("moment: 2*lift", "moment: lift*time")
+    text = text[: text.index("reliability:")]
+    asked = "reliability: {dimensions: {lift: 0.06}, outputs: [arm_effort], methods: [analytic]}"
+    study = load(text=text.replace("dynamics:", f"kinematics: {{{motion}}}\ndynamics:") + asked)
+    table = mechdesign.reliability(study).tables["moments"]
+    times = mechdesign.dynamics(study).tables["dynamics"]["time"]
+    assert table["sigma"] == pytest.approx(times * 0.02, abs=1e-9)
+    with pytest.raises(StudyError, match="these are of its own poses"):
+        load(text=text.replace("loads:", f"{motion}, loads:") + asked)

@@ -55,10 +55,7 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
         raise result
     if not passage.long:
         return result
-    long = {
-        name: passage.table(make, jobs, result.tables[name].scope)
-        for name, make in A_ROW_A_POSE.items() if name == "dynamics"
-    }  # fmt: skip
+    long = {name: passage.table(make, jobs, result.tables[name].scope) for name, make in A_ROW_A_POSE.items()}
     return replace(result, tables={**result.tables, **long})
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import DRIVE, GIVEN, VALID
+from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, VALID
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.results import KeyNumber, TableKind
 
 DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies per pose",
-    DRIVE, GIVEN,
+    TIMED, DRIVE, GIVEN,
     ("<drive>_effort", "torque or force of the drive, positive where it drives <drive> up", "force or moment",
      "virtual work of all forces, those of inertia among them"),
     ("<drive>_power", "power that the drive puts in", "power", "effort times velocity"),
@@ -18,7 +18,7 @@ DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies 
     ("potential_energy", "energy of weights, 0 at the origin, and of springs, 0 at their free lengths", "moment",
      "-sum of m g x + sum of k s^2/2 + preload s"), VALID)  # fmt: skip
 JOINT_FORCES = TableKind.of("joint_forces", "what the joints bear, a row a pose and joint",
-    DRIVE, GIVEN, ("joint", "point or joint"),
+    TIMED, DRIVE, GIVEN, ("joint", "point or joint"),
     ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
     ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies"),
     ("fx, fy", "force on the one by the other, axes of the world", "force"),

@@ -130,12 +130,11 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     section, own = study.dynamics, study.kinematics or KinematicsSection()
     assert section is not None
     pace = section if section.moves else own
-    moves = bool(pace.rates or pace.accelerations or pace.speed)
-    rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed")}
+    rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     asked = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         asked, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, moves),
+        borne=ForceQuestion(study, section, pace.rated),
     )  # fmt: skip

@@ -30,8 +30,8 @@ class DynamicsSection(MotionSection):
     def checked(self, checker: Checker) -> Self:
         """Also check the loads."""
         section = self if self.moves else checker.parts.get("kinematics") or self
-        moving = bool(section.rates or section.accelerations or section.speed)
-        check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=False)
+        timed = section.motion is not None
+        check_loads(checker, self.loads, (self.command, "loads"), moving=section.rated, timed=timed)
         return super().checked(checker)
 
     def joints(self, mechanism: Mechanism) -> Joints:
@@ -47,7 +47,7 @@ class DynamicsSection(MotionSection):
     @property
     def moves(self) -> bool:
         """Whether it gives poses or rates of its own; else those of kinematics count."""
-        return self.source is not None or bool(self.rates or self.accelerations or self.speed)
+        return self.source is not None or self.rated
 
 
 def column_kinds(mechanism: Mechanism, joints: Joints, *, moving: bool) -> dict[str, str]:

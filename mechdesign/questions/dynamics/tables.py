@@ -65,7 +65,7 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
     """
     question, poses = motion.question, motion.question.poses
     statics, swept = [static for static in asked_of(motion).statics if static.name in names], poses.swept
-    at = (poses.values[swept] if swept is not None else poses.numbers).reshape(poses.designs, -1)
+    at = poses.abscissa.reshape(poses.designs, -1)
     valid = motion.valid.reshape(poses.designs, -1)
     numbers = np.full((len(statics), poses.designs, 8), np.nan)
     for k, static in enumerate(statics):

@@ -85,7 +85,7 @@ class Motion:
         regular = conditioning >= STALLED
         section = self.question.section
         moving = Moving()
-        if section.rates or section.accelerations or section.speed:
+        if section.rated:
             moving = self._rates(linear, solved, regular)
         if section.instant_centres:
             # Of one drive alone every speed gives the same centres.
@@ -113,10 +113,7 @@ class Motion:
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration
-        coordinates = {
-            o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]
-        }
-        for output in coordinates.values():
+        for output in self.question.rated.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
@@ -156,7 +153,7 @@ class Motion:
         shown = {output.name: output for output in question.outputs}
         drives = {drive.name: drive for drive in question.drives}
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
-        for name, output in ((drives if question.of_given else {}) | shown).items():
+        for name, output in question.rated.items():
             if name not in drives:
                 columns.append(MOTION["<output>"].column(arrays[name], label(output.quantity), output=name))
             for order in ("velocity", "acceleration"):
@@ -177,12 +174,14 @@ class Motion:
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
         question, units = self.question, self.question.study.units
-        columns = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
-        named = {column.name for column in columns}
-        for column in pose_columns(question.study, question.poses):
-            if column.name not in named:
-                columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
-        return columns
+        given = [
+            replace(column, values=self.arrays.get(column.name, column.values))
+            for column in pose_columns(question.study, question.poses)
+        ]
+        drives = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
+        named = {column.name for column in drives}
+        timed = given[:1] if question.poses.times is not None else []
+        return [*timed, *drives, *(column for column in given[len(timed) :] if column.name not in named)]
 
     def _error(self, error: Error) -> Column:
         study = self.question.study
@@ -292,7 +291,14 @@ def _through_change_points(motion: Motion) -> None:
     scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
     steps = in_study_units(study, coordinate, scale * STENCIL)
     values = (group.values[name][rows][:, None] + steps).ravel()
-    beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
+    slopes, bends = (
+        {given: np.repeat(column[rows], len(STENCIL)) for given, column in part.items()}
+        for part in (question.poses.slopes, question.poses.bends)
+    )
+    beside = Poses(
+        (PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),), slopes=slopes,
+        bends=bends,
+    )  # fmt: skip
     around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
     each = np.repeat(rows, len(STENCIL))
     for solved in solve_poses(study, beside):

@@ -127,13 +127,17 @@ class MotionQuestion:
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
 
     @property
+    def rated(self) -> dict[str, Coordinate]:
+        """What has velocities and accelerations, where rates are asked: outputs, and drives whose rates change."""
+        drives = self.drives if self.of_given or self.section.motion is not None else []
+        return {output.name: output for output in [*drives, *self.outputs]}
+
+    @property
     def orders(self) -> dict[str, tuple[Quantity, int]]:
         """Columns of velocities and accelerations, where the study gives rates: of what quantity, and which order."""
-        asked = self.section.rates or self.section.accelerations or self.section.speed
-        moving = {output.name: output for output in [*(self.drives if self.of_given else []), *self.outputs]}
         return {
             f"{output.name}_{word}": (output.quantity, order)
-            for output in (moving.values() if asked else ())
+            for output in (self.rated.values() if self.section.rated else ())
             for order, word in ((1, "velocity"), (2, "acceleration"))
         }
 
@@ -156,6 +160,12 @@ class MotionQuestion:
             tempos += [
                 abs(rate * units.get(mechanism.quantity(name), 1.0)) ** (1 / order) for name, rate in rates.items()
             ]
+        timed = ((self.poses.slopes, 1), (self.poses.bends, 2)) if section.motion is not None else ()
+        for columns, order in timed:
+            tempos += [
+                float(np.abs(column).max() * units.get(mechanism.quantity(name), 1.0)) ** (1 / order)
+                for name, column in columns.items()
+            ]
         return max(tempos)
 
     @cached_property
@@ -176,7 +186,7 @@ class MotionQuestion:
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
         borne = self.borne if self.borne is not None and any(s.name in names for s in self.borne.statics) else None
         if not rates and borne is None and not coordinates_in(self.study, section.loads):
-            unasked |= {"rates": {}, "accelerations": {}, "speed": None}
+            unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}
         if not any(static.name in names for static in self.statics):
             unasked |= {"loads": (), "mechanical_advantage": {}}
         square = self.square and any(name in ("det_J", "inverse_condition") or "_by_" in name for name in names)

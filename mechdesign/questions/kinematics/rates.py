@@ -46,7 +46,7 @@ def drive_rates(
     """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
 
     At a speed v along the path of a point, of length s, a coordinate c that the path gives has the velocity c'(s) v
-    and the acceleration c''(s) v^2.
+    and the acceleration c''(s) v^2. In a motion over time its derivatives by time are known.
 
     `linear` is the mechanism at the solved poses.
     """
@@ -54,12 +54,13 @@ def drive_rates(
     inverse = of_given(study, section)
     names = solved.given if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]
-    if section.speed is None:
+    if section.speed is None and section.motion is None:
         rates = constant_rates(study, section, names)
     else:
+        pace = 1.0 if section.speed is None else section.speed
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
-            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * section.speed**order) for c in coordinates]
+            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
             for order, known in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
     return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates

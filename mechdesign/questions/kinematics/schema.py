@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field
 
@@ -16,6 +16,12 @@ from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 
 HELP_PAGE = "reference/study/kinematics"
+
+# Drawn where they are asked for.
+PICTURES = {
+    "hodographs": "velocities and accelerations of points over the motion, as the ways of their vectors' tips",
+    "polygons": "velocity and acceleration polygons of a few poses, or of the listed ones",
+}
 
 
 class KinematicsSection(MotionSection):
@@ -39,6 +45,8 @@ class KinematicsSection(MotionSection):
     """Pairs of links whose instant centre of velocity is found in every pose; of a telescopic leg the body at its begin
     counts. With more than one drive it depends on their rates. Example: [[rod, ground], [crank, rocker]]
     """
+    pictures: tuple[Annotated[str, fields.choice(PICTURES, "picture")], ...] = ()
+    """Pictures beside those that are always drawn; both need rates. Example: [hodographs, polygons]"""
     mechanical_advantage: dict[fields.CoordinateName, fields.CoordinateName] = Field(default_factory=dict)
     """Outputs, each with its input: the force (of an angle the moment) that the output gives over that put in, without
     friction; other drives are held. Example: {T.y: grip}
@@ -48,14 +56,17 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
+        if self.pictures and not self.rates and self.speed is None and self.motion is None:
+            shown = " and ".join(self.pictures)
+            message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
+            checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
         rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
             what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
             checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
-        moving = bool(self.rates or self.accelerations or self.speed)
-        check_loads(checker, self.loads, ("kinematics", "loads"), moving=moving, timed=False)
+        check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 
     def _check_centres(self, checker: Checker) -> None:
@@ -70,8 +81,12 @@ class KinematicsSection(MotionSection):
                 checker.report(path, f"{' and '.join(pair)} are listed twice")
             seen.add(frozenset(pair))
         drives = len(checker.mechanism.drives)
-        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
-            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+        moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
+        if self.instant_centres and drives > 1 and not moved:
+            message = (
+                f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed', or a "
+                "'motion'"
+            )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
 
     def _check_advantage(self, checker: Checker) -> None:

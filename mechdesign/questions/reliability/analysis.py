@@ -201,7 +201,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mechanism, pair = task.study.mechanism, task.question.pair
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
-    followed, forces = _followed(task), force_model(task.study)
+    followed, forces = _followed(task), force_model(task.study, task.poses)
     settings = []
     for solved, rates in groups:
         by_drives = set(solved.given) == set(mechanism.drives)
@@ -218,7 +218,8 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]), forces, scale, row == followed,
+                    None if task.elastic is None else task.elastic.take([row]),
+                    None if forces is None else forces.take([row]), scale, row == followed,
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)

@@ -81,23 +81,23 @@ def followed(study: Study) -> set[str]:
 class ForceModel:
     """The forces of a mechanism in motion, of designs or made mechanisms with `parameters` of their own.
 
-    Those that are `changed` themselves follow nothing.
+    Those that are `changed` themselves follow nothing. `times` are those of poses over time.
     """
 
     question: ForceQuestion
     parameters: Mapping[str, Floats] = field(default_factory=dict)
     changed: frozenset[str] = frozenset()
+    times: Floats | None = None
 
     @property
     def coordinates(self) -> list[Coordinate]:
         """Coordinates that the loads follow."""
         return coordinates_in(self.question.study, self.question.section.loads)
 
-    def take(self, rows: Sequence[int] | Ints | int) -> ForceModel:
+    def take(self, rows: Sequence[int] | Ints) -> ForceModel:
         """The model at some of many poses."""
-        return replace(
-            self, parameters={name: np.asarray(at_rows(value, rows)) for name, value in self.parameters.items()}
-        )
+        parameters = {name: np.asarray(at_rows(value, rows)) for name, value in self.parameters.items()}
+        return replace(self, parameters=parameters, times=None if self.times is None else self.times[rows])
 
     def made(self, deviations: Mapping[str, Number]) -> ForceModel:
         """The model of made mechanisms, from deviations of parameters by their `FOLLOWED` names."""
@@ -119,7 +119,7 @@ class ForceModel:
             velocity = linear.velocity(rates.velocities)
             moving = Moving(velocity, linear.acceleration(velocity, rates.accelerations))
         nominal = self.question.study.parameters.nominal
-        poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal)
+        poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
         found = self.question.values(names, poses, linear, slice(None), moving)
         return [np.where(held, value, np.nan) for value in found]
@@ -163,8 +163,10 @@ def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
     """The model of a study, or of designs at their poses; None where no force is asked."""
     if study.dynamics is None or not kinds_of_forces(study):
         return None
-    question = ForceQuestion(study, study.dynamics, pace(study).paced)
-    return ForceModel(question) if poses is None else ForceModel(question, poses.parameters, poses.changed)
+    question = ForceQuestion(study, study.dynamics, pace(study).rated)
+    if poses is None:
+        return ForceModel(question)
+    return ForceModel(question, poses.parameters, poses.changed, poses.times)
 
 
 def _one_of(names: Sequence[str], name: str) -> Floats:

@@ -242,7 +242,7 @@ def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     listed = [output.name for output in outputs]
     also = dict.fromkeys(name for name in limited if name not in listed and name not in kinds)
     outputs += expand_outputs(study, tuple(also))
-    orders = 3 if section.paced else 1
+    orders = 3 if section.rated else 1
     forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
     channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
     channels += [ForceChannel(name, kinds[name]) for name in forces]

@@ -113,6 +113,18 @@ def inscribed(field: Field, scan: tuple[float, float], patches: Sequence[Patch],
     return np.array([*circle, 0.5 * (left + right), 0.5 * (low + high), right - left, high - low])
 
 
+def crossed(shapes: Floats, z: Complexes) -> list[str]:
+    """Which of the shapes, as `INSCRIBED` names them, have one of some places inside: ``circle``, ``rectangle``."""
+    x, y, radius, middle_x, middle_y, width, height = shapes
+    inside = 1 - POINT
+    within = {
+        "circle": np.abs(z - complex(x, y)) < inside * radius,
+        "rectangle": (np.abs(z.real - middle_x) < inside * width / 2)
+        & (np.abs(z.imag - middle_y) < inside * height / 2),
+    }
+    return [name for name, places in within.items() if places.any()]
+
+
 def _sector(about: complex, scan: tuple[float, float]) -> Callable[[Complexes], Floats]:
     """Margins of a scan of less than a turn: distances from its sides (beyond half a turn one is enough)."""
     start, stop = (np.exp(1j * angle) for angle in scan)

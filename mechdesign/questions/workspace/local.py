@@ -29,7 +29,12 @@ class Local(Jacobian):
             jacobian = Jacobian.of(
                 seen.mechanism.linearize(configuration), seen.outputs, places.get(LENGTH, seen.length)
             )
-            return Local(jacobian.entries, jacobian.homogeneous, jacobian.shape, configuration)
+            # Of a table on two slides they are the same everywhere.
+            entries, homogeneous = (
+                [[np.broadcast_to(entry, jacobian.shape) for entry in row] for row in rows]
+                for rows in (jacobian.entries, jacobian.homogeneous)
+            )
+            return Local(entries, homogeneous, jacobian.shape, configuration)
 
     @staticmethod
     def on_rays(designs: Designs, design: Ints, theta: Floats, radius: Floats) -> Local:

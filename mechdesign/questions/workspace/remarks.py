@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
+from mechdesign.questions.workspace.inscribed import crossed
 from mechdesign.questions.workspace.quadrature import FINEST_AREA
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.ranged import Ranged
@@ -17,6 +19,7 @@ from mechdesign.study import Study
 
 # An area is doubtful whose error is a larger part of it.
 AREA_SURE = 1e-3
+_SINGULARITIES = {"forward": "parallel", "inverse": "serial"}
 ROOTLESS = "no pose of the mechanism reaches the held values from the sketch; redraw the sketch at those values"
 
 
@@ -40,6 +43,25 @@ def remarks(study: Study, region: Reached, row: int) -> Iterator[Caution]:
             "jumps (an angle's turn ends there) no slope leads along the boundary",
             "indices",
         )
+    if region.patches and not ranged:
+        yield from _crossed(region, row)
+
+
+def _crossed(region: Reached, row: int) -> Iterator[Caution]:
+    """A warning where singularities cross the largest shapes inside, which no motion can then use as a whole."""
+    crossing: dict[str, list[str]] = {}
+    for locus in region.loci:
+        for name in crossed(region.shapes, locus.points):
+            crossing.setdefault(name, []).append(f"{_SINGULARITIES[locus.kind]} singularity ({locus.cause})")
+    if crossing:
+        shapes, causes = " and ".join(crossing), ", ".join(dict.fromkeys(chain.from_iterable(crossing.values())))
+        yield Caution(
+            "singular",
+            f"the largest {shapes} inside the region{region.question.where} "
+            f"{'is' if len(crossing) == 1 else 'are'} crossed by a {causes}: only motion that passes it uses the "
+            "whole; 'assembly: same' gives the largest without a parallel singularity",
+            "indices", row,
+        )  # fmt: skip
 
 
 def rough(name: str, regions: Sequence[Reached]) -> Iterator[Caution]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.report.figures import shapes
-from mechdesign.report.figures.labels import covered, place_labels, rows
+from mechdesign.report.figures.labels import Label, covered, place_labels, rows
 from mechdesign.report.figures.scene import pose
 from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
 
@@ -32,6 +32,7 @@ def draw_mechanism(
     drives: bool = True,
     travel: Travel | None = None,
     size: float = 1.0,
+    more: Sequence[Label] = (),
 ) -> None:
     """Draw a mechanism in one pose of a batch; a pose that cannot be assembled draws nothing.
 
@@ -48,6 +49,8 @@ def draw_mechanism(
         Range of each slide (lengths from the line's origin), which its guide should cover.
     size : float
         Of the symbols; 1 for a drawing as wide as the page.
+    more : sequence of Label
+        What else is written, where the mechanism's own names leave room.
     """
     scene = pose(mechanism, configuration, index)
     if scene is None:
@@ -62,7 +65,7 @@ def draw_mechanism(
     if labels:
         # The most important first.
         named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene)]
-        named += shapes.link_labels(scene, colors)
+        named += [*more, *shapes.link_labels(scene, colors)]
         place_labels(axes, named, covered(axes), order=5.0)
 
 
@@ -105,8 +108,11 @@ def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Li
         shift = line.rail * size / 72
         artist.set_transform(axes.transData + ScaledTranslation(shift.real, shift.imag, figure.dpi_scale_trans))
         spacing = shapes.TICK_SPACING
-        ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
-        artist.set_path_effects([ticks, Normal()])
+        ends = axes.transData.transform(rows(np.array(line.places)))
+        # A rail without room for a tick has none.
+        if 72 / figure.dpi * np.hypot(*np.ptp(ends, axis=0)) > 2 * spacing:
+            ticks = TickedStroke(angle=shapes.TICK_ANGLE, spacing=spacing, length=shapes.TICK / spacing)
+            artist.set_path_effects([ticks, Normal()])
     return artist
 
 

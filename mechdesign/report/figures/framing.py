@@ -22,6 +22,7 @@ LEFT = 0.78
 BELOW = 0.55
 ABOVE = 0.12
 RIGHT = 0.15
+PLANE = "plane"  # label of axes whose places a page marks as the mechanism moves
 
 
 class Window(NamedTuple):
@@ -59,20 +60,22 @@ def windows(
     above: float = ABOVE,
     top: float = 0.0,
     below: float = BELOW,
+    stretch: float = 1.0,
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `count` windows in rows; inches between columns, above each window, above all and below all of them.
 
-    Where the gap between columns has room for it each has an axis label of its own, or else the first one.
+    Where the gap between columns has room for it each has an axis label of its own, or else the first one. Lengths
+    along y are drawn `stretch` times as large as those along x, which the window's scale is of.
     """
     rest = style.width() - LEFT - columns * window.width - (columns - 1) * gap
     figure, panels = style.page(
         count, columns, window.height, left=LEFT, right=rest, top=top + above, bottom=below, across=gap, down=above
     )
-    half_width, half_height = window.width / 2 / window.scale, window.height / 2 / window.scale
+    half_width, half_height = window.width / 2 / window.scale, window.height / 2 / window.scale / stretch
     for k, axes in enumerate(panels):
         axes.set_xlim(window.middle.real - half_width, window.middle.real + half_width)
         axes.set_ylim(window.middle.imag - half_height, window.middle.imag + half_height)
-        axes.set_aspect("equal")
+        axes.set_aspect(stretch)
         lowest, first = k + columns >= count, k % columns == 0 or gap >= LEFT
         axes.tick_params(labelleft=first, labelbottom=lowest)
         axes.set_xlabel(style.axis_label("x", unit) if lowest else "")

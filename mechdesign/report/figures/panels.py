@@ -17,7 +17,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, Sector, Sectors
+from mechdesign.study.poses import TIME, Poses, Sector, Sectors, with_length
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
@@ -31,7 +31,6 @@ _EDGE = 0.05  # left of the label of an axis
 _LINE = 0.18  # a line of it
 _TICK = 0.1  # a tick and its gap
 _DIGIT = 0.083  # a digit of its number
-_POWER_LETTERS = 5  # of a power of ten
 BELOW_BARE = 0.6  # below the lowest panel: its axis alone
 BELOW_WITH_LEGEND = 0.95  # and with a legend of one or two rows
 # Inches of a map and its bar of colours.
@@ -47,9 +46,14 @@ _NARROW = 10.0  # ratio of values up to which levels are at even steps
 _LETTER = 0.56  # mean width of a letter in font sizes
 _LEGEND_LETTERS = 14.75  # an inch
 _LEGEND_ROW = 0.19  # inches
+_LEGEND_ROOM = 4 * _LEGEND_ROW  # by which a narrow page may grow for its title and its legend
 _ABSCISSA_TICK = 0.47  # inches from one to the next
 # Steps of ticks that are parts of a turn in degrees.
 TURNS = (1, 1.5, 3, 4.5, 6, 9, 10)
+
+
+# Axes with a label that begins so are over a sweep or a path, whose label follows.
+OVER = "over "
 
 
 class Along(NamedTuple):
@@ -65,12 +69,23 @@ def along(study: Study, poses: Poses) -> Along | None:
     return None if poses.listed or len(poses.grid) != 1 or poses.count < 3 else abscissa(study, poses)
 
 
-def abscissa(study: Study, poses: Poses) -> Along:
-    """The one coordinate that moves, always the same way, or else the number of the pose."""
+def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
+    """Time, of a motion over time or at a given speed; the coordinate that moves, always the same way; or the pose."""
+    label = style.axis_label(TIME, study.units.label("time"))
+    if poses.times is not None:
+        return Along(poses.times, label, TIME)
+    if speed is not None:
+        return Along(times(poses, poses.numbers.astype(float), speed), label)
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(poses.numbers + 1, "pose along the path")
     return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0])
+
+
+def times(poses: Poses, rows: Floats, speed: float) -> Floats:
+    """When a point that passes its path at a speed is at places of it, in rows; in the study's units."""
+    ((_, path),) = with_length(poses.paths)
+    return path.way(np.zeros(len(rows), dtype=np.intp), rows) / speed
 
 
 def moving_names(poses: Poses) -> list[str]:
@@ -103,6 +118,7 @@ def stack(
 ) -> tuple[Figure, list[Axes]]:
     """Panels one below the other over one labelled axis, with this much room (inches) below for a legend."""
     top = _TOP + 0.1 * bool(note)
+    tall = min(tall, (style.tallest() - top - bottom - _LEGEND_ROOM + _GAP) / panels - _GAP)
     figure, axes = style.page(panels, 1, tall, left=_LEFT, right=_RIGHT, top=top, bottom=bottom, down=_GAP, sharex=True)
     title(figure, heading, note)
     for axis in axes:
@@ -122,7 +138,7 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
     numbers = [
         text for axis in axes for text in axis.yaxis.get_major_formatter().format_ticks(axis.get_yticks().tolist())
     ]
-    letters = max(len(text) if "$" not in text else _POWER_LETTERS for text in numbers)
+    letters = max(map(len, numbers))
     lines = 1 + max(axis.get_ylabel().count("\n") for axis in axes)
     left = max(figure.subplotpars.left * style.width(), _EDGE + _LINE * lines + _TICK + _DIGIT * letters)
     figure.subplots_adjust(left=left / style.width())
@@ -133,7 +149,12 @@ def clear_of_ticks(figure: Figure, axes: Sequence[Axes]) -> None:
 
 
 def tick_abscissa(axis: Axes, swept: Along) -> None:
-    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees."""
+    """Places for the ticks of a sweep: over much of a turn its parts, such as 30 or 45 degrees.
+
+    The axes that share them are marked as panels over what is swept; a page moves a cursor through them.
+    """
+    for panel in axis.get_shared_x_axes().get_siblings(axis):
+        panel.set_label(f"{OVER}{swept.label}")
     turning = swept.label.endswith("[deg]") and np.ptp(swept.values) > 150
     inches = axis.get_position().width * style.width()
     axis.xaxis.set_major_locator(
@@ -243,7 +264,7 @@ def map_sheet(
     lines = -(-len(panels) // columns)
     wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
     tall = min(_MAX_MAP_HEIGHT / min(lines, 2), wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
-    tall = max(tall, 1.2)
+    tall = max(min(tall, (style.tallest() - _MAP_TOP - _MAP_BELOW) / lines - _MAP_BELOW - _MAP_GAP), 1.2)
     # Of equal scales the height decides: the bar stands beside the map.
     slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0
     wide -= slack
@@ -297,9 +318,12 @@ def _map(
         values = np.log10(np.maximum(values, 1e-3 * 10.0 ** levels[0]))
     known = values[np.isfinite(values)]
     norm = style.steps(levels, float(known.min()), float(known.max()))
-    for patch in sectors.patches:
-        shown = _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays])
-        style.filled(axes, patch.nodes.real, patch.nodes.imag, shown, norm, levels)
+    shown = [
+        (patch.nodes.real, patch.nodes.imag,
+         _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays]))
+        for patch in sectors.patches
+    ]  # fmt: skip
+    style.filled(axes, shown, norm, levels)
     for curve in sectors.outline:
         axes.plot(curve.real, curve.imag, color=style.INK, linewidth=1.2)
     style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), cax=bar, ticks=levels)
@@ -364,5 +388,5 @@ def _power(level: float) -> str:
     if 1e-2 <= level < 1e4:
         return f"{level:g}"
     power = int(np.floor(np.log10(level) + 1e-9))
-    digits, ten = f"{level / 10.0**power:.3g}", f"10$^{{{power}}}$"
+    digits, ten = f"{level / 10.0**power:.3g}", f"10{style.raised(power)}"
     return ten if digits == "1" else f"{digits}\N{MIDDLE DOT}{ten}"

@@ -219,7 +219,7 @@ class Sweep(Shown):
         poses, ends = self.poses, self.rows[np.arange(len(self.rows) + self.poses.closed) % len(self.rows)]
         values = poses.values[name][ends]
         begin = end = steps = np.diff(values)
-        if np.any(poses.bends.get(name, 0.0)):
+        if poses.times is None and np.any(poses.bends.get(name, 0.0)):
             bent = [poses.values[each][ends] for each, bends in poses.bends.items() if np.any(bends)]
             slopes, length = poses.slopes[name][ends], np.linalg.norm(np.diff(bent), axis=0)
             begin, end = slopes[:-1] * length, slopes[1:] * length

@@ -19,6 +19,7 @@ from mechdesign.report.figures.scene import Guide, Scene, hull
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
+PLATES = -0.8  # layer of plates, the lowest
 PIN = 3.6  # radius of a joint
 GROUND_HEIGHT = 13.0
 SLIDER_SIZE = (22.0, 13.0)  # along its guide and across
@@ -128,8 +129,8 @@ def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) ->
         shapes += _guide(scene, guide, colors, guide.ends(travel, scene.span))
     for rank, (name, body) in enumerate(bodies(scene)):
         if len(body) > 2:
-            # A smaller plate lies on a larger one, all of them below the bars.
-            layer = 0.1 * (1 - 0.5**rank)
+            # A smaller plate lies on a larger one, all of them below paths and bars.
+            layer = PLATES + 0.1 * (1 - 0.5**rank)
             shapes += [Line(body, shade, width, layer, name, filled=True)
                        for shade, width in ((colors[name], BAR), (lighter(colors[name]), BAR - 2.4))]  # fmt: skip
         elif len(body) == 2:
@@ -169,7 +170,7 @@ def _guide(scene: Scene, guide: Guide, colors: Mapping[str, str], ends: tuple[co
     """A rail of the ground, or a bar with a slot, and the slider on it."""
     shapes: list[Shape] = []
     if guide.owner == GROUND:
-        shapes += _rail(*ends)
+        shapes += _rail(*ends) if ends[0] != ends[1] else []
     else:
         shapes += _bar(reach(scene, guide, ends), colors[guide.owner], guide.owner)
         if guide.slider is None:

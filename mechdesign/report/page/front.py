@@ -76,10 +76,10 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     beside = inline(figure, name, described(figure))
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
     pace = f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
-    data = {"poses": len(rows), "first": knee, "choices": choices, "given": given, "numbers": numbers.tracks,
-            "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
+    data = {"poses": len(rows), "first": knee, "choices": choices, "given": given, "keys": [given],
+            "numbers": numbers.tracks, "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
     drawing = _drawing(sheet, sweeps[int(rows[knee])])
-    return Moving(drawing, beside, data, choices[knee]["title"], ["value"], entries, {})
+    return Moving(drawing, beside, data, choices[knee]["title"], ["value"], entries, {}, ["pareto"])
 
 
 def _fitting(sheet: Sheet, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:

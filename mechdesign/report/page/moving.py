@@ -25,10 +25,11 @@ from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
+from mechdesign.report.page.axes import box
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import CURVES, PLACES, TIMES, Cell, Moving, Numbers, deltas, meanings, places
+from mechdesign.report.page.tracks import PLACES, TIMES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
@@ -57,7 +58,7 @@ def moving(
     Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
     `marked` are places of the motion, in rows of its table, that are among the poses drawn.
     """
-    name = f"{result.command}-curves"
+    command = result.command
     if isinstance(result.drawn, DrawnDesigns):
         best = result.drawn.best
         judged = best.region or best.motion
@@ -66,8 +67,8 @@ def moving(
         study, result = best.study, judged
     with style.context():
         if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
-            return _motion(study, result, result.drawn, name, before, marked)
-        return roaming(study, result) if "local" in result.tables else None
+            return _motion(study, result, result.drawn, f"{command}-curves", before, marked)
+        return roaming(study, result, command) if "local" in result.tables else None
 
 
 def _motion(
@@ -90,17 +91,28 @@ def _motion(
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
-    for given in [table.column(name) for name in sweep.poses.values if name in table]:
+    for given in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(given).unit
-        which, _, power = numbers.scaled[given.name]
-        data["given"].append([given.name, unit, which, power])
+        data["given"].append([given.name, unit, numbers.scaled[given.name][0]])
+    # What names a pose: the coordinates that are given, or the drives.
+    keys = dict.fromkeys(
+        tuple(name for name in names if name in table) for names in (sweep.poses.values, study.mechanism.drives)
+    )
+    data["keys"] = [[[name, *numbers.scaled[name][::2]] for name in key] for key in keys if key]
+    speed = study.kinematics.speed if study.kinematics is not None else None
+    over, looks = abscissa(study, sweep.poses, speed), path_looks(whole)
+    own = table.column(over.name) if over.name in table else Column(over.label, over.values, "")
+    which = numbers.add(own)
+    data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
+    data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
     figure, beside = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before), ""
     if figure is not None:
         beside = inline(figure, name, described(figure))
-        data["curves"] = _curves(study, sweep, figure, table, numbers)
+        data["dots"] = _dots(figure, table, numbers)
     data["numbers"] = numbers.tracks
     drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
-    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table))
+    replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
+    return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
 def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
@@ -145,9 +157,10 @@ def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, li
 
 
 def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
-    """Time of each pose, from the rates of the study if these follow the motion; else evenly spaced."""
+    """Time of each pose, of a motion over time or from the rates of the study if these follow it; else even."""
     section, unit = study.kinematics, study.units.label("time")
-    steps, own = _steps(sweep, table, section.rates if section else {}), None
+    timed = None if sweep.poses.times is None else sweep.poses.times[sweep.rows]
+    steps, own = _steps(sweep, table, section.rates if section else {}) if timed is None else np.diff(timed), None
     times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
     if sweep.poses.closed:
         times = np.append(times, times[-1] + np.diff(times).mean())
@@ -155,7 +168,8 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
     if steps is not None:
         own = float(times[-1])
         seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
-        note = ", as at the study's rates" if seconds == own else f"; at the study's rates {own:.3g} {unit}".rstrip()
+        what = "at the study's rates" if timed is None else "in the study's motion"
+        note = f", as {what}" if seconds == own else f"; {what} {own:.3g} {unit}".rstrip()
     pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
     return {"times": deltas(times / times[-1], TIMES), "seconds": round(seconds, 3), "pace": pace,
             "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
@@ -194,7 +208,7 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
 def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     """Velocities of the moving points as arrows of the drawing, and the length of a round one; empty without rates."""
     section, configuration = study.kinematics, sweep.configuration
-    if section is None or not (section.rates or section.speed):
+    if section is None or not section.rated:
         return {}
     linear = sweep.mechanism.linearize(configuration)
     solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
@@ -217,16 +231,11 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
 
 
-def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: Numbers) -> dict[str, Any]:
-    """Where the pose is in each panel of the curves: places of the cursor, and of a dot on each curve."""
-    wide, tall = (72 * inches for inches in figure.get_size_inches())
-    over = abscissa(study, sweep.poses).values[sweep.rows]
-    boxes = [axes.get_position() for axes in figure.axes]
-    low, high = figure.axes[0].get_xlim()
-    x = wide * (boxes[0].x0 + boxes[0].width * (over - low) / (high - low))
-    dots = []
-    for axes, box in zip(figure.axes, boxes, strict=True):
-        bottom, top = axes.get_ylim()
+def _dots(figure: Figure, table: Table, numbers: Numbers) -> list[list[Any]]:
+    """Dots on the curves at the pose: panel, number, slope and place at 0 of its height, colour."""
+    dots: list[list[Any]] = []
+    for panel, axes in enumerate(figure.axes):
+        (_, _, upper, lower), (bottom, top) = box(axes), axes.get_ylim()
         for line in axes.get_lines():
             drawn = np.asarray(line.get_ydata(), dtype=float)
             column = next((each for each in table.columns if each.values.dtype.kind == "f"
@@ -234,9 +243,7 @@ def _curves(study: Study, sweep: Sweep, figure: Figure, table: Table, numbers: N
             if column is None or axes.get_yscale() != "linear":
                 continue
             which = numbers.add(column)
-            slope = -tall * box.height / (top - bottom) * 10.0 ** numbers.scaled[column.name][2]
-            start = tall * (1 - box.y0) + tall * box.height * bottom / (top - bottom)
-            dots.append([which, slope, round(start, 2), round(tall * (1 - box.y1), 1), round(tall * (1 - box.y0), 1),
-                         to_hex(line.get_color())])  # fmt: skip
-    ends = [round(tall * (1 - max(box.y1 for box in boxes)), 1), round(tall * (1 - min(box.y0 for box in boxes)), 1)]
-    return {"x": deltas(x, CURVES), "ends": ends, "dots": dots}
+            slope = (upper - lower) / (top - bottom)
+            scaled = slope * 10.0 ** numbers.scaled[column.name][2]
+            dots.append([panel, which, scaled, round(lower - slope * bottom, 2), to_hex(line.get_color())])
+    return dots

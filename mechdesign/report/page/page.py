@@ -5,7 +5,10 @@ from __future__ import annotations
 import base64
 import hashlib
 import io
+import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -30,6 +33,7 @@ from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.scene import pose
 from mechdesign.report.manifest import computed_from
 from mechdesign.report.page import vector
+from mechdesign.report.page.dark import dark
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR, harmless
 from mechdesign.report.requirements import Verdict, judged_by, named
@@ -40,6 +44,10 @@ from mechdesign.terms import path_of
 # Pixels of the drawings in an index, twice their width on the page, and the number of their colours.
 _THUMBNAIL = (240, 180)
 _FEW_COLORS = 32
+_INDENT = re.compile(r"^[ ]*(?://.*\n)?", re.MULTILINE)  # and a line of comment
+_FIRST_NUMBERS = 5  # at the top of a page
+
+_Number = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -94,19 +102,34 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
-    parts = ["moving"] * any(section["moving"] is not None for section in sections)
+    moving = {section["command"]: section["moving"] for section in sections if section["moving"] is not None}
+    # The mechanism beside the answers moves through a motion, if there is one.
+    lead = next((name for name, part in moving.items() if "given" in part["data"]), next(iter(moving), ""))
+    parts = ["moving"] * bool(moving)
     parts += ["sorted"] * any(table["sorted"] for section in sections for table in section["tables"])
     drawing = next((section["mechanism"] for section in sections if section["mechanism"]), "")
     required = _requirements(study, answers)
+    drawing = drawing or (_sketch(study) if plots else "")
+    drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
+    # Each design of a front has a drawing.
+    drawings += [each.get("drawing", "") for part in moving.values() for each in part["data"].get("choices", ())]
+    drawings += [picture["html"] for section in sections for picture in section["pictures"]]
+    first, more = _divided({section["command"]: section["headlines"] for section in sections})
     return _page(
         "report.html.j2",
+        moving=moving,
+        drawings=drawings,
+        lead=lead,
+        first=first,
+        more=more,
         parts=parts,
         study=study,
         about=_about(study),
-        drawing=drawing or (_sketch(study) if plots else ""),
+        drawing=drawing,
         plots=plots,
         answers=answers,
-        mover=partial(_mover, sections),
+        mover=partial(_mover, moving),
+        pose_of=_pose_of,
         questions=QUESTIONS,
         required=required,
         met=sum(each["met"] for each in required),
@@ -116,14 +139,35 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     )
 
 
-def _mover(sections: Iterable[Mapping[str, Any]], command: str, pose: Mapping[str, float]) -> str:
-    """The question whose mechanism moves through poses like one: its own, or kinematics; empty where there is none."""
-    given = {
-        section["command"]: {name for name, *_ in section["moving"]["data"].get("given", ())}
-        for section in sections
-        if section["moving"] is not None
-    }
-    return next((name for name in (command, "kinematics") if given.get(name) and given[name] <= pose.keys()), "")
+def _mover(moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None) -> str:
+    """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one."""
+    for name in dict.fromkeys((command, "kinematics")):
+        keys = moving[name]["data"].get("keys", ()) if name in moving else ()
+        if any(pose is None or {each for each, *_ in key} <= pose.keys() for key in keys):
+            return name
+    return ""
+
+
+def _pose_of(verdict: Verdict) -> dict[str, float]:
+    """The numbers that the place of a verdict names, such as a pose."""
+    numbers = {}
+    for part in verdict.place.split(", "):
+        name, _, value = part.rpartition(" ")
+        with suppress(ValueError):
+            numbers[name] = float(value)
+    return numbers
+
+
+def _divided(numbers: Mapping[str, Sequence[_Number]]) -> tuple[list[tuple[str, _Number]], dict[str, list[_Number]]]:
+    """The key numbers at the top of the page, each with its question, and those that remain to each question.
+
+    The questions take turns, and each gives its numbers in their order.
+    """
+    turns = [(k, place, command) for place, (command, own) in enumerate(numbers.items()) for k in range(len(own))]
+    top = sorted(turns)[:_FIRST_NUMBERS]
+    first = [(command, numbers[command][k]) for k, _, command in sorted(top, key=itemgetter(1, 0))]
+    taken = Counter(command for *_, command in top)
+    return first, {command: [*own[taken[command] :]] for command, own in numbers.items()}
 
 
 def index(entries: Sequence[Entry]) -> bytes:
@@ -166,18 +210,18 @@ def thumbnail(study: Study) -> str:
     return f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 
-def _page(template: str, *, parts: Sequence[str] = (), **content: Any) -> bytes:
-    """A page with the scripts of some parts."""
+def _page(template: str, *, parts: Sequence[str] = (), drawings: Iterable[str] = (), **content: Any) -> bytes:
+    """A page with the scripts of some parts, and the colours of some drawings on a dark screen."""
     environment = Environment(
         loader=PackageLoader("mechdesign.report.page"), autoescape=True, undefined=StrictUndefined, finalize=harmless,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
     environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     environment.filters |= {"printed": style.printed, "counted": counted, "shown": shown}
-    styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "")
-    script = "".join(_text(f"{part}.js") for part in parts)
+    styles = _text("page.css") + (_text("moving.css") if "moving" in parts else "") + dark(drawings)
+    script = "".join(_text(f"{part}.js") for part in ("page", *parts))
     policy = ["default-src 'none'", "img-src data:", f"style-src {_hash(styles)}"]
-    policy += [f"script-src {_hash(script)}"] if script else []
+    policy += [f"script-src {_hash(script)}"]
     text = environment.get_template(template).render(
         **content,
         generator=Markup(GENERATOR),
@@ -190,7 +234,9 @@ def _page(template: str, *, parts: Sequence[str] = (), **content: Any) -> bytes:
 
 
 def _text(name: str) -> str:
-    return files("mechdesign.report.page").joinpath("templates", name).read_text(encoding="utf-8")
+    """A style sheet or a script without indents and lines of comments."""
+    text = files("mechdesign.report.page").joinpath("templates", name).read_text(encoding="utf-8")
+    return _INDENT.sub("", text)
 
 
 def _hash(text: str) -> str:
@@ -209,10 +255,19 @@ def _requirements(study: Study, answers: Iterable[Answered]) -> list[dict[str, A
     ]
     of_warnings = range(len(study.requirements), len(rules))
     for answer in answers:
+        meanings = _meanings(answer.section)
         for k, verdict in zip_longest([*judged_by(study, answer.command), *of_warnings], answer.verdicts):
             about = {"command": answer.command, "verdict": verdict, "met": verdict is not None and verdict.met}
-            rows.append((answer.command == SWEEP.name, k, about | rules[k]))
+            about |= {"meaning": meanings.get(rules[k]["what"].strip("|"), ""), **rules[k]}
+            rows.append((answer.command == SWEEP.name, k, about))
     return [about for *_, about in sorted(rows, key=itemgetter(0, 1))]
+
+
+def _meanings(section: Mapping[str, Any] | None) -> dict[str, str]:
+    """Meanings of the columns of a result that have no unit, such as indices."""
+    tables = section["tables"] if section is not None else ()
+    columns = (column for table in tables for column in table["columns"])
+    return {column["name"]: column["meaning"] for column in columns if column["numeric"] and not column["unit"]}
 
 
 def _in_words(requirement: Requirement) -> dict[str, str]:

@@ -11,6 +11,7 @@ from mechdesign.files import marked
 HELP_PAGE = "howto/report"
 
 REPORT = "report.html"
+PRINTED = "report.pdf"
 INDEX = "index.html"
 SECTION = "report.json"  # what a page says of a result
 # A page of mechdesign is recognised by this mark.
@@ -23,7 +24,7 @@ def harmless(value: Any) -> Any:
 
 
 def remove(path: Path) -> None:
-    """Remove a page of an older result; a file of that name that is not by mechdesign stays.
+    """Remove a page of an older result, printed or not; a file of that name that is not by mechdesign stays.
 
     Raises
     ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from xml.etree.ElementTree import Element, tostring
 
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from mechdesign.mechanism import Configuration
-from mechdesign.numerics.arrays import Ints, evenly
+from mechdesign.numerics.arrays import Complexes, Ints, evenly
 from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.index_maps import contours, index_columns, index_norm
@@ -25,23 +25,28 @@ from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
 from mechdesign.report.page.linkage import Sheet, Sketcher, add, dashed
-from mechdesign.report.page.tracks import Moving, Numbers, meanings, places
+from mechdesign.report.page.tracks import Map, Moving, Numbers, meanings, places
 from mechdesign.results import Column, Result, Table
 from mechdesign.study import Study
 
 # Cells along the larger side of a region, each with at most one pose: for a single region, and for each of several.
 CELLS = 60
 FEW_CELLS = 32
-_DPI = 96  # of the map of an index
+_DPI = 72  # of the map of an index
 _SWATCH = 16.0  # width of a colour in the legend
 _NAMED_POSES = 12  # in which names keep off the links
 _LINE = 17.0  # height of a line of the legend, in the drawing's units
 _ENTRY = 170.0  # width of an entry
-_COLORS = 64  # of the map
+_COLORS = 24  # of the map
+_SEEN = 128  # opacity from which on a pixel belongs to the map
+_AROUND = 6.0  # left free around a region in a small map
 
 
-def roaming(study: Study, result: Result) -> Moving | None:
-    """The mechanism in its workspace, for each of a few values of held coordinates."""
+def roaming(study: Study, result: Result, name: str) -> Moving | None:
+    """The mechanism in its workspace, for each of a few values of held coordinates, with a map of each index.
+
+    `name` begins the ids in the drawing.
+    """
     shown = some(regions(study, result))
     section, mechanism = study.workspace, study.mechanism
     if not shown or section is None:
@@ -67,25 +72,25 @@ def roaming(study: Study, result: Result) -> Moving | None:
     scene = pose(mechanism, configuration, begin)
     assert scene is not None
     root = sheet.root(f"the mechanism in the workspace of point {section.point}")
-    index = next((name for name in index_columns(shown[0])
-                  if all(np.isfinite(region.local[name]).any() for region in shown)), "")  # fmt: skip
-    norm = index_norm(shown, index) if index else None
+    indices = [index for index in index_columns(shown[0])
+               if all(np.isfinite(region.local[index]).any() for region in shown)]  # fmt: skip
+    norms = {index: index_norm(shown, index) for index in indices}
+    maps, layers = [], add(root, "defs")
     for k, region in enumerate(shown):
-        layer = add(root, "g", **{"class": "moving-region" if k == 0 else "moving-region moving-off"})
-        _region(layer, sheet, region)
-        if norm is not None:
-            _map(layer, sheet, region, index, norm)
-        _boundary(layer, sheet, region)
+        maps.append((region.title, _maps(layers, sheet, region, norms, f"{name}-map-{k}")))
+    add(root, "use", **{"class": "moving-region"}, href=f"#{maps[0][1][0].href}")
     few = evenly(len(rows), _NAMED_POSES).tolist()
     scenes = list(filter(None, (pose(mechanism, configuration, index) for index in [begin, *few])))
     sketcher = Sketcher(root, sheet, mechanism, scene, travels(scenes))
     sketcher.draw()
     sketcher.names(scenes)
     sketcher.ruler(study.units.label("length"))
-    _legend(root, sheet, shown, shown[0].local.column(index) if index else None, norm)
+    _legend(root, sheet, shown, [(shown[0].local.column(index), norm) for index, norm in norms.items()])
     data = {"choices": choices, "point": section.point, "unit": study.units.label("length")}
     words = f"point {section.point} in its workspace" + (f", at {shown[0].title}" if shown[0].title else "")
-    return Moving(tostring(root, encoding="unicode"), "", data, words, ["value"], entries, meanings(table))
+    replaces = ("workspace", *indices)
+    drawing = tostring(root, encoding="unicode")
+    return Moving(drawing, "", data, words, ["value"], entries, meanings(table), replaces, maps)
 
 
 def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configuration]:
@@ -118,6 +123,37 @@ def _table(study: Study, region: Region, rows: Ints, configuration: Configuratio
     return Table("poses", tuple(columns))
 
 
+def _maps(layers: Element, sheet: Sheet, region: Region, norms: Mapping[str, BoundaryNorm], name: str) -> list[Map]:
+    """A group for each index with its map over a region, or one of the region alone."""
+    places = sheet.all(region.places())
+    low, high = _corners(places)
+    window = f"{low.real:.0f} {low.imag:.0f} {high.real - low.real:.0f} {high.imag - low.imag:.0f}"
+    below, above = add(layers, "g", id=f"{name}-region"), add(layers, "g", id=f"{name}-boundary")
+    _region(below, sheet, region)
+    _boundary(above, sheet, region)
+    maps = []
+    for index, norm in norms.items() or [("", None)]:
+        # Small maps are drawings of their own, which would fill what the large one does not.
+        layer = add(layers, "g", id=f"{name}-{index}", fill="none")
+        add(layer, "use", href=f"#{name}-region")
+        if norm is None:
+            maps.append(Map("", "region", "", f"{name}-", window))
+        else:
+            column = region.local.column(index)
+            _map(layer, sheet, region, index, norm)
+            label = style.axis_label(index.replace("_", " "), column.unit)
+            maps.append(Map(index, label, column.meaning, f"{name}-{index}", window))
+        add(layer, "use", href=f"#{name}-boundary")
+    return maps
+
+
+def _corners(places: Complexes) -> tuple[complex, complex]:
+    """The upper left and the lower right corner around places of a drawing."""
+    room = complex(_AROUND, _AROUND)
+    return (complex(np.nanmin(places.real), np.nanmin(places.imag)) - room,
+            complex(np.nanmax(places.real), np.nanmax(places.imag)) + room)  # fmt: skip
+
+
 def _region(layer: Element, sheet: Sheet, region: Region) -> None:
     """The region, and faintly what is left out."""
     if region.others is not None:
@@ -127,7 +163,7 @@ def _region(layer: Element, sheet: Sheet, region: Region) -> None:
 
 def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: BoundaryNorm) -> None:
     """A local index over the region, as a picture of few colours."""
-    figure = Figure(figsize=(sheet.width / 72, sheet.height / 72), dpi=_DPI)
+    figure = Figure(figsize=(sheet.width / 72, sheet.height / 72), dpi=_DPI, facecolor="none")
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set_axis_off()
@@ -137,9 +173,14 @@ def _map(layer: Element, sheet: Sheet, region: Region, index: str, norm: Boundar
     axes.set_ylim(far.imag, sheet.corner.imag)
     stream = io.BytesIO()
     figure.savefig(stream, format="rgba", dpi=_DPI)
-    pixels = Image.frombytes("RGBA", figure.canvas.get_width_height(), stream.getvalue()).convert("RGB")
-    few, packed = pixels.quantize(_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE), io.BytesIO()
-    few.save(packed, format="png", optimize=True)
+    pixels = Image.frombytes("RGBA", figure.canvas.get_width_height(), stream.getvalue())
+    few = pixels.convert("RGB").quantize(_COLORS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    # Beyond the region, where the ground of the drawing shows, one more colour.
+    palette = few.getpalette() or []
+    few.putpalette([*palette[: 3 * _COLORS], *[255] * (3 * (_COLORS + 1) - len(palette[: 3 * _COLORS]))])
+    few.paste(_COLORS, mask=pixels.getchannel("A").point(lambda alpha: 255 * (alpha < _SEEN)))
+    packed = io.BytesIO()
+    few.save(packed, format="png", optimize=True, transparency=_COLORS)
     data = f"data:image/png;base64,{base64.b64encode(packed.getvalue()).decode()}"
     add(layer, "image", href=data, width=sheet.width, height=sheet.height, preserveAspectRatio="none")
 
@@ -165,10 +206,8 @@ def _look(line: Element, kind: str) -> None:
     dashed(line, dashes, width)
 
 
-def _legend(
-    root: Element, sheet: Sheet, shown: Sequence[Region], index: Column | None, norm: BoundaryNorm | None
-) -> None:
-    """Below the drawing what ends the regions, and what the colours of the map mean."""
+def _legend(root: Element, sheet: Sheet, shown: Sequence[Region], maps: Sequence[tuple[Column, BoundaryNorm]]) -> None:
+    """Below the drawing what ends the regions, and what the colours of each map mean; the first is seen."""
     seen = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip
     kinds = [kind for kind in LOOKS if kind in seen]
@@ -178,14 +217,17 @@ def _legend(
         _look(add(root, "path", d=f"M{x:g} {y:.1f}h24"), kind)
         add(root, "text", LOOKS[kind][3], x=x + 30, y=y + 3.5, font_size=10, fill="#333333")
     height = sheet.height + _LINE * -(-len(kinds) // columns)
-    if index is not None and norm is not None:
-        height += _LINE
+    height += _LINE * bool(maps)
+    for index, norm in maps:
+        entry = add(
+            root, "g", **{"class": f"moving-legend{' moving-off' * (index is not maps[0][0])}"}, data_index=index.name
+        )
         levels = np.asarray(norm.boundaries, dtype=float)
         for k, level in enumerate((levels[1:] + levels[:-1]) / 2):
-            add(root, "rect", x=12 + _SWATCH * k, y=height - 0.8 * _LINE, width=_SWATCH, height=0.6 * _LINE,
+            add(entry, "rect", x=12 + _SWATCH * k, y=height - 0.8 * _LINE, width=_SWATCH, height=0.6 * _LINE,
                 fill=to_hex(colormaps[style.COLORMAP](int(norm(level)))))  # fmt: skip
         name = style.axis_label(index.name.replace("_", " "), index.unit)
         words = f"{name}, from {levels[0]:g} to {levels[-1]:g}{' and beyond' * (norm.extend != 'neither')}"
-        add(root, "text", words, x=18 + _SWATCH * (len(levels) - 1), y=height - 0.3 * _LINE, font_size=10,
+        add(entry, "text", words, x=18 + _SWATCH * (len(levels) - 1), y=height - 0.3 * _LINE, font_size=10,
             fill="#333333")  # fmt: skip
     root.set("viewBox", f"0 0 {sheet.width:g} {height + 4:.1f}")

@@ -26,14 +26,13 @@ from mechdesign.table_text import readable
 
 HELP_PAGE = "howto/report"
 
-# Pictures that are left out where the same stands beside a moving mechanism: of a motion its curves, and the front.
-BESIDE = {"motion", "pareto"}
 # Of tables with more rows than this only the first rows are shown.
 MOST_ROWS = 24
 FIRST_ROWS = 8
 # A table with few rows and many columns is transposed: one line per column, with its meaning.
 FEW_ROWS = 3
 MANY_COLUMNS = 7
+MOST_ON_PAPER = 8  # columns of a table that is printed
 
 
 def section(
@@ -61,8 +60,7 @@ def section(
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
-    doubled = BESIDE if part is not None and part.beside else ()
-    shown = {name: html for name, html in pictures.items() if name not in doubled}
+    shown = {name: html for name, html in pictures.items() if part is None or name not in part.replaces}
     swept = isinstance(result.drawn, DrawnCases)
     return {
         "command": result.command,
@@ -118,6 +116,7 @@ def _part(table: Table, some: Table, which: str, *, turned: bool, opened: bool =
         "rows": len(table),
         "which": which,
         "turned": turned,
+        "narrow": turned or len(table.columns) <= MOST_ON_PAPER,
         "open": opened,
         "sorted": not turned and len(some) > 1 and (opened or len(some) == len(table)),
         "columns": [

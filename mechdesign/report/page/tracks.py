@@ -18,11 +18,14 @@ from mechdesign.report.figures.scene import link_points
 from mechdesign.report.page.linkage import Sheet
 from mechdesign.results import Column, Table
 
-# Integers in a unit of a drawing, in a degree, and in a point of the curves.
+# Integers in a unit of a drawing, and in a degree.
 PLACES = 20
 TURNS = 100
-CURVES = 10
 TIMES = 10_000  # in the time of a motion
+# Digits of integers.
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+_BASE = 32
+_NOTHING = "."
 # Smallest number of steps between zero and the usual size of a number.
 _STEPS = 1000
 _COMMON = 0.5  # quantile of the absolute values that counts as the size of a column
@@ -40,6 +43,17 @@ class Cell:
 
 
 @dataclass(frozen=True)
+class Map:
+    """A map of a local index that a drawing can show."""
+
+    index: str
+    label: str  # with its unit
+    meaning: str
+    href: str  # the id of its group in the drawing
+    window: str  # the view box around its region
+
+
+@dataclass(frozen=True)
 class Moving:
     """A mechanism that moves in a page."""
 
@@ -50,6 +64,8 @@ class Moving:
     headings: Sequence[str]  # of the columns of numbers
     rows: Sequence[tuple[str, Sequence[Cell | None]]]  # numbers of the pose drawn, by what they are of
     meanings: Mapping[str, str]  # of these rows, where no unit tells what they are
+    replaces: Sequence[str] = ()  # pictures of the question that show the same
+    maps: Sequence[tuple[str, Sequence[Map]]] = ()  # maps to choose from, by what the orientation is
 
 
 class Numbers:
@@ -110,20 +126,42 @@ def _size(values: Floats) -> float:
     return float(np.quantile(known, _COMMON) or known.max()) if len(known) else 0.0
 
 
-def deltas(values: Floats, factor: float) -> list[int | None]:
-    """Values times a factor as integers: the first, then the step from the last known one; None where there is none.
+def deltas(values: Floats, factor: float) -> str:
+    """Values times a factor as integers in letters: the first, then the step from the last known one.
 
-    Steps of zero at the end are left out.
+    A step s is 2 s, or -2 s - 1 where it is negative, in digits to the base 32, the lowest first; all but the last of
+    them are 32 more. Where there is no value stands a point; steps of zero at the end are left out.
     """
-    steps: list[int | None] = []
+    letters: list[str] = []
     last = 0
     for value in (values * factor).tolist():
-        whole = round(value) if math.isfinite(value) else None
-        steps.append(None if whole is None else whole - last)
-        last = last if whole is None else whole
-    while steps and steps[-1] == 0:
-        steps.pop()
-    return steps
+        if math.isfinite(value):
+            step, last = round(value) - last, round(value)
+            letters.append(_letters(2 * step if step >= 0 else -2 * step - 1))
+        else:
+            letters.append(_NOTHING)
+    return "".join(letters).rstrip(_letters(0))
+
+
+def steps(text: str, count: int) -> Floats:
+    """The integers that `deltas` has written, shape (count,); where there is no value the last one before it."""
+    found, value, place = [], 0, 1
+    for letter in text:
+        digit = _LETTERS.find(letter)
+        value += place * (digit % _BASE if digit >= 0 else 0)
+        place *= _BASE
+        if digit < _BASE:
+            found.append(-(value + 1) // 2 if value % 2 else value // 2)
+            value, place = 0, 1
+    return np.cumsum([*found, *[0] * (count - len(found))]).astype(np.float64)
+
+
+def _letters(number: int) -> str:
+    letters = ""
+    while number >= _BASE:
+        letters += _LETTERS[_BASE + number % _BASE]
+        number //= _BASE
+    return letters + _LETTERS[number]
 
 
 def places(sheet: Sheet, configuration: Configuration, links: Mapping[str, Link]) -> dict[str, Any]:

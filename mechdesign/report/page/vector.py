@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
 from collections.abc import Callable, Iterator
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
 from mechdesign.report.figures import style
+from mechdesign.report.page.axes import axes_of
 
 Element = ElementTree.Element
 
@@ -86,9 +88,12 @@ def inline(figure: Figure, name: str, alt: str) -> str:
     names = {old: f"{name}-{count}" for count, old in enumerate(dict.fromkeys(_ids(root, used)))}
     _rename(root, names)
     _unwrap(root)
+    _inherited(root)
     box = root.attrib["viewBox"]
     root.attrib.clear()
     root.attrib |= {"viewBox": box, "role": "img", "aria-label": alt, "font-family": _FONTS, "stroke-linejoin": "round"}
+    if axes := axes_of(figure):
+        root.set("data-axes", json.dumps(axes, separators=(",", ":"), ensure_ascii=False))
     return ElementTree.tostring(root, encoding="unicode")
 
 
@@ -120,7 +125,7 @@ def _clean(element: Element, halo: str) -> None:
             value = value.removesuffix("px")
         elif key not in ("id", "href", "class", "clip-path", "fill", "stroke", "viewBox", "font-family", "font-weight"):
             value = _NUMBER.sub(lambda match: _rounded(match[0]), value)
-        if key != "font-family" and _ASSUMED.get(key) != value:
+        if key != "font-family" and _ASSUMED.get(key) != value and not value.startswith("rotate(-0 "):
             element.set(key, value)
     if element.tag == "text":
         if not len(element) and element.text:
@@ -203,6 +208,15 @@ def _rename(root: Element, names: dict[str, str]) -> None:
                 element.set(key, _REFERENCE.sub(renamed, element.attrib[key]))
         if identity in names:
             element.set("id", names[identity])
+
+
+def _inherited(root: Element) -> None:
+    """Remove from uses of a symbol the looks that the symbol has itself."""
+    symbols = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
+    for use in root.iter("use"):
+        symbol = symbols[use.attrib["href"]]
+        for look in symbol.attrib.keys() & use.attrib.keys() & {"fill", "stroke", "stroke-width"}:
+            del use.attrib[look]
 
 
 def _unwrap(element: Element) -> None:

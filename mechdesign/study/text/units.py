@@ -209,6 +209,11 @@ class Units:
         """Force that gives a unit of mass a unit of acceleration, in the study's unit of force."""
         return _scale(self.mass) * _scale(self.length) / _scale(self.time) ** 2 / _scale(self.force)
 
+    @cached_property
+    def time_factor(self) -> float:
+        """Seconds in one unit of time."""
+        return _scale(self.time)
+
     def label(self, kind: str) -> str:
         """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
         length, angle, time, force = KINDS[kind]

@@ -17,7 +17,15 @@ from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.overlay import DASHES, name_both
-from mechdesign.report.figures.panels import abscissa, clear_of_ticks, fitting, moving_names, tick_abscissa
+from mechdesign.report.figures.panels import (
+    Along,
+    abscissa,
+    clear_of_ticks,
+    fitting,
+    moving_names,
+    tick_abscissa,
+    times,
+)
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import ranks
 from mechdesign.results import Column, Table
@@ -43,6 +51,9 @@ _PEAK_RATIO = 6  # of the whole range to that of the other poses
 _LEGEND_LETTERS = 26  # of the longest name in a legend
 # Inches.
 _LEFT = 1.0
+_BOTTOM = 0.5
+# Height of a panel: of few, of many, and on a page that holds no more.
+_TALL, _LOW, _LOWEST = 1.57, 1.23, 0.7
 _LEGEND_ROW = 0.19
 
 
@@ -98,23 +109,26 @@ def curves_figure(
     table = tables["motion"]
     if not moving_names(poses):
         return None
-    over = abscissa(study, poses)
+    over = abscissa(study, poses, _speed(study))
     swept, x = over.name, over.values
     panels = _panels(study, table, swept, x)
     if not panels:
         return None
-    limits, marks = tables.get("limits"), []
-    if limits is not None and swept in limits:
-        marks = list(zip(limits[swept].tolist(), limits["kind"].tolist(), strict=True))
+    marks = _marks(study, tables.get("limits"), poses, over)
     invalid = _runs(table["valid"] == 0, x, np.array([value for value, _ in marks]))
     # A narrow page has no room for legends beside its panels: they stand above them.
     above = style.narrow()
     room = 0.1 + _LEGEND_ROW * max(panel.rows for panel in panels)
     longest = max(len(curve.label) for panel in panels for curve in panel.curves)
+    top, down = (0.4 if marks else 0.15) + room * above, room if above else 0.2
+    # What a page has no room for, the table has.
+    left_out = max(len(panels) - int(min((style.tallest() - top - _BOTTOM + down) / (_LOWEST + down), MAX_PANELS)), 0)
+    panels = panels[: len(panels) - left_out]
+    tall = _TALL if len(panels) <= _MAX_TALL_PANELS else _LOW
+    tall = min(tall, (style.tallest() - top - _BOTTOM + down) / len(panels) - down)
     figure, axes = style.page(
-        len(panels), 1, 1.57 if len(panels) <= _MAX_TALL_PANELS else 1.23, left=_LEFT,
-        right=0.15 if above else 0.6 + 0.08 * longest, top=(0.4 if marks else 0.15) + room * above, bottom=0.5,
-        down=room if above else 0.2, sharex=True,
+        len(panels), 1, tall, left=_LEFT, right=0.15 if above else 0.6 + 0.08 * longest, top=top, bottom=_BOTTOM,
+        down=down, sharex=True,
     )  # fmt: skip
     colors: dict[tuple[str, str], str] = {}
     for axis, panel in zip(axes, panels, strict=True):
@@ -126,11 +140,35 @@ def curves_figure(
     _draw_limits(figure, axes, marks, bool(invalid))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
     axes[-1].margins(x=0.02)
-    axes[-1].set_xlabel(over.label)
+    axes[-1].set_xlabel(over.label + f"; {left_out} more panels in motion.csv" * bool(left_out))
     tick_abscissa(axes[-1], over)
     clear_of_ticks(figure, axes)
     name_both(figure, before)
     return figure
+
+
+def _speed(study: Study) -> float | None:
+    """At which the path's point passes it, if the study says so."""
+    return study.kinematics.speed if study.kinematics is not None else None
+
+
+def _marks(study: Study, limits: Table | None, poses: Poses, over: Along) -> list[tuple[float, str]]:
+    """Where on the axis the motion ends or is singular, and what it is there."""
+    speed = _speed(study)
+    if limits is None or (speed is None and over.name not in limits):
+        return []
+    if speed is None:
+        places = limits[over.name]
+    else:
+        rows = limits["row"] if poses.swept is None else _rows(poses, poses.swept, limits[poses.swept])
+        places = times(poses, rows, speed)
+    return list(zip(places.tolist(), limits["kind"].tolist(), strict=True))
+
+
+def _rows(poses: Poses, swept: str, values: Floats) -> Floats:
+    """Places of a motion, in rows, by the values of the coordinate that is swept."""
+    order = np.argsort(poses.values[swept])
+    return np.interp(values, poses.values[swept][order], poses.numbers[order])
 
 
 def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
@@ -283,7 +321,8 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
 
 def _draw_before(axis: Axes, panel: _Panel, before: Before, colors: dict[tuple[str, str], str]) -> None:
     """The curves of the study before, dashed, each in the colour of its name."""
-    table, x = before.result.tables["motion"], abscissa(before.study, DrawnMotion.of(before.result).shown.poses).values
+    table, poses = before.result.tables["motion"], DrawnMotion.of(before.result).shown.poses
+    x = abscissa(before.study, poses, _speed(before.study)).values
     low, high = axis.get_ylim()
     for curve in panel.curves:
         if curve.column.name in table:

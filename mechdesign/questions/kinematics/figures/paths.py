@@ -1,47 +1,58 @@
-"""Paths of a mechanism's points along its motion, with ticks of time and centrodes, and the mechanism on its way."""
+"""Paths of a mechanism's points along its motion, with ticks and crank angles, and the mechanism on its way."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from mechdesign.mechanism.algebra import vector
+from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.numerics.arrays import Complexes, Flags, Ints
+from mechdesign.numerics.arrays import Complexes, Ints
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_ghost, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, LEFT, RIGHT, TITLE, extent, framed, tiled, windows
-from mechdesign.report.figures.labels import paper
+from mechdesign.report.figures.framing import ABOVE, LEFT, PLANE, RIGHT, TITLE, framed, tiled, windows
+from mechdesign.report.figures.labels import Label, paper
 from mechdesign.report.figures.overlay import draw_sweep, name_both
 from mechdesign.report.figures.panels import moving_names
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Sweep, link_points, ranks
-from mechdesign.report.figures.shapes import link_colors
+from mechdesign.report.figures.shapes import Color, darker, lighter, link_colors
 from mechdesign.results import Table
+from mechdesign.study import Study
 
 HEIGHT = 5.6  # inches, of a mechanism along its motion at most
 _LEGEND_LINE = 0.19  # inches
+_TICKS = 0.4  # inches, the word before those of ticks
 _LEGEND_SYMBOL = 0.6  # inches, of a legend's lines beside their words
 # Largest number of moving links, and for it the number of ghosts.
 _GHOSTS = ((3, 7), (5, 6), (8, 4), (10**6, 2))
 # Line width and share of colour of a path by the rank of its point.
 _LOOKS = {2: (2.2, 1.0), 1: (1.1, 0.9), 0: (0.9, 0.55)}
-# Of ticks at equal steps of time.
+# Colours of several bold paths of one link.
+_SHADES: tuple[Callable[[str], Color], ...] = (
+    str,
+    lambda color: darker(color, 0.55),
+    lambda color: lighter(color, 0.35),
+)
+_MOST_KINDS = 2  # loops whose class is written above the drawing
+# Of ticks at equal steps.
 _TICK = 9.0  # points, across a path
 _MOST_TICKS = 24  # along a motion
+_MOST_NUMBERS, _FEWEST_NUMBERS = 12, 3  # beside all paths, beside one
+_NUMBER = 8.0  # points, the type of a number
+_ROUND_ANGLES = (15, 30, 45, 60, 90, 120, 180)  # steps of numbers, degrees
 _FEWEST_TICKS = 4
 _UNEVEN = 2e-3  # greatest difference of steps of an even sweep, as a part of their mean
-# Of centrodes.
-_CENTRODES = ((0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (3, 2)))  # dashes
-_NEAR = 0.75  # distance from the middle, in sizes of the mechanism, up to which a centrode widens the window
-_STILL = 1e-9  # a centre that moves less than this part of the mechanism's size is fixed
 # Of the panels of assemblies.
 _MAX_COLUMNS = 4
 _PADS = (0.4, 0.2)  # inches around what is drawn, in one column and in several
@@ -58,17 +69,26 @@ def motion_paths_figure(view: MotionView) -> Figure | None:
     """The paths of a motion; None where no pose is valid."""
     if not view.sweep.poses.motion or not len(view.sweep.valid):
         return None
-    return paths_figure(view.sweep, centres=view.result.tables.get("instant_centres"), before=view.before)
+    tables = view.result.tables
+    kinds = _kinds(view.study, tables["loops"]) if "loops" in tables else []
+    return paths_figure(view.sweep, kinds=kinds, before=view.before)
+
+
+def _kinds(study: Study, table: Table) -> list[str]:
+    """Four-bars and slider-cranks by their joints, with their class; none where they are many."""
+    loops = zip(four_bars(study.mechanism), table["kind"].tolist(), table["class"].tolist(), strict=True)
+    words = [f"{kind} {' '.join(joint.name for joint in loop.joints)}: {of}" for loop, kind, of in loops]
+    return words if len(words) <= _MOST_KINDS else []
 
 
 def paths_figure(
-    sweep: Sweep, *, above: float = ABOVE, centres: Table | None = None, before: Before | None = None
-) -> Figure:
+    sweep: Sweep, *, above: float = ABOVE, kinds: Sequence[str] = (),
+    before: Before | None = None,
+) -> Figure:  # fmt: skip
     """The first valid pose with its names, ghosts of later ones, paths of all moving points, places to pass through.
 
-    The boldest paths have ticks at equal steps of time where the swept drive has a rate; `centres` are the instant
-    centres, of which those against the ground have a path, too. A study before it lies under it in grey dashes.
-    `above` it, inches are left for a title.
+    The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `kinds` are words
+    about its loops. A study before it lies under it in grey dashes. `above` it, inches are left for a title.
     """
     wanted = [
         target.table[:, -2] + 1j * target.table[:, -1]
@@ -76,23 +96,19 @@ def paths_figure(
         if target.table is not None and len(target.coordinates) == 2
     ]
     earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
-    centrodes = _centrodes(sweep, centres)
-    middle, *sides = extent(sweep.extent)
-    near = [path[np.abs(path - middle) <= _NEAR * max(sides)] for path in centrodes.values()]
-    places = np.concatenate([sweep.extent, *wanted, *near, *([earlier.extent] if earlier is not None else [])])
-    ticks = equal_times(sweep)
+    places = np.concatenate([sweep.extent, *wanted, *([earlier.extent] if earlier is not None else [])])
+    steps = steps_of(sweep)
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
-    words = [style.folded(f"fixed centrode of {link}: path of its instant centre with the ground", 9, room)
-             for link in centrodes]  # fmt: skip
-    if rows := sum(label.count("\n") + 1 for label in words) + (ticks is not None):
+    kinds = [style.folded(kind, 9, room) for kind in kinds]
+    if steps is not None:
+        steps = steps._replace(words=style.folded(steps.words, 9, room - _TICKS))
+    if rows := sum(label.count("\n") + 1 for label in (*kinds, *([steps.words] if steps is not None else []))):
         above = max(above, TITLE + _LEGEND_LINE * (rows - 1))
     figure, axes = framed(places, sweep.study.units.label("length"), height=HEIGHT, above=above)
-    for path, label, dashes in zip(centrodes.values(), words, _CENTRODES * len(centrodes), strict=False):
-        path = np.where(_leaps(path - middle, max(sides)), complex(np.nan, np.nan), path)
-        axes.plot(path.real, path.imag, color=style.INK, linewidth=1.3, linestyle=dashes, zorder=2.75,
-                  label=label)  # fmt: skip
-    if ticks is not None:
-        _draw_ticks(axes, sweep, *ticks)
+    axes.set_label(PLANE)
+    for kind in kinds:
+        axes.plot([], [], " ", label=kind)
+    numbers = _draw_steps(axes, sweep, steps) if steps is not None else []
     for path in wanted:
         axes.plot(
             path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
@@ -108,65 +124,61 @@ def paths_figure(
         draw_sweep(axes, earlier)
     draw_paths(axes, sweep)
     first = int(sweep.valid[0])
-    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel)
+    more = [*_path_names(sweep), *numbers]
+    draw_mechanism(axes, sweep.mechanism, sweep.configuration, first, travel=sweep.travel, more=more)
     if axes.get_legend_handles_labels()[1]:
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handlelength=2.6)
     name_both(figure, before)
     return figure
 
 
-def _centrodes(sweep: Sweep, centres: Table | None) -> dict[str, Complexes]:
-    """Paths of the instant centres that links have with the ground, by the links; a pin of the ground stays."""
-    if centres is None:
-        return {}
-    centrodes = {}
-    for name in centres.names:
-        pair, _, column = name.rpartition(".")
-        links = pair.split(".")
-        if column == "x" and GROUND in links and len(links) == 2:
-            path = vector(centres[name], centres[f"{pair}.y"])[sweep.rows]
-            path[~np.isfinite(path)] = complex(np.nan, np.nan)
-            known = path[np.isfinite(path)]
-            if len(known) and np.abs(known - known[0]).max() > _STILL * sweep.mechanism.size:
-                centrodes[next(link for link in links if link != GROUND)] = path
-    return centrodes
+class Steps(NamedTuple):
+    """Poses at equal steps of what is swept, the step in words, and the values that are written beside some."""
+
+    rows: Ints
+    words: str
+    written: Mapping[int, str]
 
 
-def _leaps(path: Complexes, side: float) -> Flags:
-    """Points after which a path passes through infinity; `path` is relative to the mechanism's middle."""
-    far = np.abs(path) > side
-    turned = (np.conj(path[:-1]) * path[1:]).real < 0
-    return np.append(far[:-1] & far[1:] & turned, False)
-
-
-def equal_times(sweep: Sweep) -> tuple[Ints, str] | None:
-    """Poses at equal steps of time, and the step in words; None where the swept drive has no constant rate."""
+def steps_of(sweep: Sweep) -> Steps | None:
+    """Steps of a sweep of one coordinate, with their time where it has a constant rate; None of other motions."""
     section, poses = sweep.study.kinematics, sweep.poses
     moving = moving_names(poses)
-    if section is None or not poses.motion or len(moving) != 1 or any(section.accelerations.values()):
+    if section is None or not poses.motion or len(moving) != 1:
         return None
     (name,) = moving
-    rates = {key: rate for key, rate in section.rates.items() if rate}
     values = poses.values[name][sweep.rows]
     steps = np.diff(values)
-    if set(rates) != {name} or np.ptp(steps) > _UNEVEN * abs(steps.mean()) or len(steps) < _FEWEST_TICKS:
+    if np.ptp(steps) > _UNEVEN * abs(steps.mean()) or len(steps) < _FEWEST_TICKS:
         return None
     least = -(-len(steps) // _MOST_TICKS)
     stride = next((k for k in range(least, 2 * least + 1) if len(steps) % k == 0), least)
     step, units = abs(float(steps.mean())) * stride, sweep.study.units
     unit = units.label(sweep.mechanism.quantity(name))
-    words = f"ticks every {step / abs(rates[name]):.3g} {units.time} ({step:.4g} {unit}".rstrip() + f" of {name})"
-    return np.arange(0, len(values) - sweep.closed, stride), words
+    words = f"{step:.4g} {unit}".rstrip() + f" of {name}"
+    rates = {key: rate for key, rate in section.rates.items() if rate}
+    if set(rates) == {name} and not any(section.accelerations.values()):
+        words = f"{step / abs(rates[name]):.3g} {units.time}".rstrip() + f" ({words})"
+    rows = np.arange(0, len(values) - sweep.closed, stride)
+    bold = list(ranks(sweep.study).values())
+    most = max(_MOST_NUMBERS // bold.count(max(bold)), _FEWEST_NUMBERS)
+    each = -(-len(rows) // most)
+    if unit == "deg":
+        each = next((k for k in range(each, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), each)
+    degree = "\N{DEGREE SIGN}" * (unit == "deg")
+    written = {k: f"{values[k]:.4g}{degree}" for k in rows[::each].tolist()}
+    return Steps(rows, f"every {words}; numbers: {name}", written)
 
 
-def _draw_ticks(axes: Axes, sweep: Sweep, rows: Ints, words: str) -> None:
-    """Short lines across the boldest paths, of a length on paper."""
-    ranked = ranks(sweep.study)
+def _draw_steps(axes: Axes, sweep: Sweep, steps: Steps) -> list[Label]:
+    """Short lines across the boldest paths, of a length on paper; returns the numbers to be written beside some."""
+    ranked, looks = ranks(sweep.study), {look.point: look for look in path_looks(sweep)}
     shown = paper(axes, np.array([0.0, 1.0], dtype=complex))
-    half, lines = _TICK / 2 / (shown[1, 0] - shown[0, 0]), []
+    half, lines, numbers = _TICK / 2 / (shown[1, 0] - shown[0, 0]), [], []
     for point, path in sweep.places.items():
         if ranked[point] < max(ranked.values()):
             continue
+        rows = steps.rows
         before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, len(path) - 1)
         with np.errstate(invalid="ignore"):
             along = np.where(np.isfinite(path[after]), path[after], path[rows])
@@ -174,8 +186,15 @@ def _draw_ticks(axes: Axes, sweep: Sweep, rows: Ints, words: str) -> None:
             across = 1j * half * along / np.abs(along)
         ends = np.stack([path[rows] - across, path[rows] + across], axis=1)
         lines += [np.column_stack([end.real, end.imag]) for end in ends if np.isfinite(end).all()]
+        color = darker(looks[point].color)
+        for row, toward in zip(rows.tolist(), across.tolist(), strict=True):
+            if row in steps.written and np.isfinite(toward):
+                numbers.append(Label(steps.written[row], (complex(path[row]),), color, _TICK / 2 + 1,
+                                     float(np.angle(toward)), _NUMBER, optional=True))  # fmt: skip
     axes.add_collection(LineCollection(lines, colors=style.INK, linewidths=1.2, zorder=2.8), autolim=False)
-    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2, label=words)
+    axes.plot([], [], color=style.INK, linewidth=0.8, marker="|", markersize=_TICK, markeredgewidth=1.2,
+              label=f"ticks {steps.words}")  # fmt: skip
+    return numbers
 
 
 def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
@@ -188,8 +207,9 @@ def draw_paths(axes: Axes, sweep: Sweep, width: float = 1.0) -> None:
 
 
 class PathLook(NamedTuple):
-    """How the path of a point is drawn: in the colour of its link, and the wider and stronger the higher its rank."""
+    """How the path of a point is drawn: in a shade of its link's colour, the wider and stronger the higher its rank."""
 
+    point: str
     path: Complexes
     color: str
     width: float
@@ -206,9 +226,30 @@ def path_looks(sweep: Sweep) -> list[PathLook]:
     for name, link in sweep.mechanism.description.links.items():
         for point in link_points(link) if name != GROUND else ():
             owners.setdefault(point, name)
-    looks = [PathLook(path, colors[owners[point]], *_LOOKS[min(ranked[point] + lift, 2)], ranked[point])
-             for point, path in sweep.traces.items()]  # fmt: skip
+    looks, shaded = [], Counter[str]()
+    for point, path in sweep.traces.items():
+        color, look = colors[owners[point]], _LOOKS[min(ranked[point] + lift, 2)]
+        if look is _LOOKS[2]:
+            shade = _SHADES[shaded[owners[point]] % len(_SHADES)]
+            color = to_hex(shade(color))
+            shaded[owners[point]] += 1
+        looks.append(PathLook(point, path, color, *look, ranked[point]))
     return sorted(looks, key=lambda look: look.rank)
+
+
+def _path_names(sweep: Sweep) -> list[Label]:
+    """Names of bold paths of which a link has several, each where it is far from the place of the point itself."""
+    looks = [look for look in path_looks(sweep) if look.width == _LOOKS[2][0]]
+    links = [link for name, link in sweep.mechanism.description.links.items() if name != GROUND]
+    several = {point for link in links if sum(look.point in link_points(link) for look in looks) > 1
+               for point in link_points(link)}  # fmt: skip
+    labels = []
+    for look in looks:
+        far = np.nan_to_num(np.abs(look.path - look.path[np.isfinite(look.path)][0]))
+        anchors = look.path[np.argsort(-far)[: len(far) // 3 : max(len(far) // 12, 1)]].tolist()
+        if look.point in several and anchors:
+            labels.append(Label(f"path of {look.point}", anchors, darker(look.color), 6.0, size=9.0, optional=True))
+    return labels
 
 
 @picture(MotionView, "modes", order=50)

@@ -18,7 +18,7 @@ from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.special_poses import LIMIT, SINGULAR, SpecialPose, SpecialPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import LEFT, RIGHT, extent, tiled, windows
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, extent, tiled, windows
 from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
@@ -28,6 +28,8 @@ from mechdesign.study import Study
 _MAX_COLUMNS = 3
 _PAGE = 7.5  # inches, of all panels together, about
 _MIN_HEIGHT = 1.8  # inches, of a panel
+_LOWEST = 0.9  # and on a page that holds no more
+_TRIES = 4  # to find panels that a page holds
 _GAP = 0.15  # inches between panels
 _PAD = 0.42  # inches around what is drawn
 _SYMBOLS = 0.75  # size of symbols
@@ -49,7 +51,7 @@ _HEAD = 8.5  # points, a head's length, and of its arrow at most
 _HEAD_SHARE = 0.6
 _NEAR = 1.1  # larger sides of the mechanism from its middle up to which instant centres are drawn
 _TICK_EDGE = 0.07  # of a panel's width, at both ends, without the number of a tick
-_ORDER = 5.2  # above links and pins
+_ORDER = 4.8  # above links and pins, below names
 _SHAPES = ("o", "s", "D", "^", "v", "p")
 _FILLED_HEAD = Path([(-1, 0.36), (0, 0), (-1, -0.36), (-1, 0.36)], closed=True)
 _OPEN_HEAD = Path([(-1, 0.42), (0, 0), (-1, -0.42)])
@@ -68,7 +70,7 @@ class _Kind(NamedTuple):
     filled: bool
 
 
-_KINDS = (
+KINDS = (
     _Kind("velocity", style.INK, {"linestyle": "-", "linewidth": 1.7}, _FILLED_HEAD, True),
     _Kind("acceleration", style.VERMILION, {"linestyle": (0, (3, 1.4)), "linewidth": 1.5}, _OPEN_HEAD, False),
 )
@@ -81,25 +83,33 @@ def poses_figure(view: MotionView) -> Figure | None:
     centres = list(chosen.shown[0].centres) if chosen.shown else []
     if not chosen.shown or not (chosen.special or chosen.rates or centres or sweep.poses.listed):
         return None
-    mechanism, points = study.mechanism, _pointing(study)
+    mechanism, points = study.mechanism, pointing(study)
     places = [mechanism_places(sweep, each) for each in chosen.shown]
     middle, wide, tall = extent(np.concatenate(places))
     side = max(wide, tall)
     # Lengths of arrows by their rates.
-    scales = [_scale(chosen.shown, points, order, side) for order in range(len(_KINDS))]
+    scales = [_scale(chosen.shown, points, order, side) for order in range(len(KINDS))]
     for each in chosen.shown:
         for order, scale in enumerate(scales):
-            tips = [_place(each, point) + scale * _rates(each, order)[point] for point in points]
+            tips = [place_of(each, point) + scale * rates_of(each, order)[point] for point in points]
             places.append(np.array(tips, dtype=complex))
         places.append(np.array([z for z in each.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
     everything, count = np.concatenate(places), len(chosen.shown)
-    columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=_PAGE, least=_MIN_HEIGHT)
-    titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
-    above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
     heading = style.folded(_heading(chosen, listed=sweep.poses.listed), 11, style.width() - LEFT - RIGHT)
     top = _HEADING + _HEADING_LINE * heading.count("\n") + _KEY * (arrows + len(rows))
+    page, least = _PAGE, _MIN_HEIGHT
+    # Lower panels may stand in more columns, and narrower ones have more lines above them.
+    for _ in range(_TRIES):
+        columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=page, least=least)
+        titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
+        above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
+        lines = -(-count // columns)
+        room = style.tallest() - top - BELOW - lines * above
+        if lines * window.height <= room:
+            break
+        page, least = room, _LOWEST
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
     for axes, title, each in zip(grid, titles, chosen.shown, strict=True):
         axes.set_title(title, loc="left", fontsize=_TITLE_SIZE)
@@ -123,7 +133,7 @@ def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:
     return np.array([] if scene is None else scene.places(sweep.travel), dtype=complex)
 
 
-def _pointing(study: Study) -> list[str]:
+def pointing(study: Study) -> list[str]:
     """Points whose rates are drawn: those asked for, else those that tell most."""
     section, ranked = study.kinematics, ranks(study)
     asked = dict.fromkeys(name.split(".")[0] for name in (section and section.outputs) or ())
@@ -132,18 +142,18 @@ def _pointing(study: Study) -> list[str]:
     ]
 
 
-def _rates(each: SpecialPose, order: int) -> Any:
+def rates_of(each: SpecialPose, order: int) -> Any:
     return each.accelerations if order else each.velocities
 
 
-def _place(each: SpecialPose, point: str) -> complex:
+def place_of(each: SpecialPose, point: str) -> complex:
     return complex(each.configuration.point(point)[each.index])
 
 
 def _scale(shown: Sequence[SpecialPose], points: Sequence[str], order: int, side: float) -> float:
     """Length of an arrow over its rate, 0 where nothing moves."""
-    sizes = np.array([abs(_rates(each, order)[point]) for each in shown for point in points])
-    fastest = np.array([abs(rate) for each in shown for rate in _rates(each, order).values()])
+    sizes = np.array([abs(rates_of(each, order)[point]) for each in shown for point in points])
+    fastest = np.array([abs(rate) for each in shown for rate in rates_of(each, order).values()])
     largest = float(np.nanmax(sizes, initial=0.0))
     usual = float(np.nanmax(fastest, initial=0.0))
     if order:
@@ -187,11 +197,11 @@ def arrow(base: complex, along: complex, kind: _Kind, inches: float, **more: Any
 def _draw_arrows(
     axes: Axes, each: SpecialPose, points: Sequence[str], order: int, scale: float, side: float, inches: float
 ) -> None:  # fmt: skip
-    kind = _KINDS[order]
+    kind = KINDS[order]
     for point in points:
-        along = scale * _rates(each, order)[point]
+        along = scale * rates_of(each, order)[point]
         if np.isfinite(along) and abs(along) > _SHORTEST * _LONGEST * side:
-            axes.add_line(arrow(_place(each, point), along, kind, inches, label=f"{kind.name} of {point}"))
+            axes.add_line(arrow(place_of(each, point), along, kind, inches, label=f"{kind.name} of {point}"))
 
 
 def _draw_centres(axes: Axes, each: SpecialPose, centres: Sequence[Centre], letters: int) -> None:
@@ -199,17 +209,18 @@ def _draw_centres(axes: Axes, each: SpecialPose, centres: Sequence[Centre], lett
     for centre, shape in zip(centres, _SHAPES * len(centres), strict=False):
         z = each.centres[centre]
         if left < z.real < right and low < z.imag < high:
-            axes.plot([z.real], [z.imag], **_centre_look(shape), label=f"instant centre {centre.name}")
+            axes.plot([z.real], [z.imag], **centre_look(shape), label=f"instant centre {centre.name}")
         else:
             x, y = (part if abs(part) > _STILL * abs(z) else 0.0 for part in (z.real, z.imag))
             where = f"at ({x:.4g}, {y:.4g})" if np.isfinite(z) else "at infinity" if np.isinf(z) else "none"
             away.append(textwrap.fill(f"centre of {centre.one}, {centre.other}: {where}", letters))
     if away:
-        axes.text(0.02, 0.02, "\n".join(away), transform=axes.transAxes, fontsize=8, va="bottom", zorder=_ORDER + 1,
+        axes.text(0.02, 0.02, "\n".join(away), transform=axes.transAxes, fontsize=8, va="bottom", zorder=5.2,
                   path_effects=HALO)  # fmt: skip
 
 
-def _centre_look(shape: str) -> dict[str, Any]:
+def centre_look(shape: str = "o") -> dict[str, Any]:
+    """How an instant centre is marked."""
     return {"marker": shape, "linestyle": "none", "markersize": 8.5, "markerfacecolor": (1, 1, 1, 0.35),
             "markeredgecolor": style.PURPLE, "markeredgewidth": 2.2, "zorder": _ORDER}  # fmt: skip
 
@@ -243,7 +254,7 @@ def _draw_key(
 
     x = LEFT
     line -= _KEY if any(scales) else 0.0
-    for kind, scale in zip(_KINDS, scales, strict=True):
+    for kind, scale in zip(KINDS, scales, strict=True):
         if scale:
             if style.narrow() and x > LEFT:
                 line, x = line - _KEY, LEFT
@@ -256,6 +267,6 @@ def _draw_key(
     for row in rows:
         line, x = line - _KEY, LEFT
         for words, shape in row:
-            mark = Line2D([x + 0.08], [line], **_centre_look(shape), transform=figure.dpi_scale_trans)
+            mark = Line2D([x + 0.08], [line], **centre_look(shape), transform=figure.dpi_scale_trans)
             figure.add_artist(mark)
             x = write(x + _SYMBOL, words)

@@ -31,6 +31,7 @@ from mechdesign.study import Study
 
 # Transmission angles that textbooks call good, degrees.
 GOOD = (40.0, 140.0)
+BEST = 90.0
 GOOD_WORDS = f"good: {GOOD[0]:g} to {GOOD[1]:g} deg"
 MOST_LOOPS = 5
 MOST_ADVANTAGES = 4
@@ -52,6 +53,7 @@ class Transmission(NamedTuple):
     """A four-bar or slider-crank, its transmission angle at the poses, and where it is worst (degrees)."""
 
     loop: FourBar
+    kind: str  # Grashof's class, or the kind of slider-crank
     angle: Floats  # between coupler and output, 0 to 180
     worst: float
     at: float
@@ -64,7 +66,7 @@ def transmission_figure(view: MotionView) -> Figure | None:
     section = study.kinematics
     if not sweep.poses.motion or not moving_names(sweep.poses):
         return None
-    over = abscissa(study, sweep.poses)
+    over = abscissa(study, sweep.poses, section.speed if section is not None else None)
     x = over.values[sweep.rows]
     loops = transmissions(study, tables.get("loops"), sweep, over)
     asked = list((section.mechanical_advantage if section is not None else {}).items())
@@ -121,13 +123,14 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
             place = float(over.values[sweep.rows][nearest])
         least = float(np.degrees(table["transmission_min"][k] * study.units.angle_factor))
         least = least if np.isfinite(least) else _off(float(angle[nearest]))
-        angles.append(Transmission(loop, angle, least if angle[nearest] <= 90 else 180 - least, place))
+        kind = str(table["class"][k])
+        angles.append(Transmission(loop, kind, angle, least if angle[nearest] <= 90 else 180 - least, place))
     return angles
 
 
 def _label(each: Transmission) -> str:
-    """The name of a loop, as wide as the page at most."""
-    return style.folded(each.loop.name, 9, style.width() - _LEGEND_SYMBOL)
+    """The name of a loop and its class, as wide as the page at most."""
+    return style.folded(f"{each.loop.name}: {each.kind}", 9, style.width() - _LEGEND_SYMBOL)
 
 
 def _off(angle: float) -> float:
@@ -139,6 +142,7 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     axis.axhspan(*GOOD, color=_BAND, linewidth=0, zorder=0, label=GOOD_WORDS)
     for end in GOOD:
         axis.axhline(end, color=style.GREEN, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
+    axis.axhline(BEST, color=style.GREEN, linewidth=1.4, zorder=1)
     for loop, (color, dashes) in zip(loops, _LOOKS, strict=False):
         axis.plot(x, loop.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(loop))
     worst = loops[0]
@@ -146,9 +150,9 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION
     axis.plot([worst.at], [worst.worst], "o", color=color, markersize=7, zorder=5, clip_on=False, label=words)
     axis.set_ylim(0, 180)
-    axis.set_yticks([0, GOOD[0], 90, GOOD[1], 180])
+    axis.set_yticks([0, GOOD[0], BEST, GOOD[1], 180])
     axis.set_ylabel("angle between coupler\nand output [deg]")
-    axis.set_title("90 deg is best; 0 and 180 deg pass no force", loc="left", fontsize=9.5)
+    axis.set_title(f"{BEST:g} deg is best; 0 and 180 deg pass no force", loc="left", fontsize=9.5)
 
 
 @quiet

@@ -17,6 +17,11 @@ class MotionView(View):
         """The solved poses and what makes some special."""
         return DrawnMotion.of(self.result)
 
+    def asks_for(self, picture: str) -> bool:
+        """Whether the study asks for a picture that is not always drawn."""
+        section = self.study.kinematics
+        return section is not None and picture in section.pictures
+
     @cached_property
     def sweep(self) -> Sweep:
         """The solved poses with the paths of their points."""

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
+from mechdesign.errors import counted
+from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.variables import Design, variables_of
 from mechdesign.report.figures import style
+from mechdesign.results import Table
 
 NAME_LETTERS = 14  # of a name in one line below an axis
+# Inches: beside the panels, above and below them, and between them.
+_LEFT, _RIGHT, _ABOVE, _BELOW, _ACROSS = 0.85, 0.2, 0.45, 0.55, 0.95
+_LEGEND_LINE = 0.19
+FEW = 1000  # so many designs have larger dots
+OUTLYING = 3.0  # ranges of the middle half of some values
 MAX_TICKS = 8  # of an axis with a number at each choice
 
 
@@ -49,6 +61,47 @@ def tick(axis: Axis, designs: Designs, name: str) -> bool:
     return variable.choices is not None
 
 
-def head(figure: Figure, words: str) -> None:
-    """A title above all panels."""
-    figure.suptitle(style.folded(words, 11.0, style.width() - 0.2), x=0.01, ha="left", fontsize=11)
+def sheet(
+    count: int, columns: int, tall: float, heading: str, *, left: float = _LEFT, right: float = _RIGHT,
+    above: float = _ABOVE, below: float = _BELOW, across: float = _ACROSS, down: float = 0.0, **shared: bool,
+) -> tuple[Figure, list[Axes]]:  # fmt: skip
+    """Panels of a height in rows under a heading; inches above the panels, below them, between columns and rows."""
+    words = style.folded(heading, 11.0, style.width() - 0.2)
+    above += style.line(11.0) * words.count("\n")
+    figure, axes = style.page(
+        count, columns, tall, left=left, right=right, top=above, bottom=below, across=across, down=down, **shared
+    )
+    figure.text(0.1 / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=11)
+    return figure, axes
+
+
+def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], columns: int) -> None:
+    """One legend below all panels, for which the page is made higher."""
+    rows = -(-len(labels) // columns)
+    lines = sum(max(label.count("\n") + 1 for label in labels[row::rows]) for row in range(rows))
+    style.grow(figure, below=_LEGEND_LINE * lines + 0.05)
+    figure.legend(handles, labels, loc="lower left", ncols=columns, borderaxespad=0.3)
+
+
+def usual(values: Floats, *, smallest: bool) -> Flags:
+    """Values that an axis shows: all, unless outliers on the worse side would take more than half of it.
+
+    These lie beyond three times the range of the middle half of the values from it [Tukey 1977].
+    """
+    worse = values if smallest else -values
+    low, high = np.quantile(worse, (0.25, 0.75))
+    near = worse <= high + OUTLYING * (high - low)
+    if np.ptp(worse) < 2 * np.ptp(worse[near]) or np.ptp(worse[near]) == 0:
+        return np.ones(len(values), dtype=bool)
+    return np.asarray(near)
+
+
+def outside(near: Flags) -> str:
+    """How many values an axis does not show."""
+    return f"{counted(int((~near).sum()), 'far worse design')} outside"
+
+
+def on_front(designs: Designs, front: Table) -> Ints:
+    """Rows of the designs whose goals are those of a front's designs."""
+    best = set(zip(*(front[goal.name].tolist() for goal in designs.goals), strict=True))
+    return np.flatnonzero([tuple(values) in best for values in designs.values.tolist()])

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.questions.optimize.figures.designs import head, value_text
+from mechdesign.questions.optimize.figures.designs import FEW, legend, sheet, value_text
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
@@ -20,7 +20,7 @@ from mechdesign.results import Table
 
 _FRONT_MARKS = "so^DvPX"
 _LONGEST_NAME = 22  # letters of a goal in one line along an axis of several panels
-_ROW = 3.2  # inches
+_ROW = 2.2  # inches
 
 
 @picture(DesignsView, "pareto", order=50)
@@ -31,21 +31,23 @@ def pareto_figure(view: DesignsView) -> Figure | None:
 
 def front_figure(designs: Designs, front: Table) -> Figure:
     """Every feasible design, those of the front, and the knee; a panel each pair of goals."""
-    panels = pairs(designs)
-    columns = 1 if style.narrow() else min(len(panels), 2)
-    rows = -(-len(panels) // columns)
-    figure = style.new_figure(4.8 if len(panels) == 1 else 0.8 + _ROW * rows)
-    for number, pair in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, number + 1)
+    shown = pairs(designs)
+    columns = 1 if style.narrow() else min(len(shown), 2)
+    rows = -(-len(shown) // columns)
+    low = style.narrow() or len(shown) > 1
+    lines = style.line(10.0) * 2 * low
+    figure, panels = sheet(
+        len(shown), columns, 3.3 if len(shown) == 1 else min(_ROW, 5.6 / rows),
+        f"Pareto front: {len(front)} of {int(designs.feasible.sum())} feasible designs", left=0.9 + lines,
+        above=0.62, below=0.55 + lines, across=0.9 + lines, down=0.85 + lines,
+    )  # fmt: skip
+    for axes, pair in zip(panels, shown, strict=True):
         _front(axes, designs, front, pair)
-        low = style.narrow() or len(panels) > 1
         for axis, goal in zip((axes.xaxis, axes.yaxis), pair, strict=True):
             axis.set_label_text(_goal_label(designs, designs.goals[goal], folded=low))
     handles, labels = figure.axes[0].get_legend_handles_labels()
     labels = [style.folded(words, 9.0, style.width() - 0.6) for words in labels]
-    figure.legend(handles, labels, loc="outside lower left", ncols=1 if len(labels) > 2 else fitting(labels))
-    number = int(designs.feasible.sum())
-    head(figure, f"Pareto front: {len(front)} of {number} feasible designs")
+    legend(figure, handles, labels, 1 if len(labels) > 2 else fitting(labels))
     return figure
 
 
@@ -57,7 +59,8 @@ def pairs(designs: Designs) -> list[tuple[int, int]]:
 def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) -> None:
     goals = [designs.goals[k] for k in pair]
     x, y = designs.values[designs.feasible][:, pair].T
-    axes.plot(x, y, ".", color=style.FAINT, markersize=3, alpha=0.5, markeredgewidth=0, label="feasible designs")
+    axes.plot(x, y, ".", color=style.FAINT, markersize=3 if len(x) > FEW else 5, alpha=0.6, markeredgewidth=0,
+              label="feasible designs")  # fmt: skip
     along, up = (np.asarray(front[goal.name], dtype=float) for goal in goals)
     order = np.argsort(along, kind="stable")
     # Between two designs of the front nothing is known to be better than the worse of the two.
@@ -99,14 +102,11 @@ def growth_figure(view: DesignsView) -> Figure | None:
     if view.front is None:
         return None
     growth = view.result.tables["hypervolume"]
-    figure = style.new_figure(3.2)
-    axes = figure.add_subplot()
+    words = f"Growth of the front: {100 * growth['growth'][-1]:.2g} % by the last tenth of the designs"
+    figure, (axes,) = sheet(1, 1, 2.2, words)
     axes.plot(growth["designs"], growth["hypervolume"], "o-", color=style.BLUE, markersize=4)
     axes.set_xlabel("designs evaluated")
     axes.set_ylabel("hypervolume of the front")
-    axes.set_title(
-        f"Growth of the front: {100 * growth['growth'][-1]:.2g} % by the last tenth of the designs", loc="left"
-    )
     axes.margins(x=0.02)
     return figure
 

@@ -115,14 +115,15 @@ def designs_figure(parts: Sequence[tuple[str, Shown, Result | None]]) -> Figure:
     count = len(parts)
     columns = 1 if style.narrow() else count
     wide = column_width(columns, _BESIDE)
-    window = fit(places, wide, _MAX_BESIDE if columns > 1 else 8.0 / count, 0.25)
     titles = [
-        style.folded(words.replace("\n", ", "), 8.5, window.width)
+        style.folded(words.replace("\n", ", "), 8.5, wide)
         if style.narrow()
-        else "\n".join(textwrap.fill(line, int(window.width * _LETTERS_AN_INCH)) for line in words.splitlines())
+        else "\n".join(textwrap.fill(line, int(wide * _LETTERS_AN_INCH)) for line in words.splitlines())
         for words, _, _ in parts
     ]
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
+    free = (style.tallest() - _BELOW - 2 * _LEGEND) / count - above
+    window = fit(places, wide, _MAX_BESIDE if columns > 1 else min(8.0 / count, free), 0.25)
     figure, grid = windows(window, sweeps[0].study.units.label("length"), count, columns, gap=_BESIDE, above=above,
                            below=_BELOW + _LEGEND)  # fmt: skip
     for axes, title, sweep, (_, _, motion) in zip(grid, titles, sweeps, parts, strict=True):

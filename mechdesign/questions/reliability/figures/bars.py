@@ -21,16 +21,23 @@ from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
 MAX_SOURCES = 16
+MIN_SOURCES = 3
 MAX_TOLERANCES = 20
 MAX_POSE_BARS = 4
 # Sobol' indices that differ from the first-order share by more than this part of the variance are marked.
 _SAME_SHARE = 0.01
+_SHARE = "share, to the first order"
+_NAMES = 0.4  # of the width, for names beside bars
 # Inches.
+_AROUND = 2.1  # above and below all panels
+_LEGEND = 0.35
+_LETTER = 0.072  # of a name
 _SOURCE_HEIGHT = 0.24
 _TOLERANCE_HEIGHT = 0.36  # of both bars
 _FAILURE_HEIGHT = 0.75
 _FAILURE_ROOM = 1.4
-_PANEL_GAP = 0.94
+_BEFORE_FAILURE = 1.1
+_PANEL_GAP = 0.5
 _ACROSS = 0.3
 _MIN_WIDTH = 1.9  # of a panel
 
@@ -55,7 +62,23 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     blocks = [table.take(table.where(output=output, order=order)) for output, order in pairs]
     bars = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, each) for block in blocks]
     largest = np.max([np.nan_to_num(bar).mean(axis=0) for bar in bars], axis=0)
-    ranked = np.argsort(-largest, kind="stable")[:MAX_SOURCES]
+    names, margin, lines = _beside(names)
+    columns = max(
+        1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.width() - margin) / (_ACROSS + _MIN_WIDTH)))
+    )
+    bar = max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06, style.line(10.0) * lines)
+    free = style.tallest() - _AROUND + _PANEL_GAP
+    rows = -(-len(pairs) // columns)
+    # Where a page does not hold all panels with a few bars each, the last are left out.
+    while rows > 1 and rows * (_PANEL_GAP + (0.15 + min(MIN_SOURCES, len(names))) * bar) > free:
+        rows -= 1
+    held = rows * columns
+    left_out = len(pairs[held:])
+    pairs, blocks, bars = pairs[:held], blocks[:held], bars[:held]
+    most = MAX_SOURCES
+    while most > MIN_SOURCES and rows * (_PANEL_GAP + (0.15 + most) * bar) > free:
+        most -= 1
+    ranked = np.argsort(-largest, kind="stable")[:most]
     where = "" if each and poses.count > 1 else f"average over {poses.count} poses"
     if sobol is not None or poses.count == 1:
         section, pose = study.reliability, sobol or 0
@@ -65,24 +88,20 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     notes = []
     if any((bar < -1.0).any() for bar in bars):
         notes.append("correlated sources make up for each other: negative shares, and others above 100 %")
-    elif sobol is not None:
-        notes.append(f"Sobol indices that differ by less than {100 * _SAME_SHARE:g} % are not marked")
-        if not np.isfinite(table["sobol_total"].reshape(poses.count, -1)[sobol]).all():
-            notes.append("correlated sources have none")
-    margin = 0.3 + 0.072 * max(len(names[k]) for k in ranked)
-    columns = max(
-        1, min(len(pairs), 3 if len(names) < 9 else 2, int((style.width() - margin) / (_ACROSS + _MIN_WIDTH)))
-    )
-    tall = (0.15 + len(ranked)) * max(_SOURCE_HEIGHT, 0.1 * len(bars[0]) + 0.06)
+    if left_out:
+        notes.append(f"the first {len(pairs)} of {len(pairs) + left_out} errors")
+    if len(ranked) < len(names):
+        notes.append(f"the {len(ranked)} largest of {len(names)} sources")
+    tall = (0.15 + len(ranked)) * bar
     figure, grid = style.page(
-        len(pairs), columns, tall, left=margin, right=0.2, top=0.75 + 0.2 * bool(notes), bottom=0.95, across=_ACROSS,
-        down=_PANEL_GAP, sharey=True,
+        len(pairs), columns, tall, left=margin, right=0.2, top=0.95, bottom=0.6, across=_ACROSS,
+        down=_PANEL_GAP, sharex=True, sharey=True,
     )  # fmt: skip
     entries: dict[str, Any] = {}
     for k, (axis, block, shown) in enumerate(zip(grid, blocks, bars, strict=True)):
         for place, values in enumerate(shown[:, ranked]):
             height = 0.8 / len(shown)
-            label = pose_in_words(study, poses, place) if len(shown) > 1 else "share, to the first order"
+            label = pose_in_words(study, poses, place) if len(shown) > 1 else _SHARE
             look: dict[str, Any] = {"color": style.PALETTE[place % len(style.PALETTE)]}
             if hatch := style.HATCHES[place % len(style.HATCHES)]:
                 look |= {"hatch": hatch, "edgecolor": "white", "linewidth": 0}
@@ -95,9 +114,27 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         _name(axis, [names[k] for k in ranked])
         axis.set_title(heading(*pairs[k]), loc="left", fontsize=9.5)
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
+    low = min(0.0, *(float(np.nanmin(shown)) for shown in bars)) if any((bar < -1.0).any() for bar in bars) else 0.0
+    high = max(float(np.nanmax(shown, initial=1.0)) for shown in bars)
+    grid[0].set_xlim(1.25 * low, 1.25 * high)
+    if list(entries) != [_SHARE]:
+        style.grow(figure, below=_LEGEND)
+        legend_below(figure, list(entries.values()), list(entries))
+    elif sobol is None:
+        notes.append("shares to the first order")
+    else:
+        notes.append(
+            f"shares to the first order; Sobol indices agree within {100 * _SAME_SHARE:g} % or their intervals"
+        )
     title(figure, "Where the variance of the error comes from", where, "; ".join(notes), left=margin)
-    legend_below(figure, list(entries.values()), list(entries))
     return figure
+
+
+def _beside(names: Sequence[str]) -> tuple[list[str], float, int]:
+    """Names beside bars in lines, the inches that they need, and how many lines the longest has."""
+    folded = [style.folded(name, 10.0, _NAMES * style.width()) for name in names]
+    lines = [line for name in folded for line in name.split("\n")]
+    return folded, 0.3 + _LETTER * max(map(len, lines)), max(name.count("\n") for name in folded) + 1
 
 
 def _sobol_pose(table: Table, poses: Poses, worst: int) -> int | None:
@@ -135,8 +172,6 @@ def _name(axis: Axes, names: list[str]) -> None:
     axis.tick_params(axis="y", length=0)
     axis.set_yticks(np.arange(len(names)), names)
     axis.set_ylim(len(names) - 0.42, -0.58)
-    axis.margins(x=0.25)
-    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]) if axis.dataLim.x0 < -1.0 else 0.0)
 
 
 @picture(ErrorsView, "allocation", order=60)
@@ -155,9 +190,11 @@ def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
     table = table.take(np.arange(len(table))[:MAX_TOLERANCES])
     names = [f"{row['source']}" + f" ({row['kind']})" * (row["kind"] != "tolerance") for row in table]
     units = table["unit"].tolist()
-    margin = 0.35 + 0.075 * max(10, *(len(name) for name in names))
+    names, margin, lines = _beside(names)
+    margin = max(margin, _BEFORE_FAILURE)
+    tall = max(_TOLERANCE_HEIGHT, style.line(10.0) * lines) * len(table)
     figure, (one, two) = style.page(
-        2, 2, _TOLERANCE_HEIGHT * len(table), left=margin, right=0.2, top=0.8, bottom=_FAILURE_ROOM + 1.05,
+        2, 2, tall, left=margin, right=0.2, top=0.8, bottom=_FAILURE_ROOM + 1.05,
         across=0.45 * (style.width() - margin - 0.2) / 2.45, sharey=True,
     )  # fmt: skip
     alike, given, allocated = len(set(units)) == 1, table["given"], table["allocated"]

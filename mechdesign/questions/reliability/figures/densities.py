@@ -1,4 +1,4 @@
-"""Joint density of two errors of made mechanisms: regions of given shares beside ellipses, and surfaces [S2]."""
+"""Joint density of two errors of made mechanisms: regions of given shares beside ellipses [S2]."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.reliability.figures.view import ErrorsView
-from mechdesign.questions.reliability.simulation import CELLS, REACH
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import Sampled, heading, look
 from mechdesign.report.figures.panels import title
@@ -43,24 +42,17 @@ _BEYOND = "#FBEDE4"  # where a limit is broken
 Ends = tuple[float, float]
 
 
-@picture(ErrorsView, "density_contours", "density", order=80)
-def density_figures(view: ErrorsView) -> dict[str, Figure] | None:
-    """``density_contours``, in the errors' units, and ``density``: both densities as surfaces [S2, Fig. 5]."""
+@picture(ErrorsView, "density_contours", order=80)
+def density_figure(view: ErrorsView) -> Figure | None:
+    """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
     given = view.sampled("density")
     if given is None:
         return None
-    assert given.samples.pair is not None
-    labels = [
-        style.axis_label(f"{heading(given.samples.outputs[k], given.samples.orders[k])} error", given.samples.units[k])
-        for k in given.samples.pair
-    ]
-    return {"density_contours": _contours(given, labels), "density": _surfaces(given, labels)}
-
-
-def _contours(given: Sampled, labels: list[str]) -> Figure:
-    """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
     samples = given.samples
-    pair = list(samples.pair or ())
+    assert samples.pair is not None
+    labels = [style.axis_label(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k])
+              for k in samples.pair]  # fmt: skip
+    pair = list(samples.pair)
     errors, units = samples.errors[pair], samples.units[pair]
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
     limits = _Limits.of(given, ellipses[-1])
@@ -232,41 +224,6 @@ def _view(parts: Sequence[Floats], alike: bool) -> tuple[Ends, Ends, float]:
         span = max(span[0] / wide, span[1] / tall) * np.array([wide, tall])
     (left, bottom), (right, top) = middle - span / 2, middle + span / 2
     return (left, right), (bottom, top), tall
-
-
-def _surfaces(given: Sampled, labels: list[str]) -> Figure:
-    """Both densities over the cells of the density's table [S2, Fig. 5]."""
-    samples, table = given.samples, given.tables["density"].take(given.rows("density"))
-    shape = (2, 1) if style.narrow() else (1, 2)
-    figure = style.new_figure(1.0 + 3.2 * shape[0], layout=None)
-    figure.subplots_adjust(
-        left=0.02, right=0.82 if style.narrow() else 0.92, bottom=0.08, top=0.8, wspace=0.15, hspace=0.3
-    )
-    x, y = (
-        (samples.mean[k] + np.sqrt(samples.covariance[k, k]) * table[axis]).reshape(CELLS, CELLS)
-        for k, axis in zip(samples.pair or (), "xy", strict=True)
-    )
-    densities = {
-        "bivariate normal, first order": table["normal"].reshape(CELLS, CELLS),
-        f"simulation ({look(given.method).words})": table["simulated"].reshape(CELLS, CELLS),
-    }
-    top = max(density.max() for density in densities.values())
-    panels = figure.subplots(*shape, subplot_kw={"projection": "3d"})
-    for axes, (name, density) in zip(panels, densities.items(), strict=True):
-        axes.plot_surface(
-            x, y, density, rstride=1, cstride=1, cmap=style.COLORMAP, edgecolor=style.INK, linewidth=0.25, vmax=top
-        )
-        axes.set_title(name, fontsize=10)
-        axes.set_zlim(0, top)
-        axes.set_xlabel(labels[0], labelpad=6)
-        axes.set_ylabel(labels[1], labelpad=6)
-        axes.set_zlabel("density of standardised errors", labelpad=4)
-        axes.tick_params(labelsize=7)
-        axes.locator_params(nbins=5)
-        axes.view_init(elev=28, azim=-60)
-    note = f"{CELLS} x {CELLS} cells within {REACH:g} standard deviations of the mean, samples as counted"
-    title(figure, f"Density of two errors {given.where}", note, left=_LEFT)
-    return figure
 
 
 def _percent(share: float) -> str:

@@ -25,8 +25,6 @@ from mechdesign.report.figures.looks import (
     methods,
 )
 from mechdesign.report.figures.panels import (
-    BELOW_BARE,
-    BELOW_WITH_LEGEND,
     MAX_PANELS,
     Along,
     clear_of_ticks,
@@ -61,19 +59,13 @@ _MAX_LINEAR_RATIO = 8.0
 Legend = dict[str, Any]
 
 
-@picture(ErrorsView, "bands", "means", "deviations", "difference", order=10)
+@picture(ErrorsView, "bands", "deviations", order=10)
 def sweep_figures(view: ErrorsView) -> dict[str, Figure] | None:
-    """Bands of the errors, means, standard deviations and the methods' difference over the sweep [S3, Figs. 5 to 7]."""
+    """Bands of the errors and standard deviations over the sweep, with the difference of the methods [S3]."""
     study, tables, swept = view.study, view.result.tables, view.swept
     if swept is None:
         return None
-    moments, made = tables["moments"], {"bands": _bands(study, tables, swept)}
-    for name, column, what in (("means", "mean", "Mean"), ("deviations", "sigma", "Standard deviation")):
-        made[name] = _curves(moments, swept, column, f"{what} of made mechanisms")
-    reference, computed = best_moments(moments), [m for m in methods(moments) if not look(m).sampled]
-    if look(reference).sampled and computed:
-        made["difference"] = _difference(moments, swept, reference, computed)
-    return made
+    return {"bands": _bands(study, tables, swept), "deviations": _deviations(tables["moments"], swept)}
 
 
 def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
@@ -99,7 +91,9 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
                 axis.plot(swept.values, mean, color=drawn.color, linewidth=1.2)
                 continue
             for value in (mean - reach, mean, mean + reach):
-                (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, **_line(drawn))
+                every = max(1, len(value) // _most_dots())
+                (entries[drawn.words],) = axis.plot(swept.values, value, linewidth=1.2, markersize=2.8, markevery=every,
+                                                    **_line(drawn))  # fmt: skip
         reach = _FAR_FROM_ERRORS * np.abs(axis.get_ylim()).max()
         far = []
         for limit in np.broadcast_to(error_limits(study, tables, output, order), (2, len(swept.values))):
@@ -120,24 +114,32 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
     return figure
 
 
-def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
+def _deviations(moments: Table, swept: Along) -> Figure:
     """A panel for each order and unit; outputs by colour, methods by dashes or dots."""
     panels, known = _grouped(moments), methods(moments)
-    figure, axes = stack(len(panels), heading, swept.label)
+    reference, computed = best_moments(moments), [method for method in known if not look(method).sampled]
+    compared = computed if look(reference).sampled else []
+    note = f"in brackets: difference from {look(reference).words} on average" if compared else ""
+    figure, axes = stack(len(panels), "Standard deviation of made mechanisms", swept.label, note=note)
     tick_abscissa(axes[-1], swept)
     single = all(len(outputs) == 1 for _, _, outputs in panels)
     for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
+        named = []
         for output, color, mark in zip(outputs, style.PALETTE, _MARKS, strict=False):
-            for method in known:
-                rows = moments.where(output=output, order=order, unit=unit, method=method)
+            sigma = {
+                method: moments["sigma"][moments.where(output=output, order=order, unit=unit, method=method)]
+                for method in known
+            }
+            for method, values in sigma.items():
                 shown = _line(look(method)) | ({} if single else {"color": color})
                 if not single and not look(method).sampled:
                     shown |= {"marker": mark, "markersize": 6, "markevery": max(len(swept.values) // 8, 1)}
-                axis.plot(swept.values, moments[column][rows], **({"markersize": 3.2} | shown))
-        _name_outputs(axis, outputs, [style.INK] if single else style.PALETTE)
+                axis.plot(swept.values, values, **({"markersize": 3.2} | shown))
+            apart = [_apart(sigma[method], sigma[reference]) for method in compared]
+            named.append(f"{output} ({', '.join(apart)})" if apart else output)
+        _name_outputs(axis, named, [style.INK] if single else style.PALETTE)
         axis.set_ylabel(style.axis_label(order, unit))
-        if column == "sigma":
-            axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
+        axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
     looks = [_line(look(method)) | ({} if single else {"color": style.INK}) for method in known]
     legend_below(figure, [Line2D([], [], markersize=4, **shown) for shown in looks],
                  [look(method).words for method in known])  # fmt: skip
@@ -145,41 +147,21 @@ def _curves(moments: Table, swept: Along, column: str, heading: str) -> Figure:
     return figure
 
 
+def _apart(computed: Floats, simulated: Floats) -> str:
+    """By how much deviations differ from simulated ones on average, in per cent of these."""
+    known = np.isfinite(computed) & (simulated > 0)
+    return f"{100.0 * np.mean(np.abs(computed[known] / simulated[known] - 1.0)):.2g} %" if known.any() else "unknown"
+
+
+def _most_dots() -> int:
+    """Simulated poses of a sweep that can be told apart."""
+    return 36 if style.narrow() else 80
+
+
 def _line(drawn: Method) -> dict[str, Any]:
     """Dashes of what is computed, markers of what is simulated."""
     dashes, marker = ("None", drawn.marker) if drawn.sampled else (drawn.dashes, "")
     return {"color": drawn.color, "linestyle": dashes, "marker": marker}
-
-
-def _difference(moments: Table, swept: Along, reference: str, computed: Sequence[str]) -> Figure:
-    """Standard deviations of the computed methods, in per cent of the simulated ones, and how far apart on average."""
-    panels = _grouped(moments)
-    figure, axes = stack(
-        len(panels), f"Standard deviation less that of {look(reference).words}, in per cent of it", swept.label,
-        note="in brackets: how far apart on average", bottom=BELOW_WITH_LEGEND if len(computed) > 1 else BELOW_BARE,
-    )  # fmt: skip
-    tick_abscissa(axes[-1], swept)
-    for axis, (order, unit, outputs) in zip(axes, panels, strict=True):
-        axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
-        named = []
-        for output, color, mark in zip(outputs, style.PALETTE, _MARKS if len(outputs) > 1 else ".", strict=False):
-            true = moments["sigma"][moments.where(output=output, order=order, unit=unit, method=reference)]
-            apart = []
-            for method in computed:
-                rows = moments.where(output=output, order=order, unit=unit, method=method)
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    percent = 100.0 * (moments["sigma"][rows] / true - 1.0)
-                mean = np.nanmean(np.abs(percent)) if np.isfinite(percent).any() else np.nan
-                apart.append(f"{mean:.2f} %")
-                axis.plot(swept.values, percent, look(method).dashes, marker=mark, markersize=4, linewidth=1.2,
-                          color=color, markevery=max(len(percent) // 24, 1) if len(outputs) > 1 else None)  # fmt: skip
-            named.append(f"{output} ({', '.join(apart)})")
-        axis.set_ylabel(f"{order} [%]")
-        _name_outputs(axis, named, style.PALETTE)
-    if len(computed) > 1:
-        handles = [Line2D([], [], color=style.INK, ls=look(m).dashes, marker=".") for m in computed]
-        legend_below(figure, handles, [look(method).words for method in computed])
-    return figure
 
 
 def _name_outputs(axis: Axes, outputs: Sequence[str], colors: Sequence[str]) -> None:

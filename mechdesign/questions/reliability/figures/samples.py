@@ -24,6 +24,8 @@ _BINS = 60
 _MAX_LINEAR_SAMPLES = 400_000
 _MAX_LINEAR_RATIO = 50.0
 _DASHED = (0, (5, 2))
+_TICK = 0.65  # inches from one number along x to the next
+_AROUND = 2.6  # inches above and below all panels, with a legend of several rows
 
 
 class _Histogram(NamedTuple):
@@ -45,12 +47,15 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
     if given is None:
         return None
     shown = _histograms(given)
-    columns = 1 if style.narrow() else min(len(shown), 2 if len(shown) == 4 else 3)
+    columns = min(len(shown), 2 if style.narrow() or len(shown) == 4 else 3)
+    if style.narrow() and len(shown) < 3:
+        columns = 1
     blocks = [shown[k : k + columns] for k in range(0, len(shown), columns)]
+    down, rows = 0.5 if len(blocks) == 1 else 0.85 if style.narrow() else 0.68, 2 * len(blocks)
+    tall = min(1.75, (style.tallest() - _AROUND + down) / rows - down)
     figure, grid = style.page(
-        2 * columns * len(blocks), columns, 1.75, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75,
-        down=0.5 if len(blocks) == 1 else 0.68,
-    )  # fmt: skip
+        columns * rows, columns, tall, left=0.8, right=0.15, top=0.95, bottom=0.95, across=0.75, down=down
+    )
     entries: dict[str, Any] = {}
     for place, block in enumerate(blocks):
         for column in range(columns):
@@ -61,7 +66,10 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
                 continue
             for axis, logarithmic in zip(pair, (False, True), strict=True):
                 _histogram(axis, block[column], entries, logarithmic=logarithmic)
-            pair[0].set_title(block[column].name, loc="left", fontsize=9.5)
+            room = pair[0].get_position().width * style.width()
+            pair[0].set_title(style.folded(block[column].name, 9.5, room), loc="left", fontsize=9.5)
+            for axis in pair:
+                axis.locator_params(axis="x", nbins=max(1, min(4, int(room / _TICK))))
             pair[1].set_xlabel(style.axis_label("error", block[column].unit))
     kept, samples = given.samples.kept, given.samples.errors.shape[1]
     note = f"{look(given.method).words}, {samples:,} samples"
@@ -127,7 +135,6 @@ def _histogram(axis: Axes, shown: _Histogram, entries: dict[str, Any], *, logari
         axis.text(0.99, 0.98, f"limit {beyond} {unit}, outside", transform=axis.transAxes, ha="right", va="top",
                   fontsize=8, color=style.VERMILION)  # fmt: skip
     axis.set_ylabel(style.axis_label("density", f"1/({unit})" if "/" in unit else f"1/{unit}" if unit else ""))
-    axis.locator_params(axis="x", nbins=4)
 
 
 def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) -> list[float]:
@@ -145,26 +152,29 @@ def _limits(axis: Axes, limits: tuple[float, float], entries: dict[str, Any]) ->
 
 @picture(ErrorsView, "convergence", order=90)
 def convergence_figure(view: ErrorsView) -> Figure | None:
-    """Mean of the simulation against the number of samples, within three standard errors of its end [S3, Fig. 4]."""
+    """Mean error of the simulation against the number of samples, within three standard errors of its end [S3, Fig. 4].
+
+    Not the mean itself: beside large dimensions its changes are lost.
+    """
     given = view.sampled("convergence")
     if given is None:
         return None
     table, moments = given.tables["convergence"], given.tables["moments"]
     shown = channels(table)[:MAX_PANELS]
-    figure, axes = stack(len(shown), "Mean of made mechanisms as samples are added", "samples",
+    figure, axes = stack(len(shown), "Mean error of made mechanisms as samples are added", "samples",
                          note=f"{given.where}; {look(given.method).words}")  # fmt: skip
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         rows = table.where(output=output, order=order, unit=unit)
-        samples, mean = table["samples"][rows], table["mean"][rows]
         row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=given.method))[
             given.samples.pose
         ]
+        samples, mean = table["samples"][rows], table["mean"][rows] - moments["nominal"][row]
         band = 3.0 * moments["sigma"][row] / np.sqrt(samples)
-        final = moments["mean"][row]
+        final = moments["mean"][row] - moments["nominal"][row]
         axis.fill_between(samples, final - band, final + band, color=style.SKY, alpha=0.3, linewidth=0,
                           label="three standard errors")  # fmt: skip
         axis.plot(samples, mean, color=style.BLUE, marker="." if len(samples) == 1 else "", label="mean")
-        axis.axhline(moments["nominal"][row], color=style.INK, linestyle="--", linewidth=1.0, label="nominal")
+        axis.axhline(0.0, color=style.INK, linestyle="--", linewidth=1.0, label="no error")
         axis.set_ylabel(style.axis_label(output if order == "position" else f"{output}\n{order}", unit))
     _sample_axis(axes[-1], table["samples"])
     legend_below(figure, *axes[0].get_legend_handles_labels())

@@ -107,8 +107,8 @@ class ReliabilitySection(MotionSection):
     """
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
     """What errors may be in each pose, by coordinate, measure or point; of velocities and accelerations C.x_velocity
-    and so on; of efforts and forces by the column of dynamics (theta_effort, shaking, A_force). The reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]}
-    Example: {P: {radius: 0.05}}
+    and so on; of efforts and forces by the column of dynamics (theta_effort, shaking, A_force). The reliability is the
+    chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]} Example: {P: {radius: 0.05}}
     """
     load: tuple[fields.Number, ...] | None = None
     """Mean load [fx, fy, mz] on the stiffness section's point, whose deflection is part of the errors; it varies by
@@ -266,7 +266,8 @@ def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[
     dynamics: DynamicsSection | None = checker.parts.get("dynamics")
     joints = (dynamics or DynamicsSection()).joints(compiled)
     pace = pace_of(section, dynamics, checker.parts.get("kinematics"))
-    elsewhere = pace.of_given(compiled.drives) and source_of(checker, pace) is not source_of(checker, section)
+    own = pace.motion is not None or pace.of_given(compiled.drives)
+    elsewhere = own and source_of(checker, pace) is not source_of(checker, section)
     still = column_kinds(compiled, joints, moving=False)
     kinds = {
         name: kind for name, kind in column_kinds(compiled, joints, moving=True).items()
@@ -279,7 +280,7 @@ def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[
         if dynamics is None and checker.reporter.raw(("dynamics",)) is None:
             example = "dynamics: {gravity: [0, -9.81 m/s^2]}"
             message = f"{name!r} is a column of dynamics, and the study has no such section; add one, such as {example}"
-        elif name not in still and not pace.paced:
+        elif name not in still and not pace.rated:
             message = f"{name!r} needs velocities: give 'rates' of the drives"
         elif elsewhere:
             message = (
@@ -295,7 +296,7 @@ def pace_of(
     section: ReliabilitySection, dynamics: DynamicsSection | None, kinematics: KinematicsSection | None
 ) -> MotionSection:
     """The section whose rates the mechanism has: its own, else those that dynamics has or takes from kinematics."""
-    if section.paced or dynamics is None:
+    if section.rated or dynamics is None:
         return section
     return dynamics if dynamics.moves or kinematics is None else kinematics
 
@@ -314,8 +315,8 @@ def _limit(
     known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
     name = split_link(mechanism, name)[1]
     base, order = split_order(name, known.__contains__)
-    if order and not section.paced:
-        report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
+    if order and not section.rated:
+        report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])

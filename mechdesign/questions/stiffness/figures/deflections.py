@@ -24,7 +24,7 @@ from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
-from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, RIGHT, fit, windows
+from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
 from mechdesign.report.figures.panels import legend_at_left, quantity, round_down
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.scene import Scene, hull, pose
@@ -32,7 +32,9 @@ from mechdesign.report.figures.shapes import ARC, arc, force
 from mechdesign.study import Study
 
 MAX_LOADS = 4
-MAX_DIRECTIONS = 4  # poses
+# Poses, and those that a column of a journal holds.
+MAX_DIRECTIONS = 4
+MAX_NARROW_DIRECTIONS = 3
 _MAX_TICKS = 6  # below a panel
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
@@ -105,11 +107,13 @@ def _panels(
     """Drawings of one scale, two in a row, under a heading, with room for titles of some lines and a legend."""
     columns = 1 if style.narrow() else min(count, 2)
     heading = style.folded(heading[0].upper() + heading[1:], 11.0, style.width() - LEFT - RIGHT)
-    # All of them on a page of paper.
-    tall = MAX_HEIGHT if count == 1 else min(3.2, 8.0 * columns / count)
-    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, tall)
     above = _PANEL_TITLE * lines + ABOVE
     top = _HEADING + style.line(11.0) * heading.count("\n")
+    # All of them on a page of paper.
+    rows = -(-count // columns)
+    room = (style.tallest() - top - BELOW - 2 * _LEGEND) / rows - above
+    tall = min(MAX_HEIGHT if count == 1 else min(3.2, 8.0 / rows), room)
+    window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, tall, min(PAD, 0.3 * tall))
     figure, axes = windows(window, study.units.label("length"), count, columns, above=above, top=top,
                            below=BELOW + _LEGEND)  # fmt: skip
     figure.text(LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), heading, va="top", fontsize=11)
@@ -196,7 +200,8 @@ def directions_figure(view: StiffnessView) -> Figure | None:
     table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
     assert section is not None
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
-    some = np.unique(np.linspace(0, len(index) - 1, min(MAX_DIRECTIONS, len(index))).astype(int))
+    most = MAX_DIRECTIONS if not style.narrow() else MAX_NARROW_DIRECTIONS
+    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).astype(int))
     posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
     scenes = {k: scene for k, scene in posed.items() if scene is not None}
     if not scenes:
@@ -217,7 +222,7 @@ def directions_figure(view: StiffnessView) -> Figure | None:
               for scene, ellipse in zip(scenes.values(), ellipses, strict=True)]  # fmt: skip
     words = f"{force:g} {style.printed(study.units.label('force'))}"
     heading = f"ellipse: where a force of {words} in any direction moves {section.at}"
-    wide = (style.width() - RIGHT) / min(len(scenes), 2) - LEFT
+    wide = (style.width() - RIGHT) / (1 if style.narrow() else min(len(scenes), 2)) - LEFT
     # Broken between coordinates only.
     named = [re.sub("(?<!,) ", "\N{NO-BREAK SPACE}", pose_in_words(study, shown.poses, int(row), 4)) for row in rows]
     where = [textwrap.fill(words, int(wide * _LETTERS_AN_INCH)) for words in named]

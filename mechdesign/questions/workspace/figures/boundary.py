@@ -13,11 +13,23 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.numerics.arrays import Complexes
+from mechdesign.numerics.arrays import Complexes, evenly
 from mechdesign.questions.poses import in_study_units, radians
 from mechdesign.questions.workspace.drawn import DrawnRegion
-from mechdesign.questions.workspace.figures.regions import ROOM, Region, fill, lines, pieces, places, sheet, some
+from mechdesign.questions.workspace.figures.regions import (
+    ROOM,
+    Region,
+    fill,
+    left_out,
+    lines,
+    panel_titles,
+    pieces,
+    places,
+    sheet,
+    some,
+)
 from mechdesign.questions.workspace.figures.view import WorkspaceView
+from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -26,15 +38,16 @@ from mechdesign.report.figures.labels import HALO
 from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
 from mechdesign.report.figures.panels import MAX_PANELS, Along, legend_below, stack, tick_abscissa
 from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
 from mechdesign.study import Study
 
-CIRCLE = ("circle_x", "circle_y", "circle_radius")
-RECTANGLE = ("rectangle_x", "rectangle_y", "rectangle_width", "rectangle_height")
 SIDES = ("inner", "outer")
 # Of the drives.
 LINE_COLORS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1)), (0, (6, 1, 1.5, 1)), (0, (2, 1)))
 _DRIVES_HEIGHT = 1.9  # inches, of a panel
+_DRIVES_BESIDE = 1.2  # inches beside it
+_TOGETHER = 0.09  # of its height, between limits whose names do not touch
 _SMALL_SYMBOLS = 0.7
 
 
@@ -73,7 +86,7 @@ def boundary_figure(view: WorkspaceView) -> Figure | None:
 
 def side_by_side(study: Study, regions: Sequence[Region], before: Before | None) -> Figure:
     """The region and its boundary for several values of held coordinates, each with the mechanism in a pose there."""
-    title = "the mechanism where it is best conditioned"
+    title = f"the mechanism where it is best conditioned{left_out(regions)}"
     return regions_figure([(region.title, study, region) for region in some(regions)], title, before)
 
 
@@ -115,50 +128,71 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
 def inscribed_figure(view: WorkspaceView) -> Figure | None:
     """The regions with the shapes that their row of indices gives; None where it gives none."""
     study, table = view.study, view.result.tables["indices"]
-    if not view.regions or not any(name in table for name in (*CIRCLE, *RECTANGLE)):
+    if not view.regions or INSCRIBED[0] not in table:
         return None
-    shown = some(view.regions)
+    shown, unit = some(view.regions), study.units.label("length")
     places = np.concatenate([region.places() for region in shown])
-    page = sheet(study, places, [region.title for region in shown], "largest circle and rectangle in the workspace",
-                 bar=False)  # fmt: skip
-    unit = study.units.label("length")
-    size = 9 if len(shown) == 1 else 7.5
-    for axes, region in zip(page.axes, shown, strict=True):
+    found = [_inscribed(table, region, unit) for region in shown]
+    # In small panels the sizes would lie over each other.
+    titles = [region.title for region in shown]
+    if len(shown) > 1:
+        titles = ["\n".join([title, *(words for *_, words in shapes)])
+                  for title, shapes in zip(titles, found, strict=True)]  # fmt: skip
+    title = f"largest circle and rectangle in the workspace{left_out(view.regions)}"
+    page = sheet(study, places, titles, title, bar=False)
+    for axes, region, shapes in zip(page.axes, shown, found, strict=True):
         fill(axes, region.local)
-        shapes: list[tuple[Patch, tuple[float, float], str, str]] = []
-        if CIRCLE[0] in table:
-            x, y, radius = (float(table[name][region.row]) for name in CIRCLE)
-            shapes.append((Circle((x, y), radius), (x, y), f"r = {radius:.4g}", style.BLUE))
-            axes.plot(x, y, "+", color=style.BLUE, zorder=4)
-        if RECTANGLE[0] in table:
-            x, y, width, height = (float(table[name][region.row]) for name in RECTANGLE)
-            corner = (x - width / 2, y - height / 2)
-            shapes.append((Rectangle(corner, width, height), corner, f"{width:.4g} x {height:.4g}", style.GREEN))
-        for shape, place, words, color in shapes:
-            if np.isfinite(place).all():
-                shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)
-                axes.add_patch(shape)
-                axes.annotate(f"{words} {unit}".strip(), place, (4, 4), textcoords="offset points", color=color,
-                              fontsize=size, zorder=5, path_effects=HALO)  # fmt: skip
+        for shape, place, color, words in shapes:
+            shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)
+            axes.add_patch(shape)
+            if len(shown) == 1:
+                axes.annotate(words, place, (4, 4), textcoords="offset points", color=color, fontsize=9, zorder=5,
+                              path_effects=HALO)  # fmt: skip
     page.ends(shown)
     return page.figure
+
+
+def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, tuple[float, float], str, str]]:
+    """The shapes of a region that were found: each with a place in it, its colour and its size in words.
+
+    Those that a singularity crosses are dotted.
+    """
+    x, y, radius, middle_x, middle_y, width, height = (float(table[name][region.row]) for name in INSCRIBED)
+    corner = (middle_x - width / 2, middle_y - height / 2)
+    shapes: dict[str, tuple[Patch, tuple[float, float], str, str]] = {
+        "circle": (Circle((x, y), radius), (x, y), style.BLUE, f"r = {radius:.4g} {unit}"),
+        "rectangle": (Rectangle(corner, width, height), corner, style.GREEN, f"{width:.4g} x {height:.4g} {unit}"),
+    }
+    singular = places(region.singularities) if region.singularities is not None else np.zeros(0, dtype=complex)
+    cut = crossed(np.array([x, y, radius, middle_x, middle_y, width, height]), singular)
+    made = []
+    for name, (shape, place, color, words) in shapes.items():
+        if np.isfinite(place).all():
+            shape.set_linestyle(":" if name in cut else "-")
+            made.append((shape, place, color, words.strip() + ", a singularity inside" * (name in cut)))
+    return made
 
 
 @picture(WorkspaceView, "drives", order=60)
 def drives_figure(view: WorkspaceView) -> Figure | None:
     """Drive values along the boundary over the angle of the scan [S1, Fig. 7]: a panel a side of each region."""
     study, mechanism = view.study, view.study.mechanism
-    parts = [
+    every = [
         (region.boundary, side, region.title)
-        for region in some([region for region in view.regions if len(region.boundary)])
+        for region in view.regions
         for side in SIDES
         if (region.boundary["side"] == side).any()
-    ][:MAX_PANELS]
-    if not parts:
+    ]
+    if not every:
         return None
-    names = mechanism.drives
+    names, parts = mechanism.drives, [every[k] for k in evenly(len(every), MAX_PANELS)]
     label = style.axis_label("angle of the ray from the centre of the scan", study.units.label("angle"))
-    figure, panels = stack(len(parts), "Drives along the boundary of the workspace", label, tall=_DRIVES_HEIGHT)
+    words = [", ".join(filter(None, (where, f"{side} boundary"))) for _, side, where in parts]
+    titles, held = panel_titles(words, style.width() - _DRIVES_BESIDE, 1)
+    notes = [f"panels: values of {held}"] * bool(held)
+    notes += [f"{len(parts)} of {len(every)} boundaries"] * (len(every) > len(parts))
+    heading = "Drives along the boundary of the workspace"
+    figure, panels = stack(len(parts), heading, label, note="; ".join(notes), tall=_DRIVES_HEIGHT)
     units = {study.units.label(mechanism.quantity(name)) for name in names}
     limits: dict[float, list[str]] = {}
     for bound in mechanism.bounds:
@@ -167,7 +201,7 @@ def drives_figure(view: WorkspaceView) -> Figure | None:
                 value = round(float(np.asarray(in_study_units(study, bound.coordinate, end))), 9)
                 limits.setdefault(value, []).append(bound.coordinate.name)
     entries: dict[str, Line2D] = {}
-    for axes, (boundary, side, where) in zip(panels, parts, strict=True):
+    for axes, (boundary, side, _), title in zip(panels, parts, titles, strict=True):
         for number, name in enumerate(names):
             for rows in curves(boundary):
                 if boundary["side"][rows[0]] != side:
@@ -175,17 +209,29 @@ def drives_figure(view: WorkspaceView) -> Figure | None:
                 own = boundary.take(rows)
                 (entries[name],) = axes.plot(own["theta"], own[name], color=LINE_COLORS[number % len(LINE_COLORS)],
                                              linestyle=DASHES[number % len(DASHES)], linewidth=1.9)  # fmt: skip
-        for limit, limited in limits.items():
+        for limit in limits:
             entries["limit of a drive"] = axes.axhline(limit, color=style.INK, linewidth=0.9, zorder=1.5)
-            axes.annotate(", ".join(limited), (1, limit), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
+        for height, limited in _together(limits, _TOGETHER * float(np.ptp(axes.get_ylim()))):
+            axes.annotate(", ".join(limited), (1, height), (-2, 1.5), xycoords=axes.get_yaxis_transform(), ha="right",
                           textcoords="offset points", fontsize=7.5, path_effects=HALO)  # fmt: skip
-        axes.set_title(", ".join(filter(None, (where, f"{side} boundary"))), loc="left", fontsize=9.5)
+        axes.set_title(title, loc="left", fontsize=9.5)
         axes.set_ylabel(style.axis_label("drive", "".join(units) if len(units) == 1 else ""))
-    every = np.concatenate([boundary["theta"] for boundary, *_ in parts])
-    tick_abscissa(panels[-1], Along(every, label))
-    panels[-1].set_xlim(float(every.min()), float(every.max()))
+    angles = np.concatenate([boundary["theta"] for boundary, *_ in parts])
+    tick_abscissa(panels[-1], Along(angles, label))
+    panels[-1].set_xlim(float(angles.min()), float(angles.max()))
     legend_below(figure, list(entries.values()), list(entries))
     return figure
+
+
+def _together(limits: Mapping[float, Sequence[str]], near: float) -> list[tuple[float, list[str]]]:
+    """Limits and whose they are; of those nearer to each other than a distance the highest, and the names of all."""
+    groups: list[tuple[float, list[str]]] = []
+    for limit in sorted(limits, reverse=True):
+        if groups and groups[-1][0] - limit < near:
+            groups[-1][1].extend(name for name in limits[limit] if name not in groups[-1][1])
+        else:
+            groups.append((limit, list(limits[limit])))
+    return groups
 
 
 def draw_before(axes: Axes, before: Before | None, held: Mapping[str, float] | None = None) -> None:

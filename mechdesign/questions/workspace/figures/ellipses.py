@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.workspace.figures.regions import fill, sheet
+from mechdesign.questions.workspace.figures.regions import fill, sheet, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import LEFT
+from mechdesign.report.figures.framing import LEFT, extent
 from mechdesign.report.figures.panels import quantity, round_down
 from mechdesign.report.figures.pictures import picture
 
@@ -32,7 +33,7 @@ _FORCE: dict[str, Any] = {"color": style.VERMILION, "linestyle": (0, (3, 1.2))}
 def ellipses_figure(view: WorkspaceView) -> Figure | None:
     """Velocity ellipses, J u for drive rates u of unit size, and force ellipses, J^-T u for efforts u [Yoshikawa 1985].
 
-    None where the Jacobian is not that of a point.
+    None where the Jacobian is not that of a point, and in a strip that is stretched: circles would not be round.
     """
     study, section, units = view.study, view.study.workspace, view.study.units
     ellipses = view.drawn.ellipses if len(view.regions) == 1 else None
@@ -40,6 +41,9 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
         return None
     title = f"where point {section.point} is fast (velocity ellipse) and where strong (force ellipse)"
     (region,) = view.regions
+    _, wide, tall = extent(region.places())
+    if stretch_of(wide / tall) != 1.0:
+        return None
     page = sheet(study, region.places(), [""], title, bar=False, below=_ROOM)
     (axes,) = page.axes
     fill(axes, region.local)
@@ -62,14 +66,17 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
         on_axes, stands_for, fits = _scale(half.max(axis=1), ellipses.spacing)
         words = f"{quantity(on_axes, length).rstrip()} long: {quantity(stands_for, unit)}"
         handles.append(Line2D([], [], linewidth=1.4, label=f"{name} by unit drive {cause}: half axis {words}", **look))
+        edges, widths = [], []
         for place, axis, pair in zip(ellipses.places, directions, half * on_axes / stands_for, strict=True):
             largest = float(pair.max())
             small = largest > fits
             share = fits / largest if small else 1.0
             ends = np.minimum(share * pair, fits)
             edge = place + ends[0] * axis[0] * _TURN.real + ends[1] * axis[1] * _TURN.imag
-            axes.plot(edge.real, edge.imag, linewidth=0.7 if small else 1.4, zorder=4, **look)
+            edges.append(np.column_stack([edge.real, edge.imag]))
+            widths.append(0.7 if small else 1.4)
             thin |= small
+        axes.add_collection(LineCollection(edges, linewidths=widths, zorder=4, **look))
     if thin:
         handles.append(Line2D([], [], color=style.FAINT, linewidth=0.7, label="thin: longer than drawn"))
     if style.narrow():

@@ -9,25 +9,27 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm
-from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
 from mechdesign.indices import INDEX_NAMES
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.workspace.figures.regions import Grid, Region, grids, sheet, some
+from mechdesign.questions.workspace.figures.regions import Region, grids, left_out, sheet, some
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
-from mechdesign.report.figures.panels import node_areas, quantile
+from mechdesign.report.figures.panels import node_areas, quantile, quantity
 from mechdesign.report.figures.pictures import picture
 from mechdesign.report.figures.rendering import Gallery
+from mechdesign.report.figures.style import Grid
 from mechdesign.study import Study
 
 # Columns of the table that are no indices, beside the held coordinates.
 _NO_INDEX = ("x", "y", "det_J", "patch", "ray", "node", "piece")
 # The colours of an index with a thin tail end at the value below which this share of the area lies.
 _SHOWN_AREA = 0.96
+# Regions whose colours would end farther apart than by this factor have a scale each.
+_ALIKE = 2.5
 # Points on paper between the name of a level and lines of other levels, and other names.
 CLEAR_OF_LINES = 5.0
 CLEAR_OF_NAMES = 18.0
@@ -45,7 +47,7 @@ def map_figures(view: WorkspaceView) -> Gallery | None:
     names = [name for name in index_columns(view.regions[0]) if any(np.isfinite(r.local[name]).any() for r in shown)]
     maps = Gallery()
     for name in names:
-        maps.add(name, _index_map, view.study, shown, name)
+        maps.add(name, _index_map, view.study, shown, name, left_out(view.regions))
     return maps
 
 
@@ -54,41 +56,47 @@ def index_columns(region: Region) -> list[str]:
     return [name for name in region.local.names if name not in _NO_INDEX and name not in region.held]
 
 
-def _index_map(study: Study, regions: Sequence[Region], column: str) -> Figure:
-    norm = index_norm(regions, column)
+def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -> Figure:
     index = regions[0].local.column(column)
     places = np.concatenate([region.places() for region in regions])
     point = study.workspace.point if study.workspace else ""
     name = column.replace("_", " ")
-    page = sheet(
-        study, places, [region.title for region in regions], f"{name} at point {point}: {index.meaning}", bar=True
-    )
-    for axes, region in zip(page.axes, regions, strict=True):
-        contours(axes, list(grids(region.local, column)), norm, labels=len(regions) == 1)
+    title, titles = f"{name} at point {point}: {index.meaning}{cut}", [region.title for region in regions]
+    shown = [[*grids(region.local, column)] for region in regions]
+    label = style.axis_label(name, index.unit)
+    parts = _parts(shown)
+    if parts is not None:
+        title, label = f"{title}; each panel has a scale of its own", f"{name}, in parts"
+        titles = [f"{words}\nin parts of {quantity(part, index.unit)}".strip()
+                  for words, part in zip(titles, parts, strict=True)]  # fmt: skip
+        shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
+    norm = _norm([patch for patches in shown for patch in patches])
+    page = sheet(study, places, titles, title, bar=True)
+    for axes, patches in zip(page.axes, shown, strict=True):
+        contours(axes, patches, norm, labels=len(regions) == 1)
     page.ends(regions)
-    page.color_bar(ScalarMappable(norm, style.COLORMAP), style.axis_label(name, index.unit), ticks=norm.boundaries)
+    page.color_bar(ScalarMappable(norm, style.COLORMAP), label, ticks=norm.boundaries)
     return page.figure
 
 
 def contours(axes: Axes, patches: Sequence[Grid], norm: BoundaryNorm, *, labels: bool) -> None:
     """Filled contours over the patches of a region, each level named once, where its line is longest."""
-    drawn = []
     low, high = norm.boundaries[[0, -1]]
     # Beyond the last level the index grows without bound, at singularities.
     over = 2 * high - low
-    for x, y, z in patches:
-        shown = np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low)
-        drawn.append(style.filled(axes, x, y, shown, norm, norm.boundaries[1:]))
+    shown = [(x, y, np.where(np.isfinite(z), np.minimum(z, over), over if norm.extend == "max" else low))
+             for x, y, z in patches]  # fmt: skip
+    lines = style.filled(axes, shown, norm, norm.boundaries[1:])
     if labels:
         edges = [np.concatenate([z[0], z[-1], z[:, 0], z[:, -1]]) for z in (x + 1j * y for x, y, _ in patches)]
-        label_levels(axes, drawn, norm, _on_paper(axes, np.concatenate(edges)))
+        label_levels(axes, lines, norm, _on_paper(axes, np.concatenate(edges)))
 
 
-def label_levels(axes: Axes, drawn: Sequence[QuadContourSet], norm: BoundaryNorm, blocked: Complexes) -> None:
-    """Name each level once on one of its lines, far from other lines and names; or not at all."""
+def label_levels(axes: Axes, drawn: Sequence[Sequence[Complexes]], norm: BoundaryNorm, blocked: Complexes) -> None:
+    """Name each level of a norm but the first on one of its lines, far from other lines and names; or not at all."""
     levels = norm.boundaries[1:]
-    parts_of = [contour.allsegs for contour in drawn]
-    lines = [[_on_paper(axes, part @ [1, 1j]) for parts in parts_of for part in parts[k]] for k in range(len(levels))]
+    ten = 10.0 ** style.power(float(np.abs(norm.boundaries).max()))
+    lines = [[_on_paper(axes, part) for part in parts] for parts in drawn]
     every = [np.concatenate(parts) if parts else np.zeros(0, dtype=complex) for parts in lines]
     taken = np.zeros(0, dtype=complex)
     for k, level in enumerate(levels):
@@ -108,7 +116,7 @@ def label_levels(axes: Axes, drawn: Sequence[QuadContourSet], norm: BoundaryNorm
         back = colormaps[style.COLORMAP](norm(level))
         place = (at[best].real, at[best].imag)
         axes.annotate(
-            f"{level:g}", place, xycoords="figure points", fontsize=7.5, ha="center", va="center",
+            f"{level / ten:.4g}", place, xycoords="figure points", fontsize=7.5, ha="center", va="center",
             rotation=(turn + 90) % 180 - 90, rotation_mode="anchor", color="white" if norm(level) < 140 else style.INK,
             zorder=3.5, path_effects=[withStroke(linewidth=2.5, foreground=back)],
         )  # fmt: skip
@@ -126,16 +134,30 @@ def _nearest(places: Complexes, others: Complexes) -> Floats:
 
 
 def index_norm(regions: Sequence[Region], column: str) -> BoundaryNorm:
+    """Colours of a local index over some regions; see `_norm`."""
+    return _norm([patch for region in regions for patch in grids(region.local, column)])
+
+
+def _norm(patches: Sequence[Grid]) -> BoundaryNorm:
     """Colours between round levels from the smallest value, or zero, to the largest, or to where a thin tail begins."""
-    patches = [patch for region in regions for patch in grids(region.local, column)]
+    low, high, top = _ends(patches)
+    return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
+
+
+def _parts(regions: Sequence[Sequence[Grid]]) -> list[float] | None:
+    """The values where the colours of each region would end; None where those of one scale suit all regions."""
+    ends = [_ends(patches) for patches in regions if any(np.isfinite(z).any() for _, _, z in patches)]
+    highs = [high for _, high, _ in ends]
+    if len(highs) < len(regions) or min(low for low, _, _ in ends) < 0 or max(highs) <= _ALIKE * min(highs):
+        return None
+    return highs
+
+
+def _ends(patches: Sequence[Grid]) -> tuple[float, float, float]:
+    """The smallest finite value, the value where the colours end, and the largest; infinite beyond a thin tail."""
     values = np.concatenate([z.ravel() for _, _, z in patches])
     areas = np.concatenate([node_areas(x, y).ravel() for x, y, _ in patches])
     finite = np.isfinite(values)
     values, areas = values[finite], areas[finite]
-    high = quantile(values, areas, _SHOWN_AREA)
-    low, top = float(values.min()), float(values.max())
-    if top > 1.4 * high + 1e-12:
-        top = np.inf
-    else:
-        high = top
-    return style.steps(style.levels(0.0 if 0 <= low < 0.5 * high else low, high, 11), low, top)
+    high, low, top = quantile(values, areas, _SHOWN_AREA), float(values.min()), float(values.max())
+    return (low, high, np.inf) if top > 1.4 * high + 1e-12 else (low, top, top)

@@ -9,21 +9,20 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Floats, Ints, evenly
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, Window, extent, windows
-from mechdesign.report.figures.panels import legend_at_left
+from mechdesign.report.figures.framing import BELOW, LEFT, PLANE, RIGHT, Window, extent, windows
+from mechdesign.report.figures.panels import legend_at_left, round_down
+from mechdesign.report.figures.style import Grid
 from mechdesign.results import Result, Table
 from mechdesign.study import Study
-
-Grid = tuple[Floats, Floats, Floats]
 
 # How a piece of the boundary is drawn by what ends the region there, and loci of singularities inside, of the closure
 # (parallel) and of a leg (serial): colour, dashes, width, words.
@@ -40,7 +39,9 @@ LOOKS: Mapping[str, tuple[str, Any, float, str]] = {
 # Of the region itself; opaque, so that patches leave no seams.
 PALE = "#D5EBF8"
 LEFT_OUT = "#ECECEC"
-MAX_REGIONS = 6  # that a picture shows side by side
+MAX_REGIONS = 9  # that a picture shows side by side
+# A region longer than so many times its width is stretched across, to about this ratio of its sides.
+_LONGEST, _STRETCHED = 10.0, 1.2
 # Free room around what is shown, as a share of its size; with a mechanism there are symbols that reach beyond points.
 _PAD = 0.03
 ROOM = 0.07
@@ -51,7 +52,8 @@ _PANEL_TITLE = 0.34
 _TITLE_LINE = 0.17  # more of it
 _TITLE = 0.4
 _ROW_GAP = 0.28
-_BESIDE = 0.15  # of a panel without labels of its own
+_BESIDE, _BESIDE_NARROW = 0.45, 0.3  # of a panel without labels of its own
+_TICK = 0.65  # from one number along x to the next, twice that along y
 _MAX_HEIGHT = 6.5
 
 
@@ -143,26 +145,30 @@ def outline(axes: Axes, region: Region) -> set[str]:
     if region.others is not None:
         local, boundary = region.others
         fill(axes, local, LEFT_OUT, zorder=0.9)
-        for rows in curves(boundary):
-            axes.plot(boundary["x"][rows], boundary["y"][rows], color=style.FAINT, linewidth=0.8, zorder=2.8)
+        _draw(axes, boundary, list(curves(boundary)), color=style.FAINT, linewidth=0.8, zorder=2.8)
         seen.add("other")
     return seen
 
 
 def outline_of(axes: Axes, boundary: Table) -> set[str]:
     """Draw the curves of a boundary, coloured by what ends the region there; returns the keys of `LOOKS` drawn."""
-    seen = set()
-    pieces = list(curves(boundary))
+    ends: dict[str, list[Ints]] = {}
+    for rows in curves(boundary):
+        ends.setdefault(fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]])), []).append(rows)
     # White below keeps the gaps of dashes clean.
-    for rows in pieces:
-        axes.plot(boundary["x"][rows], boundary["y"][rows], color="white", linewidth=2.1, zorder=3.1)
-    for rows in pieces:
-        end = fate(str(boundary["kind"][rows[0]]), str(boundary["at"][rows[0]]))
+    every = [rows for pieces in ends.values() for rows in pieces]
+    _draw(axes, boundary, every, color="white", linewidth=2.1, zorder=3.1)
+    for end, pieces in ends.items():
         color, dashes, width, _ = LOOKS[end]
-        axes.plot(boundary["x"][rows], boundary["y"][rows], color=color, linestyle=dashes, linewidth=width,
-                  solid_capstyle="round", zorder=3.15)  # fmt: skip
-        seen.add(end)
-    return seen
+        _draw(axes, boundary, pieces, color=color, linestyle=dashes, linewidth=width, solid_capstyle="round",
+              zorder=3.15)  # fmt: skip
+    return set(ends)
+
+
+def _draw(axes: Axes, table: Table, pieces: Sequence[Ints], **look: Any) -> None:
+    """Draw some curves of a table as one broken line."""
+    if pieces:
+        axes.plot(*(np.concatenate([np.append(table[name][rows], np.nan) for rows in pieces]) for name in "xy"), **look)
 
 
 def loci(axes: Axes, region: Region) -> set[str]:
@@ -173,28 +179,32 @@ def loci(axes: Axes, region: Region) -> set[str]:
     table = region.singularities
     if table is None:
         return set()
-    seen = set()
+    kinds: dict[str, list[Ints]] = {}
     every = [region.boundary, *(region.others or ())[1:]]
-    edge = np.concatenate([places(table) for table in every])
+    ends = np.concatenate([places(table) for table in every])
     near = 1e-7 * float(np.abs(region.places()).max())
     for rows in curves(table):
         middle = complex(table["x"][rows[len(rows) // 2]], table["y"][rows[len(rows) // 2]])
-        if len(edge) and np.abs(edge - middle).min() < near:
+        if len(ends) and np.abs(ends - middle).min() < near:
             continue
-        kind = str(table["kind"][rows[0]])
-        axes.plot(table["x"][rows], table["y"][rows], color=LOOKS[kind][0], linestyle=LOOKS[kind][1],
-                  linewidth=LOOKS[kind][2], zorder=3.2,
-                  marker="o" if len(rows) == 1 else "", markersize=4,
-                  path_effects=[withStroke(linewidth=3.4, foreground="white")])  # fmt: skip
-        seen.add(kind)
-    return seen
+        kinds.setdefault(str(table["kind"][rows[0]]), []).append(rows)
+    for kind, pieces in kinds.items():
+        color, dashes, width, _ = LOOKS[kind]
+        look: dict[str, Any] = {
+            "color": color,
+            "zorder": 3.2,
+            "path_effects": [withStroke(linewidth=3.4, foreground="white")],
+        }
+        _draw(axes, table, [rows for rows in pieces if len(rows) > 1], linestyle=dashes, linewidth=width, **look)
+        _draw(axes, table, [rows for rows in pieces if len(rows) == 1], linestyle="", marker="o", markersize=4, **look)
+    return set(kinds)
 
 
 def fill(axes: Axes, local: Table, color: str = PALE, **look: Any) -> None:
     """Fill a region: what lies between both curves of each patch."""
-    for x, y, _ in grids(local, "det_J"):
-        edge = [np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)]
-        axes.fill(*edge, color=color, linewidth=0, antialiased=False, **look)
+    edges = [np.column_stack([np.concatenate([side[:, 0], side[::-1, -1]]) for side in (x, y)])
+             for x, y, _ in grids(local, "det_J")]  # fmt: skip
+    axes.add_collection(PolyCollection(edges, facecolors=color, linewidths=0, antialiaseds=False, **look))
 
 
 def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: float = 3.5) -> LineCollection:
@@ -208,16 +218,25 @@ def coloured(axes: Axes, z: Complexes, values: Floats, norm: Normalize, width: f
 
 def some(regions: Sequence[Region]) -> list[Region]:
     """At most `MAX_REGIONS` regions, evenly spread."""
-    return [regions[k] for k in np.unique(np.linspace(0, len(regions) - 1, min(len(regions), MAX_REGIONS)).astype(int))]
+    return [regions[k] for k in evenly(len(regions), MAX_REGIONS)]
+
+
+def left_out(regions: Sequence[Region]) -> str:
+    """How many regions `some` leaves out, in words for the end of a title."""
+    return f" ({MAX_REGIONS} of {len(regions)} shown)" if len(regions) > MAX_REGIONS else ""
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A figure of panels of one scale, with room for a bar of colours at the right and a legend below."""
+    """A figure of panels of one scale, with room for a bar of colours at the right and a legend below.
+
+    Along y lengths are drawn `stretch` times as large as along x.
+    """
 
     figure: Figure
     axes: tuple[Axes, ...]
     bar: Axes | None
+    stretch: float
 
     def ends(self, regions: Sequence[Region]) -> None:
         """Draw what ends each region, a panel each, and its singularities, with a legend."""
@@ -240,42 +259,75 @@ def sheet(
     study: Study, places: Complexes, titles: Sequence[str], title: str, *, bar: bool, pad: float = _PAD,
     below: float = 0.0,
 ) -> Sheet:  # fmt: skip
-    """Panels with equal axes that all show the same part of the plane, `titles` above them and `title` above all.
+    """Panels that all show the same part of the plane, `titles` above them and `title` above all.
 
-    Titles of panels may have several lines.
-    So many inches more than a legend of what ends the region needs are left `below`.
+    Titles of panels may have several lines. So many inches more than a legend of what ends the region needs are left
+    `below`. The axes are equal, unless what is shown is a thin strip; the title says so.
     """
     number = len(titles)
+    middle, wide, tall = extent(places)
+    stretch = stretch_of(wide / tall)
+    tall *= stretch
     columns = number if number < 4 else 2 if number == 4 else 3
-    if style.narrow():
+    if style.narrow() or (number > 1 and wide > 2 * tall):
         columns = 1 if number < 3 else 2
-    title = style.folded(title[0].upper() + title[1:], 11.0, style.width() - LEFT - 0.1)
+    if stretch != 1.0:
+        title += f"; {'y' if stretch > 1 else 'x'} drawn {max(stretch, 1 / stretch):g} times larger"
     rows = -(-number // columns)
     room = style.width() - RIGHT - (_BAR if bar else 0.0)
-    middle, wide, tall = extent(places)
     wide, tall = wide + 2 * pad * max(wide, tall), tall + 2 * pad * max(wide, tall)
     pitch = (room - LEFT) / columns
-    inside = pitch - _BESIDE if style.narrow() else room / columns - LEFT
-    scale = min(inside / wide, (_MAX_HEIGHT if rows == 1 else 7.5 / rows) / tall)
-    window, above, down = Window(middle, scale, scale * wide, scale * tall), 0.0, _ROW_GAP
+    inside = room / columns - LEFT if columns < 3 else pitch - _BESIDE
+    if style.narrow():
+        inside = pitch - _BESIDE_NARROW
+    above, down = 0.0, _ROW_GAP
     if number > 1:
-        titles = [style.folded(words, 9.5, inside - 0.15) if style.narrow() else words for words in titles]
+        titles, name = panel_titles(titles, inside)
+        title += f"; panels: values of {name}" * bool(name)
         above = _PANEL_TITLE + _TITLE_LINE * max(name.count("\n") for name in titles)
         down = above + _ROW_GAP
+    title = style.folded(title[0].upper() + title[1:], 11.0, style.width() - LEFT - 0.1)
+    top = _TITLE + style.line(11.0) * title.count("\n")
+    below += BELOW + _LEGEND
+    free = style.tallest() - top - above - (rows - 1) * down - below
+    scale = min(inside / wide, min(_MAX_HEIGHT if rows == 1 else 7.5, free) / rows / tall)
+    window = Window(middle, scale, scale * wide, scale * tall)
     figure, panels = windows(
         window, study.units.label("length"), number, columns, gap=pitch - window.width, above=down,
-        top=_TITLE + style.line(11.0) * title.count("\n") + above - down, below=BELOW + _LEGEND + below,
+        top=top + above - down, below=below, stretch=stretch,
     )  # fmt: skip
     outer = figure.get_figheight()
     for axes, name in zip(panels, titles, strict=True):
         axes.grid(visible=False)
+        axes.set_label(PLANE)
         axes.set_title(name, loc="left", fontsize=9.5)
+        axes.locator_params(axis="x", nbins=max(1, int(window.width / _TICK)))
+        axes.locator_params(axis="y", nbins=max(1, int(2 * window.height / _TICK)))
     figure.text(LEFT / style.width(), 1 - 0.12 / outer, title, va="top", fontsize=11)
     colors = None
     if bar:
         edge = (LEFT + window.width if number == 1 else room) + 0.15
         every = rows * window.height + (rows - 1) * down
-        long, middle_up = min(every, 4.0), BELOW + _LEGEND + below + every / 2
+        long, middle_up = min(every, 4.0), below + every / 2
         low = (middle_up - long / 2) / outer
         colors = figure.add_axes((edge / style.width(), low, 0.16 / style.width(), long / outer))
-    return Sheet(figure, tuple(panels), colors)
+    return Sheet(figure, tuple(panels), colors, stretch)
+
+
+def panel_titles(titles: Sequence[str], room: float, most: int = 2) -> tuple[list[str], str]:
+    """Titles ``name = value unit`` in lines of so many inches; the value alone where these are more than `most`.
+
+    The name that is left out is returned as well, else nothing.
+    """
+    name, equals, _ = titles[0].partition(" = ")
+    long = style.folded(titles[0].partition("\n")[0], 9.5, room).count("\n") >= most
+    if not (long and equals and all(words.startswith(f"{name} = ") for words in titles)):
+        name = ""
+    return [style.folded(words.removeprefix(f"{name} = "), 9.5, room) for words in titles], name
+
+
+def stretch_of(ratio: float) -> float:
+    """How many times larger lengths along y are drawn where width over height is `ratio`: 1, or a round number."""
+    if ratio < 1:
+        return 1 / stretch_of(1 / ratio)
+    return round_down(ratio / _STRETCHED) if ratio > _LONGEST else 1.0

@@ -38,8 +38,8 @@ def prepare(study: Study) -> Evaluate:
     question, section = question.narrowed, pace(study)
     rates = constant_rates(study, section, mechanism.drives)
     forces = force_model(study) if question.columns else None
-    if of_given(study, section) and question.moving:
-        message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
+    if (of_given(study, section) or section.motion is not None) and question.moving:
+        message = "the index 'reliability' of velocities needs 'rates' of the drives: a path or a motion has none here"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     bent = elasticity(study)[0]
 

@@ -1,20 +1,30 @@
 "use strict";
 (() => {
   const SVG = "http://www.w3.org/2000/svg";
-  const PLACES = 20, TURNS = 100, CURVES = 10, TIMES = 10000; // integers in a unit, as the page writes them
+  const PLACES = 20, TURNS = 100, TIMES = 10000; // integers in a unit, as the page writes them
   const SLOW_STEPS = 24, SLOW_PAUSE = 600; // of a motion that is wanted without motion: poses, and milliseconds each
   const FRONT_TIME = 5000; // milliseconds from end to end of the motion of a front's design
   const NEAR = 0.005; // a motion passes a pose this near, as a part of the range of what it gives
   const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
 
-  // A list of steps as values; null where there is none, the last value to the end.
-  function decode(steps, count, unit) {
+  const LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+
+  // Steps in letters as values: digits to the base 32, the lowest first, all but the last 32 more; the sign in the
+  // lowest bit; a point where there is no value. The last value stands to the end.
+  function decode(text, count, unit) {
     const values = new Array(count);
-    let last = 0;
+    let last = 0, at = 0;
     for (let k = 0; k < count; k++) {
-      const step = k < steps.length ? steps[k] : 0;
-      if (step !== null) last += step;
-      values[k] = step === null ? NaN : last / unit;
+      const known = text[at] !== ".";
+      let number = 0, power = 1, digit = 0;
+      if (!known) at++;
+      else if (at < text.length) do {
+        digit = LETTERS.indexOf(text[at++]);
+        number += (digit % 32) * power;
+        power *= 32;
+      } while (digit >= 32);
+      last += number % 2 ? -(number + 1) / 2 : number / 2;
+      values[k] = known ? last / unit : NaN;
     }
     return values;
   }
@@ -53,7 +63,8 @@
   function follow(drawing, hovering, call) {
     const told = event => {
       if (event.type === "pointerdown") drawing.setPointerCapture(event.pointerId);
-      if (event.type === "pointerdown" || hovering || event.buttons) call(...within(drawing, event));
+      const begins = event.type === "pointerdown";
+      if (begins || event.buttons || (hovering && event.pointerType === "mouse")) call(...within(drawing, event), begins);
     };
     drawing.addEventListener("pointerdown", told);
     drawing.addEventListener("pointermove", told);
@@ -108,7 +119,7 @@
   // The numbers beside the drawing: their texts at a pose, or between two.
   function numbers(figure, data) {
     const tracks = data.numbers.map(([decimals, steps]) => [decimals, decode(steps, data.poses, 10 ** decimals)]);
-    const cells = [...figure.querySelectorAll("[data-number]")].map(cell => [cell, ...tracks[cell.dataset.number]]);
+    const cells = [...document.querySelectorAll(`[data-numbers="${figure.id}"] [data-number]`)].map(cell => [cell, ...tracks[cell.dataset.number]]);
     const text = (decimals, value) => isFinite(value) ? value.toFixed(decimals).replace(/^-(?=[0.]*$)/, "") : "\u2013";
     return {
       tracks,
@@ -149,30 +160,72 @@
     };
   }
 
-  // The cursor and the dots in the motion curves; a click or a drag there chooses a pose.
-  function curves(drawing, data, told, choose) {
-    if (!drawing || !data.curves) return () => {};
-    const x = decode(data.curves.x, data.poses, CURVES), [top, bottom] = data.curves.ends;
-    const cursor = make("line", {y1: top, y2: bottom, stroke: "#222222", "stroke-width": 1, class: "moving-cursor"}, drawing);
-    const dots = data.curves.dots.map(([which, slope, start, high, low, color]) =>
-      [told.tracks[which][1], slope, start, high, low, make("circle", {r: 3.6, fill: color, stroke: "white"}, drawing)]);
-    drawing.classList.add("moving-curves");
-    follow(drawing, false, place => {
-      let best = 0;
-      x.forEach((at, k) => { if (Math.abs(at - place) < Math.abs(x[best] - place)) best = k; });
-      choose(best);
-    });
-    return at => {
-      const place = between(x, at);
-      cursor.setAttribute("x1", place);
-      cursor.setAttribute("x2", place);
-      for (const [values, slope, start, high, low, dot] of dots) {
-        const y = start + slope * between(values, at);
-        const known = y >= high - 0.5 && y <= low + 0.5;
-        dot.classList.toggle("moving-gone", !known);
-        if (known) { dot.setAttribute("cx", place); dot.setAttribute("cy", y.toFixed(2)); }
+  // Index of the smallest of some numbers that are known.
+  function least(values) {
+    let best = 0, smallest = Infinity;
+    values.forEach((value, k) => { if (value < smallest) { smallest = value; best = k; } });
+    return best;
+  }
+
+  // The pictures that follow a motion: a cursor where they are over what moves, dots where they show places. Pointing at
+  // one chooses a pose.
+  function pictures(figure, data, told, moved, choose) {
+    const [label, track, power, coordinate] = data.over, own = figure.id.replace(/-moving$/, ""), marks = [];
+    const over = told.tracks[track][1].map(value => value * 10 ** power);
+    const inStudy = (point, k) => [data.corner[0] + between(moved.x[point], k) / data.scale,
+      data.corner[1] - between(moved.y[point], k) / data.scale];
+
+    // A panel over what moves, with a dot on each of its curves.
+    function panel(drawing, left, right, top, bottom, low, high, dots) {
+      const at = value => left + (right - left) * (value - low) / (high - low);
+      const cursor = make("line", {y1: top, y2: bottom, stroke: "#222222", "stroke-width": 1, class: "moving-cursor"}, drawing);
+      const drawn = dots.map(([, which, slope, start, color]) =>
+        [told.tracks[which][1], slope, start, make("circle", {r: 3.6, fill: color, stroke: "white"}, drawing)]);
+      marks.push(pose => {
+        const x = at(between(over, pose));
+        const inside = x >= Math.min(left, right) - 1 && x <= Math.max(left, right) + 1;
+        cursor.classList.toggle("moving-gone", !inside);
+        cursor.setAttribute("x1", x);
+        cursor.setAttribute("x2", x);
+        for (const [values, slope, start, dot] of drawn) {
+          const y = start + slope * between(values, pose), known = inside && y >= top - 0.5 && y <= bottom + 0.5;
+          dot.classList.toggle("moving-gone", !known);
+          if (known) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
+        }
+      });
+      return place => least(over.map(value => Math.abs(at(value) - place)));
+    }
+
+    // A part of the plane, with a dot at each point that is of interest.
+    function plane(drawing, left, right, top, bottom, west, east, south, north) {
+      const at = ([x, y]) => [left + (right - left) * (x - west) / (east - west), bottom - (bottom - top) * (y - south) / (north - south)];
+      for (const [point, color] of data.traced) {
+        const dot = make("circle", {r: 4, fill: color, stroke: "white", "stroke-width": 1.4, class: "moving-dot"}, drawing);
+        marks.push(pose => {
+          const [x, y] = at(inStudy(point, pose));
+          const known = x >= left && x <= right && y >= top && y <= bottom;
+          dot.classList.toggle("moving-gone", !known);
+          if (known) { dot.setAttribute("cx", x.toFixed(2)); dot.setAttribute("cy", y.toFixed(2)); }
+        });
       }
-    };
+    }
+
+    for (const drawing of document.querySelectorAll(`[data-moves="${figure.id}"] svg[data-axes]`)) {
+      // A number of the pose counts poses of its own question only.
+      const alike = coordinate || drawing.closest("[data-moves]").id === own;
+      const motion = Boolean(drawing.closest(`[data-beside="${figure.id}"]`));
+      let chosen = null;
+      JSON.parse(drawing.dataset.axes).forEach(([name, ...edges], k) => {
+        if (name === "plane") plane(drawing, ...edges);
+        else if (name === label && alike)
+          chosen = panel(drawing, ...edges, motion ? data.dots.filter(dot => dot[0] === k) : []);
+      });
+      if (chosen) {
+        drawing.classList.add("moving-curves");
+        follow(drawing, true, place => choose(chosen(place)));
+      }
+    }
+    return {marks, inStudy};
   }
 
   // A box that shows or hides some layers.
@@ -186,10 +239,10 @@
 
   // A motion: a slider, play and pause, speed, and what may be shown. Links with a pose that it passes bring it there.
   function motion(figure, data) {
-    const [drawing, other] = figure.querySelectorAll("svg");
-    const moved = linkage(drawing, data), told = numbers(figure, data);
+    const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), told = numbers(figure, data);
     const rates = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
-    const point = curves(other, data, told, pose => { stop(); show(pose); });
+    const choose = pose => { stop(); show(pose); };
+    const {marks, inStudy} = pictures(figure, data, told, moved, choose);
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
     slider.setAttribute("aria-label", "pose of the motion");
     const button = html("button", {type: "button", textContent: "Play"});
@@ -206,13 +259,15 @@
     const times = decode(data.times, data.poses + 1, TIMES), last = data.poses - 1;
     const whole = Math.max(times[data.poses], times[last]);
     const gap = pose => data.gaps.find(([first, end]) => first <= pose && pose <= end);
+    const movable = Object.keys(moved.x).filter(point => [moved.x[point], moved.y[point]].some(values => values.some(value => isFinite(value) && value !== values[data.first])));
     let at = data.first, forward = data.backwards ? -1 : 1, playing = 0, clock = 0;
 
     function show(pose) {
       at = pose;
       // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
       const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
-      moved.show(pose); told.show(counted); rates.show(pose); point(Math.min(pose, last));
+      moved.show(pose); told.show(counted); rates.show(pose);
+      marks.forEach(mark => mark(Math.min(pose, last)));
       const text = data.given.map(([name, unit, which]) => said(name, told.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");
       words.textContent = text;
@@ -265,7 +320,8 @@
 
     // The place of the motion where it passes a pose, between two where it is between two; null where it does not.
     function passing(wanted) {
-      const ways = data.given.map(([name, , which, power]) => {
+      const key = data.keys.find(each => each.every(([name]) => name in wanted));
+      const ways = key.map(([name, which, power]) => {
         const [decimals, values] = told.tracks[which], range = Math.max(...values) - Math.min(...values) || 1;
         const value = Number((wanted[name] / 10 ** power).toFixed(decimals));
         return values.map(each => (each - value) / range);
@@ -283,7 +339,11 @@
     for (const link of document.querySelectorAll(`a[href="#${figure.id}"][data-pose]`)) {
       const place = passing(JSON.parse(link.dataset.pose));
       if (place === null) link.removeAttribute("href");
-      else link.addEventListener("click", () => { stop(); show(place); });
+      else link.addEventListener("click", event => {
+        event.preventDefault();
+        choose(place);
+        figure.scrollIntoView({block: "nearest", behavior: calm.matches ? "auto" : "smooth"});
+      });
     }
     button.addEventListener("click", () => playing ? stop() : play());
     slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
@@ -293,13 +353,21 @@
         if (playing) stop(); else play();
       }
     });
+    // A drag on the linkage moves the point that is nearest to the pointer.
+    let held = "";
+    follow(drawing, false, (x, y, begins) => {
+      const far = (point, k) => Math.hypot(moved.x[point][k] - x, moved.y[point][k] - y);
+      if (begins) held = movable[least(movable.map(point => far(point, Math.round(at) % data.poses)))];
+      if (held) choose(least(moved.x[held].map((_, k) => far(held, k))));
+    });
     show(data.first);
+    return {marks, inStudy, points: moved.x, at: () => at};
   }
 
   // A workspace: the mechanism follows the pointer, or the arrow keys, from pose to pose.
   function workspace(figure, data) {
     const drawing = figure.querySelector("svg"), words = figure.querySelector(".moving-words");
-    const layers = [...drawing.querySelectorAll(".moving-region")];
+    const map = drawing.querySelector(".moving-region"), legends = [...drawing.querySelectorAll(".moving-legend")];
     const choices = data.choices.map(each => ({...each, moved: linkage(drawing, each), told: numbers(figure, each)}));
     const controls = figure.querySelector(".moving-controls");
     let chosen = choices[0], at = chosen.first;
@@ -341,25 +409,43 @@
       words.setAttribute("aria-live", "polite");
       event.preventDefault();
     });
-    if (choices.length > 1) {
-      const select = html("select", {}, ...choices.map((each, k) => html("option", {value: k, textContent: each.title})));
-      select.addEventListener("change", () => {
+    for (const box of document.querySelectorAll(`[data-maps="${figure.id}"] input`)) {
+      box.addEventListener("change", () => {
+        map.setAttribute("href", box.dataset.href);
+        legends.forEach(legend => legend.classList.toggle("moving-off", legend.dataset.index !== box.dataset.index));
         const {x, y} = chosen.moved, place = [x[data.point][at], y[data.point][at]];
-        chosen = choices[select.value];
-        layers.forEach((layer, k) => layer.classList.toggle("moving-off", k !== Number(select.value)));
+        if (choices[box.value] === chosen) return;
+        chosen = choices[box.value];
         show(nearest(...place));
       });
-      controls.append(html("label", {}, "At", select));
+      // A browser that goes back to the page keeps what was chosen.
+      if (box.checked) box.dispatchEvent(new Event("change"));
     }
     controls.append(check("Link names", [...drawing.querySelectorAll(".moving-name")], false));
     controls.append(html("span", {className: "moving-pace", textContent: "Move over the region, or use the arrow keys."}));
     controls.hidden = false;
     show(at);
+    return {drawing, data, alike: choices[0]};
+  }
+
+  // Marks the place of a motion in the drawing of a workspace.
+  function mark({marks, inStudy, points, at}, {drawing, data, alike}) {
+    if (!points[data.point]) return;
+    const dot = make("circle", {r: 5, fill: "#D55E00", stroke: "white", "stroke-width": 1.6, class: "moving-dot"}, drawing);
+    marks.push(pose => {
+      const [x, y] = inStudy(data.point, pose), known = isFinite(x);
+      dot.classList.toggle("moving-gone", !known);
+      if (!known) return;
+      dot.setAttribute("cx", ((x - alike.corner[0]) * alike.scale).toFixed(2));
+      dot.setAttribute("cy", ((alike.corner[1] - y) * alike.scale).toFixed(2));
+    });
+    marks.at(-1)(at());
   }
 
   // A front: a click on its picture, or the arrow keys, choose a design; its linkage moves by a slider or by itself.
   function front(figure, data) {
-    const [drawing, picture] = figure.querySelectorAll("svg"), words = figure.querySelector(".moving-words");
+    const drawing = figure.querySelector("svg"), picture = document.querySelector(`[data-beside="${figure.id}"] svg`);
+    const words = figure.querySelector(".moving-words");
     const layer = drawing.querySelector(".moving-design"), told = numbers(figure, data);
     const controls = figure.querySelector(".moving-controls");
     const slider = html("input", {type: "range", min: 0, step: "any"});
@@ -481,10 +567,12 @@
   }
 
   function start() {
-    for (const figure of document.querySelectorAll("figure.moving")) {
-      const data = JSON.parse(figure.querySelector("script").textContent);
-      if (data.front) front(figure, data); else if (data.choices) workspace(figure, data); else motion(figure, data);
-    }
+    const figures = [...document.querySelectorAll("figure.moving")].map(figure =>
+      [figure, JSON.parse(figure.querySelector("script").textContent)]);
+    figures.filter(([, data]) => data.front).forEach(each => front(...each));
+    const motions = figures.filter(([, data]) => !data.choices).map(each => motion(...each));
+    const maps = figures.filter(([, data]) => data.choices && !data.front).map(each => workspace(...each));
+    if (motions.length) maps.forEach(each => mark(motions[0], each));
   }
 
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start);

@@ -1,0 +1,129 @@
+"""Pictures of studies that stress their layout: long names, large and small numbers, many panels, thin regions."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+from helpers.pages import faults
+from helpers.studies import study_of
+
+import mechdesign
+from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
+from mechdesign.results import Result
+from mechdesign.study import Study
+
+HAND = "hand_mit_schraubgreifer_für_große_kästen_und_übergrößen_links"
+ORIENTATIONS = f"""
+units: {{length: mm}}
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, carriage: {{A: [0, 0]}}, cross: {{H: [0, 0]}}, {HAND}: [H, T, 120]}}
+  joints: {{feed: {{prismatic: [ground, carriage]}}, rise: {{prismatic: [carriage, cross], direction: 90}}}}
+  drives: {{x: {{slide: feed}}, y: {{slide: rise}}, q: {{angle: {HAND}}}}}
+  limits: [{{drive: x, min: -10000, max: 10000}}, {{drive: y, min: -8000, max: 8000}}]
+  sketch: {{T: [120, 0]}}
+workspace:
+  point: T
+  at: {{{HAND}.angle: [0, 50, 100, 150, 200, 250, 300]}}
+  scan: {{rays: 25}}
+  characteristic_length: 300
+  indices: inverse_condition
+"""
+STRIP = """
+units: {length: mm}
+mechanism:
+  links: {ground: {O: [0, 0]}, carriage: {A: [0, 0]}, tool: {T: [0, 0]}}
+  joints:
+    feed: {prismatic: [ground, carriage]}
+    cross: {prismatic: [carriage, tool], direction: 90}
+  drives: {x: {slide: feed}, y: {slide: cross}}
+  limits: [{drive: x, min: 0, max: 2000}, {drive: y, min: 0, max: 3}]
+workspace: {point: T, scan: {about: [1000, 1.5], rays: 61}, indices: inverse_condition}
+"""
+CRANK, ROD = (f"{noun}_der_übergroßen_schmiedepresse_mit_schwungrad_und_bremse" for noun in ("kurbel", "pleuel"))
+PRESS = f"""
+units: {{length: mm}}
+seed: 1
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, {CRANK}: [O, A, 8000], {ROD}: [A, B, 24000]}}
+  joints: {{guide: {{slot: ground, point: B}}}}
+  drives: {{crank: {{angle: {CRANK}}}}}
+  sketch: {{A: [0, 8000], B: [22000, 0]}}
+reliability:
+  outputs: [B.x, A.x, A.y]
+  sweep: {{crank: {{from: 0, to: 360, step: 45}}}}
+  dimensions: {{"*.length": {{tolerance: 0.000001}}}}
+  clearances: {{A: {{radial: 0.000001, link: {CRANK}}}, B: {{radial: 0.000001}}}}
+  rates: {{crank: 3}}
+  methods: [analytic, monte_carlo]
+  samples: 500
+  sobol: 0
+  limits: {{B.x: 0.000002}}
+"""
+FOUR_BAR = """
+units: {length: mm}
+seed: 1
+mechanism:
+  parameters: {a: 30, b: 90, c: 60}
+  links: {ground: {O: [0, 0], D: [100, 0]}, crank: [O, A, a], rod: [A, B, b], rocker: [D, B, c]}
+  drives: [crank]
+  sketch: {A: [0, 30], B: [75, 55]}
+  targets: {rocker.angle: 100 + 0.2*crank}
+kinematics: {sweep: {crank: {from: 20, to: 80, step: 20}}, outputs: [rocker.angle, B]}
+"""
+GOALS = (
+    FOUR_BAR
+    + """
+optimize:
+  method: pareto
+  variables: {a: {from: 25, to: 35}, b: {from: 85, to: 95}, c: {from: 55, to: 65}}
+  minimize: [kinematics.rocker.angle_error, b, c]
+  evaluations: 120
+"""
+)
+CASES = (
+    FOUR_BAR
+    + """
+requirements: [{result: kinematics.rocker.angle_error, at_most: 12}]
+matrix:
+  vary:
+    mechanism.parameters.a: "25:34:1"
+    mechanism.parameters.b: "85:94:1"
+    mechanism.parameters.c: [59, 61]
+"""
+)
+
+
+@cache
+def answered(command: str, text: str) -> tuple[Study, Result]:
+    """A study and what is answered to its question."""
+    study = study_of(text)
+    return study, getattr(mechdesign, command)(study)
+
+
+@pytest.mark.parametrize("look", ["screen", "paper"])
+@pytest.mark.parametrize(
+    ("command", "study", "expected"),
+    [
+        ("workspace", ORIENTATIONS, {"workspace", "inscribed", "drives", "inverse_condition", "resistivity"}),
+        ("workspace", STRIP, {"workspace", "inscribed", "drives", "inverse_condition", "resistivity"}),
+        ("reliability", PRESS, {"bands", "deviations", "histogram", "convergence", "estimate", "reliability",
+                                "contributions"}),
+        ("optimize", GOALS, {"CPI", "designs", "pareto", "hypervolume", "optimum"}),
+        ("sweep", CASES, {"main_effects", "scatter", "response"}),
+    ],
+    ids=["seven orientations", "a thin strip", "a large press with small clearances", "three goals", "200 cases"],
+)  # fmt: skip
+def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expected: set[str], look: str) -> None:
+    given, result = answered(command, study)
+    with style.context(look):
+        drawn = figures(given, result)
+        assert not drawn.failed
+        assert set(drawn) == expected
+        wrong = {}
+        for name, figure in drawn.items():
+            style.encoded(figure)
+            wrong[name] = [*faults(figure)]
+            assert figure.get_figheight() <= style.tallest() + 0.05, name
+    assert not any(wrong.values()), wrong
