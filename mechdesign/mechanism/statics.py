@@ -14,6 +14,7 @@ closed form. What is left at the given coordinates are the efforts of the drives
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -146,6 +147,12 @@ class Joints:
                 self.ties[name] = self.holder(one, joint.point), self.holder(other, joint.point)
         self.contacts = tuple(self._slides()) + tuple(self._pins())
         self.order, self.open = self._tie_order()
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Names of the contacts' forces: of their joint, and what it acts on where it has several."""
+        counts = Counter(contact.joint for contact in self.contacts)
+        return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
 
     def holder(self, link: str, point: str) -> str:
         """The body of a link that has a point; of a telescopic one perhaps its rod."""

@@ -30,7 +30,7 @@ def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
 class Loading:
     """Loads at some rows of poses."""
 
-    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints) -> None:
+    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice) -> None:
         self.study, self.loads, self.poses, self.rows = study, loads, poses, rows
 
     @quiet

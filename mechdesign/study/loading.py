@@ -341,7 +341,7 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    checker = Checker(builder, parameters, parts, source.folder)
+    checker = Checker(builder, parameters, parts, source.folder, mechanism)
     parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -17,9 +16,9 @@ from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
-from mechdesign.mechanism.statics import Joints, Reaction, balance, reactions
+from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
-from mechdesign.questions.dynamics.schema import DynamicsSection
+from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
@@ -38,42 +37,28 @@ class ForceQuestion:
     study: Study
     section: DynamicsSection
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
-    tempo: float  # about how fast; see `MotionQuestion.tempo`
+    tempo: float = 0.0  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
 
     @cached_property
     def joints(self) -> Joints:
         """The joints of the mechanism."""
-        mechanism = self.study.mechanism
-        springs = [spring for spring in mechanism.description.springs.values() if not spring.turning]
-        points = [load.at for load in self.section.loads if load.at is not None]
-        points += [point for load in self.section.loads for point in load.between or ()]
-        points += [point for spring in springs for point in spring.between]
-        loaded = frozenset(mechanism.graph.node(point) for point in points if "." not in point)
-        return Joints(mechanism.description, mechanism.graph, loaded)
+        return self.section.joints(self.study.mechanism)
 
-    @cached_property
+    @property
     def forces(self) -> list[str]:
-        """Names of the contacts' forces: of their joint, and what it acts on where it has several."""
-        contacts = self.joints.contacts
-        counts = Counter(contact.joint for contact in contacts)
-        return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in contacts]
+        """Names of the contacts' forces."""
+        return self.joints.names
 
     @cached_property
     def statics(self) -> list[Static]:
         """Columns of a row a pose, and of the size of each joint's force."""
-        label, mechanism = self.study.units.label, self.study.mechanism
+        mechanism, label = self.study.mechanism, self.study.units.label
         moment = self.size * mechanism.size
         sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo}
-        columns = []
-        for drive in mechanism.drives:
-            kind, words = "moment" if mechanism.quantity(drive) == "angle" else "force", {"drive": drive}
-            columns.append(Static(f"{drive}_effort", label(kind), "<drive>_effort", words, sizes[kind]))
-            if self.moves:
-                columns.append(Static(f"{drive}_power", label("power"), "<drive>_power", words, sizes["power"]))
-        kinds = {"shaking.x": "force", "shaking.y": "force", "shaking": "force", "shaking_moment": "moment"}
-        kinds |= {"kinetic_energy": "moment"} if self.moves else {}
-        kinds |= {"potential_energy": "moment"} | dict.fromkeys(self.forces, "force")
-        return columns + [Static(name, label(kind), name, {}, sizes[kind]) for name, kind in kinds.items()]
+        of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
+                    for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip
+        kinds = column_kinds(mechanism, self.joints, moving=self.moves)
+        return [Static(name, label(kind), *of_drive.get(name, (name, {})), sizes[kind]) for name, kind in kinds.items()]
 
     @cached_property
     def size(self) -> float:
@@ -101,6 +86,26 @@ class ForceQuestion:
     @quiet
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
         """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
+        columns, held = self._held(poses, linear, rows, moving)
+        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
+            columns |= self._parts(name, reaction)
+        return columns
+
+    @quiet
+    def values(
+        self, names: Sequence[str], poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+    ) -> list[Value]:
+        """Some of the columns of `statics`; joint forces are computed only where one is among them."""
+        columns, held = self._held(poses, linear, rows, moving)
+        if not set(names).isdisjoint(self.forces):
+            borne = zip(self.forces, reactions(self.joints, held), strict=True)
+            columns |= {name: np.abs(reaction.force) for name, reaction in borne}
+        return [columns[name] for name in names]
+
+    def _held(
+        self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+    ) -> tuple[dict[str, Value], Balance]:
+        """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
         forces = Forces(linear.configuration)
         Loading(study, section.loads, poses, rows).add(forces, moving)
@@ -119,11 +124,9 @@ class ForceQuestion:
         columns |= {"shaking.x": whole.real, "shaking.y": whole.imag, "shaking": np.abs(whole)}
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
-        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
-            columns |= self._parts(name, reaction)
-        return columns
+        return columns, held
 
-    def _beams(self, poses: Poses, rows: Ints, places: Mapping[str, Value]) -> dict[str, Mass]:
+    def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""
         stiffness, mechanism = self.study.stiffness, self.study.mechanism
         if stiffness is None:

@@ -13,11 +13,10 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.poses import SolvedPoses, radians
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import MotionSection
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,14 +34,13 @@ class DriveRates:
         ))  # fmt: skip
 
 
-def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:
+def of_given(study: Study, section: MotionSection) -> bool:
     """Whether a section's rates are those of the coordinates that the poses give rather than of the drives."""
-    given = {*section.rates, *section.accelerations, *(section.motion or ())}
-    return section.speed is not None or not given <= set(study.mechanism.drives)
+    return section.of_given(study.mechanism.drives)
 
 
 def drive_rates(
-    study: Study, section: KinematicsSection | ReliabilitySection, poses: Poses, solved: SolvedPoses,
+    study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses,
     linear: Linearization,
 ) -> DriveRates:  # fmt: skip
     """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
@@ -68,7 +66,7 @@ def drive_rates(
     return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
 
 
-def constant_rates(study: Study, section: KinematicsSection | ReliabilitySection, names: Sequence[str]) -> DriveRates:
+def constant_rates(study: Study, section: MotionSection, names: Sequence[str]) -> DriveRates:
     """Rates of some coordinates, as a section gives them in numbers."""
     coordinates = [study.mechanism.coordinate(name) for name in names]
     return DriveRates(*(

@@ -6,8 +6,8 @@ from mechdesign.questions.columns import GIVEN, TIMED, VALID
 from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 METHOD = ColumnKind("method", "how it was computed")
-OUTPUT = ColumnKind("output", "coordinate")
-ORDER = ColumnKind("order", "position, velocity or acceleration")
+OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")
+ORDER = ColumnKind("order", "position, velocity or acceleration; of efforts and forces 'dynamics'")
 MEAN = ColumnKind("mean", "mean over made mechanisms, in `unit`")
 EVALUATIONS = ColumnKind("evaluations", "mechanisms that were solved for it")
 MOMENTS = TableKind.of("moments", "mean and standard deviation of outputs per pose and method",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -158,8 +158,9 @@ class MotionSection(PoseSection):
 
     sources: ClassVar[tuple[str, ...]] = (*PoseSection.sources, "motion")
     outputs: fields.CoordinateNames | None = None
-    """Coordinates, measures and points (their x and y) that are asked for. Left out: every moving point, link and
-    slide; in reliability what is limited, if anything is. Example: [C, rod.angle, mu]
+    """Coordinates, measures and points (their x and y) that are asked for; in reliability columns of dynamics as well
+    (theta_effort, A_force). Left out: every moving point, link and slide; in reliability what is limited, if anything
+    is. Example: [C, rod.angle, mu]
     """
     rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     """Velocities of drives, or of all coordinates that the poses give; velocities and accelerations of the outputs (or
@@ -199,13 +200,17 @@ class MotionSection(PoseSection):
         """Check rates, accelerations and the speed as well."""
         checker.coordinates(self.rates, (self.command, "rates"), 1)
         checker.coordinates(self.accelerations, (self.command, "accelerations"), 2)
-        if _motion(_source(checker, self)):
+        if _motion(source_of(checker, self)):
             _check_motion(checker, self)
         elif self.speed is not None:
             _check_speed(checker, self)
         else:
             _check_rates(checker, self)
         return super().checked(checker)
+
+    def of_given(self, drives: Collection[str]) -> bool:
+        """Whether its rates are those of the coordinates that the poses give rather than of the drives."""
+        return self.speed is not None or not {*self.rates, *self.accelerations, *(self.motion or ())} <= {*drives}
 
 
 def _check_motion(checker: Checker, section: MotionSection) -> None:
@@ -233,7 +238,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
     Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
     """
     drives = checker.mechanism.driven_kinds
-    source = _source(checker, section)
+    source = source_of(checker, section)
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
     parts = (("rates", section.rates), ("accelerations", section.accelerations))
@@ -268,7 +273,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         if getattr(section, key):
             message = f"'speed' and {key!r} are both given; a path is passed at one of them"
             checker.report((section.command, key), message, at_key=True)
-    path = _source(checker, section).path
+    path = source_of(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
         checker.report((section.command, "speed"), message, at_key=True)
@@ -281,7 +286,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         checker.report((section.command, "speed"), message, at_key=True)
 
 
-def _source(checker: Checker, section: PoseSection) -> PoseSection:
+def source_of(checker: Checker, section: PoseSection) -> PoseSection:
     """The section that gives the poses of another: itself, or kinematics."""
     return section if section.source is not None else checker.parts.get("kinematics") or section
 
