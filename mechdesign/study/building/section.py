@@ -53,7 +53,7 @@ class Rod(fields.Model):
     """Mass of the second body of a telescopic link, whose frame has its origin at ``to`` and the link's direction."""
 
     mass: fields.NonNegativeMassPlace
-    """Mass. Example: 1.2 kg"""
+    """Mass of this body. Example: 1.2 kg"""
     center: Point | None = None
     """Centre of mass, [x, y] from ``to``, x along the link. Left out: at ``to``. Example: [-100, 0]"""
     inertia: fields.NonNegativeInertiaPlace | None = None
