@@ -17,7 +17,8 @@ GROUPS = {
     "Four-bars": ("four_bar", "parallelogram", "wiper", "pumpjack", "function_generator", "path_synthesis",
                   "straight_line_synthesis", "straight_line_front"),
     "Sliders": ("slider_crank", "offset_slider_crank", "inverted_slider_crank", "oscillating_cylinder", "scotch_yoke",
-                "whitworth", "shaper", "oldham", "trammel", "rapson_slide", "v_twin", "sine_generator"),
+                "whitworth", "shaper", "oldham", "trammel", "rapson_slide", "v_twin", "sine_generator",
+                "rise_dwell_return"),
     "Six-bars and more": ("watt", "stephenson", "stephenson_ii", "jansen", "klann", "toggle", "toggle_clamp",
                           "scissor_lift", "excavator"),
     "Straight lines": ("chebyshev", "hoeken", "hart", "peaucellier", "watt_parallel_motion", "pantograph"),
@@ -25,14 +26,15 @@ GROUPS = {
                "rrr_platform", "rrr_orientations"),
     "Reliability": ("two_link_arm", "two_link_arm_uniform", "slider_crank_tolerances", "function_generator_made",
                     "bored_in_one_setting", "cheapest_tolerances", "one_in_a_billion", "five_bar_precision_map"),
+    "Dynamics": ("flywheel_press", "twin_cylinder", "wiper_motor", "balanced_arm", "excavator_lift"),
     "Stiffness": ("planar_3rpr", "planar_2rpr_rp", "planar_rp_rr", "press_stiffness", "stiffness_map", "loaded_arm"),
 }  # fmt: skip
 # Of the home page: mechanisms that look unlike each other.
 HOME = ("four_bar", "jansen", "shaper", "five_bar", "scissor_lift", "v_twin", "peaucellier", "excavator", "watt",
         "pantograph", "klann", "trammel")  # fmt: skip
 # The picture that says most, where there are several; paths of a group without one.
-PICTURES = ("optimum", "allocation", "deflections", "failure_map", "density_contours", "springs", "workspace", "paths",
-            "bands", "reliability")  # fmt: skip
+PICTURES = ("optimum", "allocation", "free_bodies", "deflections", "failure_map", "density_contours", "springs",
+            "workspace", "paths", "bands", "reliability")  # fmt: skip
 
 
 def studies() -> dict[str, Path]:

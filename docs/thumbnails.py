@@ -6,7 +6,7 @@ It moves by style rules, without a script, and stands still where the reader's s
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, fromstring, tostring
@@ -17,7 +17,7 @@ import mechdesign
 from mechdesign.errors import MechdesignError
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import PLACES, TIMES, TURNS
+from mechdesign.report.page.tracks import PLACES, TIMES, TURNS, steps
 
 # A moving part lies this far beside its pose at most: units of a drawing that is shown half as large, degrees, lengths.
 _NEAR = {"translate": 1.0, "rotate": 0.5, "scale": 0.01}
@@ -27,7 +27,7 @@ _STYLE = (
     ".moving-trace{{stroke-width:2.5}}[class^=m-]{{animation:{seconds:g}s linear infinite{back}}}{rules}"
     "@media(prefers-reduced-motion:reduce){{*{{animation:none!important}}}}"
 )
-_MOVED_BY = ("data-at", "data-turn", "data-from", "data-to", "data-part")
+_MOVED_BY = ("data-at", "data-turn", "data-from", "data-to", "data-way")
 
 
 def thumbnail(path: Path) -> str | None:
@@ -68,7 +68,7 @@ class Tracks:
 
     def __init__(self, data: Mapping[str, Any]) -> None:
         self.data, count = data, data["poses"]
-        times = _values(data["times"], count + 1, TIMES)
+        times = steps(data["times"], count + 1) / TIMES
         # Behind the last pose of a closed motion comes the first again.
         poses = np.arange(count + (times[count] > times[count - 1])) % count
         valid = np.ones(count, dtype=bool)
@@ -80,20 +80,19 @@ class Tracks:
         self.times = (times[run] - times[run[0]]) / (times[run[-1]] - times[run[0]])
         self.seconds = data["seconds"]
 
-    def motion(self, at: str, link: str, base: str, tip: str, part: str, element: Element) -> dict[str, Floats]:
+    def motion(self, at: str, link: str, base: str, tip: str, way: str, element: Element) -> dict[str, Floats]:
         """Properties of an element's style over the poses, shape (poses, 1 or 2), by what it is moved by.
 
-        A part of a telescopic leg becomes a level line, which is turned and made longer.
+        A part of a telescopic leg or a spring is drawn level, turned and made longer.
         """
         if at:
             return {"translate": self._place(at)} | ({"rotate": self._turn(link)} if link else {})
-        first, last = map(float, part.split())
-        begin, way = self._place(base), self._place(tip) - self._place(base)
-        length = np.hypot(*way.T)[:, None]
-        angle = np.degrees(np.unwrap(np.arctan2(way[:, 1], way[:, 0])))[:, None]
-        ends = {"x1": "0", "y1": "0", "x2": f"{(last - first) * length[0, 0]:.1f}", "y2": "0"}
-        element.attrib.update(ends)
-        return {"translate": begin + first * way, "rotate": angle, "scale": length / length[0] * [1, 0] + [0, 1]}
+        begin, span = self._place(base), self._place(tip) - self._place(base)
+        length = np.hypot(*span.T)[:, None]
+        angle = np.degrees(np.unwrap(np.arctan2(span[:, 1], span[:, 0])))[:, None]
+        lines = [np.reshape(line.split(), (-1, 2)).astype(float) * [length[0, 0], -1] for line in way.split(",")]
+        element.set("d", "".join("M" + "L".join(f"{x:.1f} {y:g}" for x, y in line) for line in lines))
+        return {"translate": begin, "rotate": angle, "scale": length / length[0] * [1, 0] + [0, 1]}
 
     def _place(self, point: str) -> Floats:
         return np.column_stack([self._track(axis, point, PLACES) for axis in "xy"])
@@ -101,14 +100,8 @@ class Tracks:
     def _turn(self, link: str) -> Floats:
         return np.unwrap(self._track("turn", link, TURNS), period=360)[:, None]
 
-    def _track(self, kind: str, name: str, steps: int) -> Floats:
-        return _values(self.data[kind][name], self.data["poses"], steps)[self.poses]
-
-
-def _values(deltas: Sequence[int | None], count: int, steps: int) -> Floats:
-    """The numbers whose steps `tracks.deltas` has written, those of poses that are not valid as any."""
-    values = np.cumsum([step or 0 for step in deltas] + [0] * (count - len(deltas)))
-    return values / steps
+    def _track(self, kind: str, name: str, unit: int) -> Floats:
+        return steps(self.data[kind][name], self.data["poses"])[self.poses] / unit
 
 
 def _rule(name: str, motion: Mapping[str, Floats], times: Floats) -> str:

@@ -1,4 +1,4 @@
-"""Design studies of planar mechanisms: one description, five questions.
+"""Design studies of planar mechanisms: one description, six questions.
 
 >>> import mechdesign
 >>> from mechdesign.study import template_path
@@ -28,6 +28,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from mechdesign.api.questions import dynamics as dynamics
     from mechdesign.api.questions import kinematics as kinematics
     from mechdesign.api.questions import load as load
     from mechdesign.api.questions import optimize as optimize
@@ -47,7 +48,17 @@ _HOMES = {
     **dict.fromkeys(("AssemblyError", "MechdesignError", "StudyError"), "mechdesign.errors"),
     "requirements": "mechdesign.report.requirements",
     **dict.fromkeys(
-        ("load", "kinematics", "workspace", "optimize", "reliability", "stiffness", "sweep", "sensitivities"),
+        (
+            "load",
+            "kinematics",
+            "workspace",
+            "optimize",
+            "reliability",
+            "stiffness",
+            "dynamics",
+            "sweep",
+            "sensitivities",
+        ),
         "mechdesign.api.questions",
     ),
 }

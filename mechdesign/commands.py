@@ -57,6 +57,11 @@ COMMANDS = {
         Command(
             "stiffness", "How stiff is it?", "Stiffness and compliance matrices, equivalent springs and deflections."
         ),
+        Command(
+            "dynamics",
+            "What drives it, what does it bear?",
+            "Drive efforts, joint forces, shaking forces and energies of a motion.",
+        ),
     )
 }
 SWEEP = Command(

@@ -298,6 +298,45 @@ def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     return _ask("stiffness", study, seed, jobs=jobs, progress=progress)
 
 
+def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Answer:
+    """What drives it, what does it bear? Drive efforts, joint forces, shaking forces and energies of a motion.
+
+    Parameters
+    ----------
+    study : Study
+        With a section ``dynamics``: gravity, loads, and a motion unless kinematics has one.
+    seed, jobs, progress : optional
+        See `mechdesign`; nothing is random.
+
+    Returns
+    -------
+    Answer
+        Tables ``dynamics`` (a row a pose), ``joint_forces`` (a row a pose and joint) and ``extremes``; axes of the
+        world, the study's units.
+
+    Raises
+    ------
+    StudyError
+        If the study has no such section.
+    AssemblyError
+        If no pose at all can be assembled.
+
+    Examples
+    --------
+    A level arm of 2 kg with its centre at 50 mm needs 2 kg * 9.81 m/s^2 * 50 mm = 981 N mm.
+
+    >>> import mechdesign
+    >>> study = mechdesign.load(text='''
+    ... mechanism: {links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 2 kg}}, drives: [arm]}
+    ... dynamics: {gravity: [0, -9.81 m/s^2], poses: [{arm: 0}]}
+    ... ''')
+    >>> result = mechdesign.dynamics(study)
+    >>> print(f"{result.main['arm_effort'][0]:.3f}, {result.tables['joint_forces']['fy'][0]:.3f}")
+    981.000, 19.620
+    """
+    return _ask("dynamics", study, seed, jobs=jobs, progress=progress)
+
+
 def sweep(
     study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL,
     journal: Journal | None = None,

@@ -21,7 +21,7 @@ from mechdesign.errors import EXIT_CODES, Interrupted
 
 app = typer.Typer(
     name="mechdesign",
-    help="Design studies of planar mechanisms: one study file, five questions, tables and pictures.",
+    help="Design studies of planar mechanisms: one study file, six questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,
     # Without Rich, whose import takes a tenth of a second.

@@ -17,6 +17,7 @@ from mechdesign.commands import COMMANDS
 from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import foresee, on_warnings
@@ -38,7 +39,7 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             if not options.quiet:
                 clearances = in_words(study.reliability, study.mechanism.graph, study.sizes)
                 head = printable(f"{label}: {study.name}")
-                terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, ""]))
+                terminal.emit_words("\n".join([head, describe(study.mechanism), *clearances, *_massless(study), ""]))
             doubts = sketch_doubts(study.mechanism)
             for warning in study.warnings:
                 terminal.say(f"{label}: warning: {warning} [suspect]", quiet=options.quiet)
@@ -61,6 +62,19 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             annotate("error", of_error(error, message))
             worst = max(worst, code)
     return worst
+
+
+def _massless(study: Study) -> list[str]:
+    """Links of a study of dynamics that have neither a mass nor beams with a density, as a line."""
+    if study.dynamics is None:
+        return []
+    description, stiffness = study.mechanism.description, study.stiffness
+    beams = {} if stiffness is None else {
+        link: stiffness.sections[section].density for link, section in stiffness.elastic.items()
+    }  # fmt: skip
+    links = [link for link in description.links if link != GROUND
+             and link not in description.masses and beams.get(link) is None]  # fmt: skip
+    return [f"massless: {', '.join(links)}"] if links else []
 
 
 def _foresee(study: Study) -> None:

@@ -26,6 +26,8 @@ ZERO = 1e-8
 ZERO_AT_FOLD = 1e-4
 # An extreme this near to a pose (in rows) may be at that pose.
 BESIDE_ROW = 1e-4
+# The same of a motion over time, which is flatter where it comes to rest.
+BESIDE_REST = 0.1
 # A value of the function counts if it is within this part of the function's size from the series.
 TRUE = 1e-7
 # Sides of `searchsorted`: to the first of equal values, and behind the last.
@@ -169,7 +171,7 @@ class Functions(Series):
         place = self.curve.inside(line, place)
         # A function is flat at an extreme: a pose beside it with the same value is the place.
         row = np.round(place)
-        near = np.abs(row - place) <= BESIDE_ROW
+        near = np.abs(row - place) <= (BESIDE_ROW if self.curve.poses.program is None else BESIDE_REST)
         beside = np.flatnonzero(near & self.curve.holds(line, row, INSET * self.curve.poses.end))
         own = np.concatenate([rows, rows[beside]])
         table = self.at(np.concatenate([line, line[beside]]), np.concatenate([place, row[beside]]))

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.errors import MechdesignError
+from mechdesign.questions.dynamics import analysis as dynamics
 from mechdesign.questions.kinematics import analysis as kinematics
 from mechdesign.questions.look import ask
 from mechdesign.questions.optimize.stacked import grouped, shared
@@ -20,7 +21,7 @@ from mechdesign.study.poses import Poses
 
 # Functions of the commands that answer many designs at once.
 TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {
-    "kinematics": kinematics.answers, "stiffness": stiffness.answers
+    "kinematics": kinematics.answers, "stiffness": stiffness.answers, "dynamics": dynamics.answers
 }  # fmt: skip
 
 

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Either, Value, Vector, cross, norm2, plus, quiet, times
+from mechdesign.mechanism.algebra import Either, Value, Vector, cross, norm2, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
@@ -90,10 +90,28 @@ class Linearization(Loops):
             sides = [part for value in right for part in (-value.real, -value.imag)]
             return solve_linear(rows_of(lines), sides)[0]
         a, b = lines[0]
+        scale = self._scale(index, a, b)
+        return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
+
+    def hold_group(self, index: int, group: Group, moving: Sequence[Value]) -> list[Vector]:
+        """Forces that hold a group's loops closed against what would move its angles and slides, one a loop.
+
+        They solve the transposed equations, dot(column, force) = -moving.
+        """
+        lines = self.loop_columns(index, group)
+        if len(lines) > 1:
+            sides = [-value for value in moving]
+            parts = solve_linear(list(zip(*rows_of(lines), strict=True)), sides)[0]
+            return [vector(parts[k], parts[k + 1]) for k in range(0, len(parts), 2)]
+        a, b = lines[0]
+        p, q = (value * self._scale(index, a, b) for value in moving)
+        along = q * a - p * b
+        return [vector(-along.imag, along.real)]
+
+    def _scale(self, index: int, a: Vector, b: Vector) -> Value:
         if index not in self._scales:
             self._scales[index] = -1 / cross(a, b)
-        scale = self._scales[index]
-        return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
+        return self._scales[index]
 
     @quiet
     def _solve(

@@ -64,7 +64,7 @@ class Geometry:
     graph: Graph
     places: Mapping[str, Place]
 
-    def term(self, term: Term, values: Mapping[str, Value]) -> Value:
+    def term(self, term: Term | Value, values: Mapping[str, Value]) -> Value:
         """Value of a place or number."""
         if isinstance(term, str):
             value = values.get(term)

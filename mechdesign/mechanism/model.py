@@ -12,9 +12,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from mechdesign.expressions import Expression
+from mechdesign.mechanism.algebra import Value
 
 Term = str | float
 Quantity = Literal["length", "angle", "none"]
+# Kinds of numbers of masses and springs, as `mechdesign.study.text.units.KINDS` has them.
+Physical = Literal[
+    "mass", "moment_of_inertia", "force", "moment", "stiffness", "rotational_stiffness", "damping", "rotational_damping"
+]  # fmt: skip
 
 # Prefix of the places of parameters that measures use; no name in a study has a colon.
 MEASURED = "measures:"
@@ -22,11 +27,11 @@ MEASURED = "measures:"
 
 @dataclass(frozen=True)
 class Place:
-    """One number of the geometry: its name, nominal value (angles in radians) and kind."""
+    """One number of the mechanism: its name, nominal value (angles in radians, else the study's unit) and kind."""
 
     name: str
     nominal: float
-    quantity: Quantity = "length"
+    quantity: Quantity | Physical = "length"
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,36 @@ class Link:
     points: Mapping[str, tuple[Term, Term]]
     ends: tuple[str, str] | None = None
     telescopic: bool = False
+
+
+@dataclass(frozen=True)
+class Mass:
+    """Mass of a body, its centre in the body's frame, and its moment of inertia about this centre.
+
+    Without a centre it is the middle of the body's points.
+    """
+
+    mass: Term | Value
+    center: tuple[Term | Value, Term | Value] | None = None
+    inertia: Term | Value = 0.0
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring and damper between two points, or with `turning` between two links, the second from the first.
+
+    It pulls its points together, or turns its links back, with ``preload - push + stiffness (x - free) + damping x'``,
+    x the distance or the angle.
+    """
+
+    name: str
+    between: tuple[str, str]
+    turning: bool
+    stiffness: Term = 0.0
+    free: Term = 0.0
+    preload: Term = 0.0
+    push: Term = 0.0
+    damping: Term = 0.0
 
 
 @dataclass(frozen=True)
@@ -137,7 +172,7 @@ class Description:
 
     `sketch` has rough positions of points in the world. Where two assemblies meet, `branch` ``side`` keeps each joint
     on its side and ``follow`` goes on smoothly. `angle_unit` is the study's unit of angle in radians, for measure
-    expressions, messages and `Mechanism.solve`.
+    expressions, messages and `Mechanism.solve`. `masses` are by body: of a telescopic leg two.
     """
 
     places: Mapping[str, Place]
@@ -149,3 +184,5 @@ class Description:
     sketch: Mapping[str, complex] = field(default_factory=dict)
     branch: Literal["side", "follow"] = "side"
     angle_unit: float = 1.0
+    masses: Mapping[str, Mass] = field(default_factory=dict)
+    springs: Mapping[str, Spring] = field(default_factory=dict)

@@ -67,7 +67,7 @@ def remainder(coefficients: Floats) -> Floats:
     """
     before, last = (np.abs(coefficients[..., pair]).max(axis=-1) for pair in (slice(-4, -2), slice(-2, None)))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(last < before, last * last / before, last))
+        return np.asarray(np.where(last < before, last * (last / before), last))
 
 
 def at_places(coefficients: Floats) -> Floats:

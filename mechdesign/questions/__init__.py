@@ -1,1 +1,1 @@
-"""The five questions, a package each; an analysis is a pure function of the study and a seed."""
+"""The six questions, a package each; an analysis is a pure function of the study and a seed."""

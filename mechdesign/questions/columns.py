@@ -9,6 +9,7 @@ from mechdesign.results import ColumnKind, KeyNumber, TableKind
 from mechdesign.study import Units
 
 DRIVE = ColumnKind("<drive>", "drive", "length or angle")
+TIMED = ColumnKind("time", "time from the begin of the motion", "time")
 GIVEN = ColumnKind("<coordinate>", "given", "as the coordinate")
 VALID = ColumnKind("valid", "1 where the pose is assembled and within its limits")
 

@@ -21,12 +21,12 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.mechanism import begun
 from mechdesign.mechanism.plan import Plan
 from mechdesign.numerics.arrays import Floats, Ints, evenly
-from mechdesign.questions.columns import GIVEN
+from mechdesign.questions.columns import GIVEN, TIMED
 from mechdesign.results import Column, Scope, Table
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
 from mechdesign.study.expansion import OWN, Numbers, default, expand, number_of_poses
-from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.poses import TIME, PoseGroup, Poses
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.work.chunks import map_chunks, worker_count
 
@@ -77,7 +77,11 @@ def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
     asked = next((each for name in dict.fromkeys((section, "kinematics"))
                   if (each := getattr(designs.study, name)) is not None and each.source is not None), None)  # fmt: skip
-    counts = np.zeros((len(rows), 0)) if asked is None else number_of_poses(asked, designs.take(rows).numbers)
+    counts = (
+        np.zeros((len(rows), 0))
+        if asked is None
+        else number_of_poses(asked, designs.study.folder, designs.take(rows).numbers)
+    )
     kinds, which = np.unique(counts, axis=0, return_inverse=True)
     for kind in range(len(kinds)):
         members = rows[which.ravel() == kind]
@@ -227,11 +231,17 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
 
 
 def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
-    """The coordinates that the study gives, as columns; of these rows of the poses."""
-    return [
+    """The time of a motion and the coordinates that the study gives, as columns; of these rows of the poses."""
+    timed = [TIMED.column(poses.times[rows], study.units.label("time"))] if poses.times is not None else []
+    return timed + [
         GIVEN.column(values[rows], study.units.label(study.mechanism.quantity(name)), coordinate=name)
         for name, values in poses.values.items()
     ]
+
+
+def unit_of(study: Study, swept: str) -> str:
+    """Unit of time, or of a coordinate."""
+    return study.units.label("time" if swept == TIME else study.mechanism.quantity(swept))
 
 
 def judge_failures(
@@ -280,11 +290,11 @@ def of_poses(tables: Iterable[Table], reason: NDArray[np.int8]) -> dict[str, Tab
 
 
 def pose_in_words(study: Study, poses: Poses, row: int, digits: int = 6) -> str:
-    """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row."""
+    """``theta1 = 30 deg, theta2 = 60 deg`` for the pose of a row, with its time along a motion over time."""
     parts = []
-    for name, values in poses.values.items():
+    for name, values in poses.named.items():
         if np.isfinite(values[row]):
-            unit = study.units.label(study.mechanism.quantity(name))
+            unit = unit_of(study, name)
             parts.append(f"{name} = {values[row] + 0.0:.{digits}g} {unit}".rstrip())
     return ", ".join(parts)
 

@@ -59,19 +59,33 @@ def csv_blocks(table: Table) -> Iterator[str]:
             yield _lines([values[start : start + _BLOCK] for values in columns])
 
 
-def _lines(columns: Sequence[NDArray[Any]]) -> str:
-    """Lines of a table; tables of numbers only are formatted at once, in a third of the time."""
-    if not all(values.dtype.kind in "fiub" for values in columns):
+class _Words(dict[str, str]):
+    """Cells of texts, each made once: in one safe line, harmless and quoted; `alone` in its line or beside others."""
+
+    def __init__(self, *, alone: bool) -> None:
+        self.alone = alone
+
+    def __missing__(self, text: str) -> str:
         stream = io.StringIO()
-        cells = [texts(v, _DIGITS) if v.dtype.kind in "fiub" else map(_harmless, texts(v, _DIGITS)) for v in columns]
-        csv.writer(stream, lineterminator="\n").writerows(zip(*cells, strict=True))
-        return stream.getvalue()
-    floats = [values.dtype.kind == "f" for values in columns]
-    line = ",".join(f"%.{_DIGITS}g" if each else "%d" for each in floats) + "\n"
-    flat: list[float] = [0] * (len(columns) * len(columns[0]))
+        cell = _harmless(printable(text))
+        csv.writer(stream, lineterminator="").writerow([cell] if self.alone else [cell, ""])
+        self[text] = stream.getvalue() if self.alone else stream.getvalue()[:-1]
+        return self[text]
+
+
+def _lines(columns: Sequence[NDArray[Any]]) -> str:
+    """Lines of a table, all formatted at once."""
+    rows, words = len(columns[0]), _Words(alone=len(columns) == 1)
+    forms = {"f": f"%.{_DIGITS}g"} | dict.fromkeys("iub", "%d")
+    line = ",".join(forms.get(values.dtype.kind, "%s") for values in columns) + "\n"
+    flat: list[Any] = [0] * (len(columns) * rows)
     for k, values in enumerate(columns):
-        flat[k :: len(columns)] = (values + 0.0 if floats[k] else values).tolist()
-    return line * len(columns[0]) % tuple(flat)
+        if values.dtype.kind in forms:
+            # Adding zero turns -0.0 into 0.0: the sign of a zero is an accident of rounding.
+            flat[k :: len(columns)] = (values + 0.0 if values.dtype.kind == "f" else values).tolist()
+        else:
+            flat[k :: len(columns)] = [words[str(value)] for value in values.tolist()]
+    return line * rows % tuple(flat)
 
 
 def from_csv(text: str, name: str, columns: Sequence[Mapping[str, Any]], meaning: str = "") -> Table:

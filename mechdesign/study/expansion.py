@@ -12,10 +12,12 @@ from mechdesign.errors import StudyError
 from mechdesign.mechanism.model import Description, Term
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.study import point_paths
+from mechdesign.study.motion_program import number_of_instants, program
 from mechdesign.study.point_paths import PointPath, Polyline, table_of
-from mechdesign.study.poses import MAX_POSES, PoseGroup, Poses, by_length, with_length
+from mechdesign.study.poses import MAX_POSES, PoseGroup, Poses, by_length, by_time, with_length
+from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.paths import PathSection
-from mechdesign.study.schema.poses import PoseSection, Sweep
+from mechdesign.study.schema.poses import INSTANTS, MotionSection, PoseSection, Sweep
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount
 
@@ -72,8 +74,14 @@ def sweep_values(sweep: Sweep, numbers: Numbers = OWN) -> Floats:
     return begin[:, None] + step[:, None] * np.arange(math.floor(steps.min()) + 1, dtype=np.float64)
 
 
-def number_of_poses(section: PoseSection, numbers: Numbers) -> Ints:
-    """Numbers of values of swept coordinates that steps give, shape (designs, coordinates); -1 where there is none."""
+def number_of_poses(section: PoseSection, folder: Folder, numbers: Numbers) -> Ints:
+    """Numbers of poses that differ from design to design, shape (designs, n); -1 where there is none.
+
+    They are those of each swept coordinate that has a step, or of a motion over time.
+    """
+    if isinstance(section, MotionSection) and section.motion is not None:
+        count = number_of_instants(section.motion, section.instants or INSTANTS, folder, numbers.of)
+        return np.broadcast_to(count, numbers.count)[:, None]
     counts = []
     for sweep in (section.sweep or {}).values():
         if sweep.step is not None:
@@ -99,6 +107,8 @@ def expand(section: PoseSection, folder: Folder, numbers: Numbers = OWN) -> Pose
         poses = _grid({name: sweep_values(sweep, numbers) for name, sweep in section.sweep.items()})
     elif section.path is not None:
         poses = _path(section.path, folder, numbers)
+    elif isinstance(section, MotionSection) and section.motion is not None:
+        poses = _timed(section.motion, section.instants or INSTANTS, folder, numbers)
     else:
         return None
     return of_designs(poses, numbers)
@@ -185,6 +195,19 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
     return replace(poses, slopes=slopes, bends=bends)
 
 
+def _timed(motion: Mapping[str, Course], instants: int, folder: Folder, numbers: Numbers) -> Poses:
+    """Poses of a motion over time."""
+    timed = program(motion, instants, folder, numbers.of)
+    count = timed.times.shape[1]
+    line = np.repeat(np.arange(numbers.count), count)
+    place = np.tile(np.arange(count, dtype=float), numbers.count)
+    slopes, bends = by_time(timed, line, place)
+    return replace(
+        Poses.single({name: timed.at(name, line, place) for name in motion}, (count,)), designs=numbers.count,
+        motion=True, corners=timed.corners, program=timed, times=timed.time(line, place), slopes=slopes, bends=bends,
+    )  # fmt: skip
+
+
 def default(description: Description, numbers: Numbers = OWN) -> Poses:
     """Poses where a study gives none: a turn of an angle drive in 72 steps, or the drive's limits in 50.
 
@@ -196,7 +219,7 @@ def default(description: Description, numbers: Numbers = OWN) -> Poses:
     if len(description.drives) != 1:
         raise StudyError(
             f"the study says no poses, and with {len(description.drives)} drives none can be assumed; "
-            "give 'poses', 'sweep' or 'path'"
+            "give 'poses', 'sweep', 'path' or 'motion'"
         )
     drive = next(iter(description.drives.values()))
     factor = description.angle_unit if drive.kind == "angle" else 1.0
@@ -210,7 +233,7 @@ def default(description: Description, numbers: Numbers = OWN) -> Poses:
         return of_designs(_grid({drive.name: turn}), numbers)
     raise StudyError(
         f"the study says no poses, and the drive {drive.name!r} has no limits to move between; "
-        "give 'poses', 'sweep' or 'path', or limits of the drive"
+        "give 'poses', 'sweep', 'path' or 'motion', or limits of the drive"
     )
 
 

@@ -26,6 +26,7 @@ from mechdesign.expressions import RESERVED, Expression
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.mechanism import Variant
 from mechdesign.mechanism.model import Description
+from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.optimize.schema import OptimizeSection, Requirement, check_result
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
@@ -95,6 +96,7 @@ class Study:
     optimize: OptimizeSection | None
     reliability: ReliabilitySection | None
     stiffness: StiffnessSection | None
+    dynamics: DynamicsSection | None
     matrix: MatrixSection | None
     sensitivities: SensitivitiesSection | None
     requirements: tuple[Requirement, ...]  #: in the order of the file
@@ -339,7 +341,7 @@ def load_document(
     wrong = reporter.concerns("mechanism", "units")
     mechanism = None if wrong else _compiled(description, reporter, original)
     parameters = builder.parameters(formulas)
-    checker = Checker(builder, parameters, parts, source.folder)
+    checker = Checker(builder, parameters, parts, source.folder, mechanism)
     parts = _checked(checker)
     _check_use(parts, parameters, context, reporter)
     reporter.done()

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.study.motion_program import MotionProgram
 from mechdesign.study.point_paths import PointPath, between
 from mechdesign.study.text import fields
 from mechdesign.study.text.units import Amount
@@ -17,6 +18,8 @@ from mechdesign.study.text.units import Amount
 HELP_PAGE = "reference/study/kinematics"
 
 MAX_POSES = 10_000_000
+# What is swept along a motion over time.
+TIME = "time"
 _Section = TypeVar("_Section", bound=fields.Model)
 
 
@@ -67,8 +70,10 @@ class Poses:
     # Paths of points, by point. Other coordinates change evenly from pose to pose.
     paths: Mapping[str, PointPath] = field(default_factory=dict)
     corners: Floats = field(default_factory=lambda: np.empty(0))  # places of a motion that are not smooth, in rows
-    # Along the path of a point, shape (count,): first and second derivative of every coordinate given by the path's
-    # length, in the study's units; nan where the path has no direction.
+    program: MotionProgram | None = None  # of a motion over time
+    times: Floats | None = None  # of its poses, in the study's unit, shape (count,)
+    # Along the path of a point, or over time, shape (count,): first and second derivative of every coordinate given by
+    # the path's length or by time, in the study's units; nan where the path has no direction.
     slopes: Mapping[str, Floats] = field(default_factory=dict)
     bends: Mapping[str, Floats] = field(default_factory=dict)
     # Of a grid of rays over a workspace: one a value of its held coordinates.
@@ -100,6 +105,11 @@ class Poses:
         return columns
 
     @property
+    def named(self) -> dict[str, Floats]:
+        """Time along a motion over time, and every coordinate, over all poses, shape (count,)."""
+        return {**({} if self.times is None else {TIME: self.times}), **self.values}
+
+    @property
     def line(self) -> int:
         """Poses that follow one another: those of a motion, or of a line of a grid along its last coordinate."""
         return self.grid[-1]
@@ -126,7 +136,9 @@ class Poses:
         values = {}
         for name in group.names:
             owner, _, axis = name.rpartition(".")
-            if owner in self.paths and axis in ("x", "y"):
+            if self.program is not None:
+                values[name] = self.program.at(name, line, s)
+            elif owner in self.paths and axis in ("x", "y"):
                 place = self.paths[owner].at(line, s)
                 values[name] = place.real if axis == "x" else place.imag
             else:
@@ -141,9 +153,13 @@ class Poses:
             (PoseGroup(group.names, values, np.arange(len(s))),), len(s), False, (len(s),), places=places,
             parameters=parameters, nominal=self.nominal,
         )  # fmt: skip
-        if not self.slopes:
+        if self.program is not None:
+            poses = replace(poses, times=self.program.time(line, s))
+            slopes, bends = by_time(self.program, line, s)
+        elif self.slopes:
+            slopes, bends = by_length(self, line, s)
+        else:
             return poses
-        slopes, bends = by_length(self, line, s)
         return replace(poses, slopes=slopes, bends=bends)
 
     def of(self, number: float, rows: Ints | slice = slice(None)) -> Number:
@@ -166,11 +182,20 @@ class Poses:
 
     @property
     def swept(self) -> str | None:
-        """The one coordinate that moves along a motion; None of listed poses, and where several do."""
+        """Time, or the one coordinate that moves along a motion; None of listed poses, and where several do."""
         if self.listed:
             return None
+        if self.times is not None:
+            return TIME
         moving = self.moving
         return moving[0] if len(moving) == 1 else None
+
+    @property
+    def abscissa(self) -> Floats:
+        """What is swept, at each pose, or the row of the pose; shape (count,)."""
+        if self.times is not None:
+            return self.times
+        return self.numbers if self.swept is None else self.values[self.swept]
 
     @property
     def moving(self) -> list[str]:
@@ -179,10 +204,12 @@ class Poses:
         return [name for name, values in each.items() if (np.ptp(values, axis=1) > 0).any()]
 
     def pace(self, line: Ints, s: Floats) -> Floats:
-        """How fast a motion passes places, shape (n,): length of a point's path a row, or change of what is swept.
+        """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
 
         Means along the motion are by these; where several coordinates move without a path they are by rows.
         """
+        if self.program is not None:
+            return self.program.pace(line, s)
         moving = with_length(self.paths)
         if len(moving) == 1:
             return moving[0][1].course(line, s)[2]
@@ -211,9 +238,11 @@ class Poses:
         parts = (self.places, self.parameters, self.slopes, self.bends)
         places, parameters, slopes, bends = ({name: v[rows] for name, v in part.items()} for part in parts)
         paths = {owner: path.take(designs) for owner, path in self.paths.items()}
+        program = None if self.program is None else self.program.take(designs)
         return replace(
             self, groups=tuple(groups), count=len(rows), designs=len(designs), places=places, parameters=parameters,
-            paths=paths, slopes=slopes, bends=bends,
+            paths=paths, program=program, times=self.times[rows] if self.times is not None else None, slopes=slopes,
+            bends=bends,
         )  # fmt: skip
 
     def take(self, rows: Ints | slice) -> Poses:
@@ -227,7 +256,8 @@ class Poses:
         count = len(taken)
         return replace(
             self, groups=(PoseGroup(group.names, values, np.arange(count)),), count=count, grid=(count,),
-            places=places, parameters=parameters, slopes=slopes, bends=bends, rows=taken,
+            places=places, parameters=parameters, times=self.times[rows] if self.times is not None else None,
+            slopes=slopes, bends=bends, rows=taken,
         )  # fmt: skip
 
 
@@ -256,4 +286,10 @@ def by_length(poses: Poses, line: Ints, s: Floats) -> tuple[dict[str, Floats], d
     for axis, part in (("x", np.real), ("y", np.imag)):
         slopes[f"{owner}.{axis}"] = part(slopes_of_point).copy()
         bends[f"{owner}.{axis}"] = part(bends_of_point).copy()
+    return slopes, bends
+
+
+def by_time(program: MotionProgram, line: Ints, s: Floats) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Derivatives of what poses give by time, at places in rows: `slopes` and `bends`."""
+    slopes, bends = ({name: program.at(name, line, s, order) for name in program.courses} for order in (1, 2))
     return slopes, bends

@@ -132,6 +132,13 @@ def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
             holder, key = mechanism["parameters"], name
         elif owner.startswith("limits."):
             holder = mechanism["limits"][int(owner.partition(".")[2])]
+        elif owner in study.mechanism.description.springs:
+            holder = mechanism["springs"][owner]
+        elif last in ("mass", "inertia") or owner.endswith(".center"):
+            link, *inner = owner.split(".")
+            holder, key = mechanism["links"][link], "xy".index(last) if owner.endswith(".center") else last
+            for part in inner:
+                holder = holder[part]
         elif last in ("direction", "angle"):
             holder = mechanism["joints"][owner]
         elif last == "length":

@@ -92,8 +92,21 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     hopeless = study_of(FIVE_BAR, "optimize={method: search, evaluations: 20, variables: {a: {from: 0.25, to: 0.27}}, "
                         "minimize: a, subject_to: [{result: a, at_least: 1}]}")  # fmt: skip
     stiff = mechdesign.load(PLATFORM, ["stiffness.characteristic_length=0.2", "stiffness.direction=30"])
+    crank = study_of(
+        FOUR_BAR,
+        "kinematics={motion: {crank: [{from: 20, to: 60, time: 1}]}, instants: 2, instant_centres: [[ground, rod]]}",
+        "reliability={dimensions: {rod.length: 0.1}, limits: {B.x: 0.1, B.y: 0.1}, methods: [monte_carlo, auto], "
+        "samples: 100, allocate: {cpk: 1, grades: true}}",
+    )
+    legs = mechdesign.load(PLATFORM, [
+        "kinematics={motion: {P.x: [{from: 0, to: 0.1, time: 1}], P.y: 1, platform.angle: 0}, instants: 2}",
+        "stiffness.poses=null", "stiffness.characteristic_length=0.2",
+    ])  # fmt: skip
     return (
         ("pieces", mechdesign.workspace(bar), bar),
+        ("time and centres", mechdesign.kinematics(crank), crank),
+        ("errors over time", mechdesign.reliability(crank), crank),
+        ("stiffness over time", mechdesign.stiffness(legs), legs),
         ("goals", mechdesign.optimize(bar), bar),
         ("held", mechdesign.optimize(held), held),
         ("front", mechdesign.optimize(front), front),

@@ -143,3 +143,29 @@ def test_v_twin_has_a_primary_force_of_constant_size() -> None:
     forward, backward = (np.mean(total * np.exp(sign * 1j * t[:-1])) for sign in (-1, 1))
     assert forward == pytest.approx(-40, abs=1e-9)
     assert abs(backward) == pytest.approx(0, abs=1e-9)
+
+
+def test_pusher_moves_by_its_laws_and_its_servo_by_the_law_of_cosines() -> None:
+    """Peaks of the modified sine, 1.760 h/T and 5.528 h/T^2, and of the 3-4-5 polynomial, 1.875; h = 50 mm."""
+    result = result_of("rise_dwell_return")
+    motion, extremes = result.tables["motion"], result.tables["extremes"]
+    slow = np.pi / (4 + np.pi)
+    velocity, acceleration = row(extremes, "C.x_velocity"), row(extremes, "C.x_acceleration")
+    assert velocity["max"] == pytest.approx(4 * slow * 50 / 0.25, rel=1e-12)
+    assert velocity["min"] == pytest.approx(-15 / 8 * 50 / 0.35, rel=1e-12)
+    assert (velocity["max_at"], velocity["min_at"]) == pytest.approx((0.125, 0.25 + 0.1 + 0.175), abs=1e-7)
+    assert acceleration["max"] == pytest.approx(4 * np.pi * slow * 50 / 0.25**2, rel=1e-12)
+    assert acceleration["min"] == pytest.approx(-acceleration["max"], rel=1e-12)
+    # cos(servo) = (x^2 + r^2 - l^2)/(2 x r) and its derivatives by time.
+    x, speed, r, rod = motion["C.x"], motion["C.x_velocity"], 40, 110
+    cosine = (x**2 + r**2 - rod**2) / (2 * x * r)
+    slope = (1 - (r**2 - rod**2) / x**2) / (2 * r)
+    sine = np.sqrt(1 - cosine**2)
+    turning = -slope * speed / sine
+    bend = (r**2 - rod**2) / (x**3 * r) * speed**2 + slope * motion["C.x_acceleration"]
+    assert motion["servo"] == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-11)
+    assert motion["servo_velocity"] == pytest.approx(np.degrees(turning), abs=1e-9)
+    assert motion["servo_acceleration"] == pytest.approx(np.degrees(-(bend + cosine * turning**2) / sine), abs=1e-7)
+    dwell = (motion["time"] >= 0.25) & (motion["time"] < 0.35)
+    assert np.all(motion["C.x"][dwell] == 135)
+    assert not motion["servo_velocity"][dwell].any()

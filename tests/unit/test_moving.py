@@ -1,8 +1,6 @@
 """The mechanism in the report: what the script is given is the motion of the tables, part by part."""
 
 import json
-import re
-import string
 from functools import cache
 from xml.etree import ElementTree
 
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.gallery import FOLDER, result_of, study_named
 from helpers.studies import study_of
+from helpers.tracks import decoded
 
 import mechdesign
 from mechdesign.questions.workspace.analysis import workspace
@@ -17,18 +16,6 @@ from mechdesign.report.page.frames import frames
 from mechdesign.report.page.moving import moving
 from mechdesign.report.page.tracks import PLACES, TURNS
 from mechdesign.study import load
-
-
-def decoded(text, count, unit=1):
-    """Values of steps in letters, as the script reads them: a point for none, or digits to the base 32."""
-    digits = string.ascii_uppercase + string.ascii_lowercase + string.digits + "-_"
-    numbers = []
-    for word in re.findall(r"\.|[g-z0-9_-]*[A-Za-f]", text):
-        value = sum((digits.index(letter) % 32) * 32**k for k, letter in enumerate(word) if word != ".")
-        numbers.append(None if word == "." else -(value + 1) // 2 if value % 2 else value // 2)
-    numbers += [0] * (count - len(numbers))
-    known = np.array([step is not None for step in numbers])
-    return np.where(known, np.cumsum([step or 0 for step in numbers]) / unit, np.nan)
 
 
 def places(data, point):

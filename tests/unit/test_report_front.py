@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from helpers.fronts import FRONTS
+from helpers.tracks import decoded
 
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
@@ -32,10 +33,6 @@ def asked() -> Any:
 def shown(result: Any) -> Any:
     with style.context("paper"):
         return page.front(result.drawn.designs, result.tables["pareto"], "front")
-
-
-def decoded(steps: list[int | None], count: int) -> np.ndarray:
-    return np.cumsum([*steps, *[0] * (count - len(steps))])
 
 
 @pytest.mark.slow

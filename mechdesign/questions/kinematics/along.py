@@ -23,7 +23,7 @@ from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.motion import Motion, rates_of_advantage
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.kinematics.rates import unitless
-from mechdesign.questions.poses import SolvedPoses
+from mechdesign.questions.poses import SolvedPoses, unit_of
 from mechdesign.results import POSES_ONLY, Column, TableKind
 from mechdesign.statistics import Asked, Part
 from mechdesign.study import Study
@@ -65,7 +65,7 @@ class Along:
         mechanism, sizes = question.study.mechanism, question.sizes
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
         columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
-        columns |= {static.name: 0.0 for static in question.statics}
+        columns |= {static.name: static.size for static in question.statics}
         self._asked, self._within = asked, dict[Part, Along]()
         whole = [each for each in asked if not each.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
@@ -109,7 +109,7 @@ class Along:
         zeros = [*lines, *(f"group {k}" for k in self._groups), *(name for name in self._others if name in judged)]
         # Means are of the quotient itself where a function has poles.
         self._means = {name: f"{_MEAN_OF}{name}" if name in divisors else name for name in columns if name in integrals}
-        functions |= {f"{_MEAN_OF}{name}": 0.0 for name in self._means if name in divisors}
+        functions |= {f"{_MEAN_OF}{name}": columns[name] for name in self._means if name in divisors}
         means = [*(name for name in columns if name.endswith("_error")), *self._means.values()]
         self._names = list(functions)
         self._follow = partial(
@@ -136,6 +136,8 @@ class Along:
         divisors |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
         for name in self._others:
             output, _, order = name.rpartition("_")
+            if output in question.study.mechanism.drives and not question.of_given:
+                continue  # of their own rates, which have no poles
             if order in (powers := {"velocity": 1, "acceleration": 3}):
                 divisors[name] = [(rates if question.of_given else self._chain(output), powers[order])]
         divisors |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
@@ -180,7 +182,7 @@ class Along:
         for k, loop in enumerate(self._loops):
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)
-        arrays |= {name: column for name, column in poses.values.items() if name not in arrays}
+        arrays |= {name: column for name, column in poses.named.items() if name not in arrays}
         self._known = arrays.keys()
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
@@ -214,25 +216,27 @@ class Along:
 
     def shown(self, line: Ints, s: Floats) -> Floats:
         """Places as tables have them: what is swept (study's unit), else in rows from 0; nan where there is none."""
-        swept, poses = self.question.poses.swept, self.question.poses
+        poses = self.question.poses
         known = np.isfinite(s)
         places = self.snapped(np.where(known, s, 0.0))
-        if swept is not None:
-            given = poses.groups[0].values[swept].reshape(-1, poses.line)
-            values = poses.along(line, places).values[swept]
+        if poses.swept is not None:
+            given = poses.abscissa.reshape(-1, poses.line)
+            values = poses.along(line, places).named[poses.swept]
             near = AT_GIVEN_PLACE * np.ptp(given)
             row = given[line, np.clip(np.round(places), 0, poses.line - 1).astype(np.intp)]
             places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))
         return np.where(known, places, np.nan)
 
     def place_columns(self, table: TableKind, line: Ints, places: Floats) -> list[Column]:
-        """Places of motions as columns of a table: what is swept, or the row and all coordinates that move."""
+        """Places of motions as columns of a table: what is swept, or the row, and all other coordinates that move."""
         study, poses = self.question.study, self.question.poses
         if poses.swept is not None:
-            return table.columns(of_swept(study, poses.swept, ""), **{"<swept>": self.shown(line, places)})
-        values, label, quantity = poses.along(line, places).values, study.units.label, study.mechanism.quantity
-        given = [GIVEN.column(values[name], label(quantity(name)), coordinate=name) for name in poses.moving]
-        return table.columns({}, row=places) + given
+            columns = table.columns(of_swept(study, poses.swept, ""), **{"<swept>": self.shown(line, places)})
+        else:
+            columns = table.columns({}, row=places)
+        values = poses.along(line, places).values
+        others = [name for name in poses.moving if name != poses.swept]
+        return columns + [GIVEN.column(values[name], unit_of(study, name), coordinate=name) for name in others]
 
     def at(self, line: Ints, s: Floats) -> dict[str, Floats]:
         """Every function at places of lines."""
@@ -360,7 +364,7 @@ def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:
 
 def of_swept(study: Study, swept: str | None, otherwise: str) -> dict[str, str]:
     """For columns that hold what is swept: its name and unit; where nothing is, what they hold otherwise."""
-    unit = "" if swept is None else study.units.label(study.mechanism.quantity(swept))
+    unit = "" if swept is None else unit_of(study, swept)
     return {"swept": swept or otherwise, "as what is swept": unit}
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import DRIVE, GIVEN, VALID
+from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, VALID
 from mechdesign.results import KeyNumber, TableKind
 
 # Place in the meaning of a table of numbers of whole motions, see `mechdesign.questions.kinematics.along.over`.
 OVER = "over the motion, or of the asked poses only"
 MOTION = TableKind.of("motion", "positions, velocities and accelerations per pose",
-    DRIVE, GIVEN, ("<output>", "value of <output>", "as the output"),
+    TIMED, DRIVE, GIVEN, ("<output>", "value of <output>", "as the output"),
     ("<output>_velocity", "velocity of <output>", "as the output, per time"),
     ("<output>_acceleration", "acceleration of <output>", "as the output, per time^2"),
     ("<output>_error", "<output> less its target", "as the output"),
@@ -24,7 +24,7 @@ MOTION = TableKind.of("motion", "positions, velocities and accelerations per pos
     ("<output>_advantage", "force or moment of <output> over that put in at <input>, without friction",
      "as the input's length over the output's", "rate of the input/rate of the output"), VALID)  # fmt: skip
 INSTANT_CENTRES = TableKind.of("instant_centres", "instant centres of velocity of pairs of links",
-    DRIVE, GIVEN,
+    TIMED, DRIVE, GIVEN,
     ("<a>.<b>.x, <a>.<b>.y", "place of the instant centre of <a> and <b>; inf where one translates against the other",
      "length"), ("<a>.<b>.motion", "how <a> moves against <b>: rotation, translation or rest"), VALID)  # fmt: skip
 EXTREMES = TableKind.of("extremes", f"extremes of the outputs <{OVER}>",
@@ -36,7 +36,7 @@ EXTREMES = TableKind.of("extremes", f"extremes of the outputs <{OVER}>",
     ("time_ratio", "longer over shorter time between the extremes, constant speed", "",
      "max(t, T - t)/min(t, T - t), T the time of a turn"), ("unit", "unit of min, max and range"))  # fmt: skip
 JACOBIAN = TableKind.of("jacobian", "derivatives of outputs by the drives, per radian",
-    DRIVE, GIVEN,
+    TIMED, DRIVE, GIVEN,
     ("<output>_by_<drive>", "derivative of <output> by <drive>, angles in radians", "as the output, over the drive's",
      "d output/d drive"), VALID)  # fmt: skip
 LIMITS = TableKind.of("limits", "limits of motion and singularities found along it",

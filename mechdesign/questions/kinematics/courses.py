@@ -54,8 +54,8 @@ class Followed:
 
     def pose(self, place: float) -> dict[str, float]:
         """What the poses give at a place of the motion of the first design."""
-        given = self.along.question.poses.along(np.array([self.design or 0]), np.array([place])).values
-        return {name: float(value[0]) + 0.0 for name, value in given.items()}
+        poses = self.along.question.poses.along(np.array([self.design or 0]), np.array([place]))
+        return {name: float(value[0]) + 0.0 for name, value in poses.named.items()}
 
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""

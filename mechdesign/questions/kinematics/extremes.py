@@ -41,10 +41,9 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     arrays = motion.arrays | {error.name: error.values for error in motion.errors}
     units = [unit for _, unit in curves.values()]
     swept = poses.swept
-    at = poses.values[swept] if swept is not None else poses.numbers
     # By curve and design; of both ends the value and its place.
     table = np.array([arrays[name] for name in curves]).reshape(len(curves), poses.designs, -1)
-    places = at.reshape(poses.designs, -1)
+    places = poses.abscissa.reshape(poses.designs, -1)
     counted = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
     row = np.stack([np.where(counted, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
     low, high = (np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row)
@@ -63,7 +62,7 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
         _between(along, [list(curves)[k] for k in mine], mine, ends, still, moving)
     (low, low_at), (high, high_at) = ends
     timed = np.zeros(poses.designs, dtype=bool)
-    if along is not None and swept is not None and mechanism.quantity(swept) == "angle":
+    if along is not None and swept is not None and swept in poses.names and mechanism.quantity(swept) == "angle":
         timed = (np.ptp(places, axis=1) >= turn * (1 - 1e-9)) & along.whole
     with np.errstate(divide="ignore", invalid="ignore"):
         part = np.where(timed & moving & np.isfinite(high - low), (high_at - low_at) % turn, np.nan)
@@ -102,7 +101,7 @@ def targets_table(motion: Motion, along: Along | None) -> Table:
     """
     study, poses, errors, valid = motion.question.study, motion.question.poses, motion.errors, motion.valid
     shape, swept = (poses.designs, poses.count // poses.designs), poses.swept
-    at = poses.values[swept] if swept is not None else poses.numbers
+    at = poses.abscissa
     numbers = np.full((4, poses.designs, len(errors)), np.nan)
     for k, error in enumerate(errors):
         counted = (valid & np.isfinite(error.values)).reshape(shape)

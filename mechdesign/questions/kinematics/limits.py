@@ -13,7 +13,7 @@ from mechdesign.mechanism.margins import Cause
 from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.kinematics.along import Along
 from mechdesign.questions.kinematics.columns import LIMITS
-from mechdesign.questions.poses import pose_in_words
+from mechdesign.questions.poses import pose_in_words, unit_of
 from mechdesign.results import Table
 
 # Places that a warning names.
@@ -72,8 +72,7 @@ def place_in_words(along: Along, line: int, place: float) -> str:
     """``theta = 30 deg``, or the row and the coordinates of a path."""
     study, poses, lines, s = along.question.study, along.question.poses, np.array([line]), np.array([place])
     if poses.swept is not None:
-        unit = study.units.label(study.mechanism.quantity(poses.swept))
-        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {unit}".rstrip()
+        return f"{poses.swept} = {along.shown(lines, s)[0] + 0.0:.6g} {unit_of(study, poses.swept)}".rstrip()
     return f"row {place:.6g} ({pose_in_words(study, poses.along(lines, s), 0)})"
 
 

@@ -15,7 +15,9 @@ from mechdesign.mechanism import Reason
 from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization, mixes, regularity
+from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.mechanism.outputs import Rates, first, second
+from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.columns import DRIVE, VALID, power_of_length
@@ -23,6 +25,7 @@ from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.kinematics.question import MotionQuestion, characteristic_length
 from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.kinematics.targets import Error, errors, totals
+from mechdesign.questions.loads import Loading
 from mechdesign.questions.poses import SolvedPoses, in_study_units, pose_columns, radians, solve_poses
 from mechdesign.results import Column
 from mechdesign.study.poses import PoseGroup, Poses
@@ -81,14 +84,19 @@ class Motion:
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
         section = self.question.section
-        velocity = None
-        if section.rates or section.accelerations or section.speed:
-            velocity = self._rates(linear, solved, regular)
+        moving = Moving()
+        if section.rated:
+            moving = self._rates(linear, solved, regular)
         if section.instant_centres:
             # Of one drive alone every speed gives the same centres.
-            self._centres(linear, rows, linear.velocity([1.0]) if len(study.mechanism.drives) == 1 else velocity)
+            one = len(study.mechanism.drives) == 1
+            self._centres(linear, rows, linear.velocity([1.0]) if one else moving.velocity)
         if self.question.square or section.loads or section.mechanical_advantage:
-            self._statics(linear, rows, regular)
+            self._statics(linear, rows, regular, moving)
+        if self.question.borne is not None:
+            borne = self.question.borne.columns(self.question.poses, linear, rows, moving)
+            for name, values in borne.items():
+                self.put(name, rows, np.where(regular, values, np.nan))
         return linear
 
     def _centres(self, linear: Linearization, rows: Ints, velocity: Rates | None) -> None:
@@ -100,24 +108,21 @@ class Motion:
             self.put(f"{centre.name}.y", rows, np.where(known, place.imag, np.nan))
             self.put(f"{centre.name}.motion", rows, np.where(known, motion, 0))
 
-    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Rates:
+    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Moving:
         drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
         velocity = linear.velocity(drives.velocities)
         acceleration = linear.acceleration(velocity, drives.accelerations)
         configuration = linear.configuration
-        coordinates = {
-            o.name: o for o in [*(self.question.drives if self.question.of_given else []), *self.question.outputs]
-        }
-        for output in coordinates.values():
+        for output in self.question.rated.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
             ):
                 value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
                 self.put(f"{output.name}_{order}", solved.rows, value)
-        return velocity
+        return Moving(velocity, acceleration)
 
-    def _statics(self, linear: Linearization, rows: Ints, regular: Flags) -> None:
+    def _statics(self, linear: Linearization, rows: Ints, regular: Flags, moving: Moving) -> None:
         study, listed, drives = self.question.study, self.question.listed, self.question.drives
 
         def put(name: str, values: Value) -> None:
@@ -132,7 +137,7 @@ class Motion:
                     put(entry(output, drive), value)
             put("det_J", jacobian.determinant)
             put("inverse_condition", jacobian.inverse_condition)
-        for name, values in statics(self.question, linear, rows).items():
+        for name, values in statics(self.question, linear, rows, moving).items():
             put(name, values)
 
     def complete(self, poses: Poses, rows: Ints) -> None:
@@ -148,7 +153,7 @@ class Motion:
         shown = {output.name: output for output in question.outputs}
         drives = {drive.name: drive for drive in question.drives}
         columns = [column for column in self.pose_columns() if column.name in drives or column.name not in shown]
-        for name, output in ((drives if question.of_given else {}) | shown).items():
+        for name, output in question.rated.items():
             if name not in drives:
                 columns.append(MOTION["<output>"].column(arrays[name], label(output.quantity), output=name))
             for order in ("velocity", "acceleration"):
@@ -169,12 +174,14 @@ class Motion:
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
         question, units = self.question, self.question.study.units
-        columns = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
-        named = {column.name for column in columns}
-        for column in pose_columns(question.study, question.poses):
-            if column.name not in named:
-                columns.append(replace(column, values=self.arrays.get(column.name, column.values)))
-        return columns
+        given = [
+            replace(column, values=self.arrays.get(column.name, column.values))
+            for column in pose_columns(question.study, question.poses)
+        ]
+        drives = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
+        named = {column.name for column in drives}
+        timed = given[:1] if question.poses.times is not None else []
+        return [*timed, *drives, *(column for column in given[len(timed) :] if column.name not in named)]
 
     def _error(self, error: Error) -> Column:
         study = self.question.study
@@ -184,25 +191,18 @@ class Motion:
         return kind.column(error.values, study.units.label(error.quantity), **words)
 
 
-def statics(question: MotionQuestion, linear: Linearization, rows: Ints) -> dict[str, Value]:
-    """Efforts of the drives by virtual work, and mechanical advantages, by their columns; unknown where it stalls.
+def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving: Moving) -> dict[str, Value]:
+    """Efforts of the drives that balance the loads, and mechanical advantages, by their columns; nan where it stalls.
 
     `rows` are the poses of `linear`.
     """
-    mechanism, drives = question.study.mechanism, question.drives
     section = question.poses.section(question.section, rows)
-    work: dict[str, Value] = {}
-    for load in section.loads:
-        if load.at is not None and load.force is not None:
-            for axis, force in zip("xy", load.force, strict=True):
-                work[f"{load.at}.{axis}"] = work.get(f"{load.at}.{axis}", 0.0) + force
-        if load.link is not None and load.moment is not None:
-            work[f"{load.link}.angle"] = work.get(f"{load.link}.angle", 0.0) + load.moment
     columns: dict[str, Value] = {}
-    if work:
-        moved = Jacobian.of(linear, [mechanism.coordinate(name) for name in work]).entries
-        for k, drive in enumerate(drives):
-            columns[f"{drive.name}_effort"] = -sum(f * line[k] for f, line in zip(work.values(), moved, strict=True))
+    if section.loads:
+        forces = Forces(linear.configuration)
+        Loading(question.study, section.loads, question.poses, rows).add(forces, moving)
+        efforts = balance(linear, forces).efforts
+        columns = {f"{drive.name}_effort": effort for drive, effort in zip(question.drives, efforts, strict=True)}
     for name, given in section.mechanical_advantage.items():
         columns[f"{name}_advantage"] = _advantage(question, linear, name, given)
     return columns
@@ -291,7 +291,14 @@ def _through_change_points(motion: Motion) -> None:
     scale = 1.0 if coordinate.quantity == "angle" else study.mechanism.size
     steps = in_study_units(study, coordinate, scale * STENCIL)
     values = (group.values[name][rows][:, None] + steps).ravel()
-    beside = Poses((PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),))
+    slopes, bends = (
+        {given: np.repeat(column[rows], len(STENCIL)) for given, column in part.items()}
+        for part in (question.poses.slopes, question.poses.bends)
+    )
+    beside = Poses(
+        (PoseGroup((name,), {name: values}, np.arange(len(values))),), len(values), True, (len(values),), slopes=slopes,
+        bends=bends,
+    )  # fmt: skip
     around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
     each = np.repeat(rows, len(STENCIL))
     for solved in solve_poses(study, beside):

@@ -61,9 +61,10 @@ class Passage:
         return self.motion.question is not self.question
 
     def table(self, make: Callable[[Motion], Table], jobs: int | None, scope: Scope | None) -> Table:
-        """A table with a row a pose of a long motion; its rows are made anew where they are wanted."""
+        """A table with as many rows for each pose of a long motion; its rows are made anew where they are wanted."""
         like = replace(make(self.motion), scope=scope)
-        return LongTable(like, self.question.poses.count, partial(self.blocks, make, jobs))
+        rows = len(like) // len(self.motion.reason)
+        return LongTable(like, rows * self.question.poses.count, partial(self.blocks, make, jobs))
 
     def blocks(self, make: Callable[[Motion], Table], jobs: int | None) -> Iterator[Table]:
         """A table with a row a pose in parts."""

@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from mechdesign.curve.motion import Curve
 from mechdesign.errors import counted
+from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
-from mechdesign.mechanism.derivatives import mixes
+from mechdesign.mechanism.derivatives import Linearization, mixes
+from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
+from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.kinematics.instant_centres import Centre
 from mechdesign.questions.kinematics.rates import of_given
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.kinematics.targets import followed, needed
+from mechdesign.questions.loads import coordinates_in
 from mechdesign.questions.outputs import default_outputs, expand_outputs
 from mechdesign.questions.poses import followed_angles
 from mechdesign.study import Study
@@ -40,6 +45,20 @@ class Static:
     unit: str
     kind: str
     words: Mapping[str, str]  # at the places of the kind
+    size: float = 0.0  # least size, by which its rounding is judged
+
+
+class Borne(Protocol):
+    """What is computed of the forces of a motion, besides: its columns, and their values at solved poses."""
+
+    @property
+    def statics(self) -> list[Static]:
+        """The columns."""
+        ...
+
+    def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
+        """Values by their columns; `rows` are those of the poses."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +81,8 @@ class MotionQuestion:
         Coordinates whose values the errors need.
     errors : mapping of str to Quantity
         Columns of errors that have values between the poses, too.
+    borne : Borne or None
+        What else is computed of the forces.
     """
 
     study: Study
@@ -74,6 +95,7 @@ class MotionQuestion:
     of_given: bool
     targeted: tuple[str, ...]
     errors: Mapping[str, Quantity]
+    borne: Borne | None = None
 
     @property
     def drives(self) -> list[Coordinate]:
@@ -103,16 +125,20 @@ class MotionQuestion:
             unit = "" if above == below else above or f"1/{below}"
             words = {"output": name, "input": given}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
-        return statics
+        return [*statics, *(self.borne.statics if self.borne is not None else ())]
+
+    @property
+    def rated(self) -> dict[str, Coordinate]:
+        """What has velocities and accelerations, where rates are asked: outputs, and drives whose rates change."""
+        drives = self.drives if self.of_given or self.section.motion is not None else []
+        return {output.name: output for output in [*drives, *self.outputs]}
 
     @property
     def orders(self) -> dict[str, tuple[Quantity, int]]:
         """Columns of velocities and accelerations, where the study gives rates: of what quantity, and which order."""
-        asked = self.section.rates or self.section.accelerations or self.section.speed
-        moving = {output.name: output for output in [*(self.drives if self.of_given else []), *self.outputs]}
         return {
             f"{output.name}_{word}": (output.quantity, order)
-            for output in (moving.values() if asked else ())
+            for output in (self.rated.values() if self.section.rated else ())
             for order, word in ((1, "velocity"), (2, "acceleration"))
         }
 
@@ -135,6 +161,12 @@ class MotionQuestion:
             tempos += [
                 abs(rate * units.get(mechanism.quantity(name), 1.0)) ** (1 / order) for name, rate in rates.items()
             ]
+        timed = ((self.poses.slopes, 1), (self.poses.bends, 2)) if section.motion is not None else ()
+        for columns, order in timed:
+            tempos += [
+                float(np.abs(column).max() * units.get(mechanism.quantity(name), 1.0)) ** (1 / order)
+                for name, column in columns.items()
+            ]
         return max(tempos)
 
     @cached_property
@@ -153,8 +185,9 @@ class MotionQuestion:
             pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
         ]
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        if not rates:
-            unasked |= {"rates": {}, "accelerations": {}, "speed": None}
+        borne = self.borne if self.borne is not None and any(s.name in names for s in self.borne.statics) else None
+        if not rates and borne is None and not coordinates_in(self.study, section.loads):
+            unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}
         if not any(static.name in names for static in self.statics):
             unasked |= {"loads": (), "mechanical_advantage": {}}
         square = self.square and any(name in ("det_J", "inverse_condition") or "_by_" in name for name in names)
@@ -162,8 +195,8 @@ class MotionQuestion:
         values = {*names, *(self.targeted if errors else ())}
         return replace(
             self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
-            watched=[coordinate for coordinate in self.watched if coordinate.name in values],
-            of_given=self.of_given and rates,
+            watched=[coordinate for coordinate in self.watched if borne is not None or coordinate.name in values],
+            of_given=self.of_given and (rates or borne is not None), borne=borne,
         )  # fmt: skip
 
     @property
@@ -208,7 +241,8 @@ def motion_question(study: Study, poses: Poses) -> MotionQuestion:
     for target in study.targets.values():
         shown |= {name: mechanism.coordinate(name) for name in target.coordinates if name not in shown}
     between, targeted = dict(followed(study, poses)), needed(study, poses)
-    names = dict.fromkeys([*mechanism.drives, *shown, *targeted])
+    loads = [coordinate.name for coordinate in coordinates_in(study, section.loads)]
+    names = dict.fromkeys([*mechanism.drives, *shown, *targeted, *loads])
     watched = {name: mechanism.coordinate(name) for name in names}
     return MotionQuestion(
         study,

@@ -13,11 +13,10 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.poses import SolvedPoses, radians
-from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import MotionSection
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +34,19 @@ class DriveRates:
         ))  # fmt: skip
 
 
-def of_given(study: Study, section: KinematicsSection | ReliabilitySection) -> bool:
+def of_given(study: Study, section: MotionSection) -> bool:
     """Whether a section's rates are those of the coordinates that the poses give rather than of the drives."""
-    return section.speed is not None or not {*section.rates, *section.accelerations} <= set(study.mechanism.drives)
+    return section.of_given(study.mechanism.drives)
 
 
 def drive_rates(
-    study: Study, section: KinematicsSection | ReliabilitySection, poses: Poses, solved: SolvedPoses,
+    study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses,
     linear: Linearization,
 ) -> DriveRates:  # fmt: skip
     """Rates of the drives at some poses, as a section asks for them: constant ones, or those of the motion.
 
     At a speed v along the path of a point, of length s, a coordinate c that the path gives has the velocity c'(s) v
-    and the acceleration c''(s) v^2.
+    and the acceleration c''(s) v^2. In a motion over time its derivatives by time are known.
 
     `linear` is the mechanism at the solved poses.
     """
@@ -55,18 +54,19 @@ def drive_rates(
     inverse = of_given(study, section)
     names = solved.given if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]
-    if section.speed is None:
+    if section.speed is None and section.motion is None:
         rates = constant_rates(study, section, names)
     else:
+        pace = 1.0 if section.speed is None else section.speed
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
-            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * section.speed**order) for c in coordinates]
+            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
             for order, known in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
     return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
 
 
-def constant_rates(study: Study, section: KinematicsSection | ReliabilitySection, names: Sequence[str]) -> DriveRates:
+def constant_rates(study: Study, section: MotionSection, names: Sequence[str]) -> DriveRates:
     """Rates of some coordinates, as a section gives them in numbers."""
     coordinates = [study.mechanism.coordinate(name) for name in names]
     return DriveRates(*(

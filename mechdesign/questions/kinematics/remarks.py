@@ -16,6 +16,7 @@ from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Mark
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
+from mechdesign.study.motion_program import MotionProgram
 from mechdesign.study.poses import Poses
 
 # Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
@@ -48,7 +49,7 @@ def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
-    what = f"the steps of {poses.swept} are" if poses.swept is not None else "the steps of the path are"
+    what = f"the steps of {'the motion' if poses.program is not None else poses.swept or 'the path'} are"
     return [Caution(
         "incomplete",
         f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
@@ -165,8 +166,13 @@ def _astray(question: MotionQuestion) -> list[Caution]:
 
 
 def _corners(question: MotionQuestion) -> list[Caution]:
-    """A warning where a path that is passed with a speed has corners: its rates there are those behind them."""
+    """A warning where the velocity jumps: at corners of a path that is passed with a speed, and in a motion over time.
+
+    Rates there are those behind.
+    """
     poses = question.poses
+    if poses.program is not None:
+        return _jumps(question, poses.program)
     if question.section.speed is None or not poses.motion:
         return []
     rows = poses.corners[(poses.corners > 0) & (poses.corners < poses.end) & (poses.corners % 1 == 0)]
@@ -184,6 +190,25 @@ def _corners(question: MotionQuestion) -> list[Caution]:
         f"the path has corners at {counted(len(rows), 'pose')}, the first: "
         f"{first}; velocities there are those of the segment that begins, "
         "and the acceleration that a corner takes is in no row; 'spline: true' has no corners",
+        _TABLE, row, first,
+    )]  # fmt: skip
+
+
+def _jumps(question: MotionQuestion, program: MotionProgram) -> list[Caution]:
+    """A warning where a motion over time has velocities that jump; those with which it begins and ends do not count."""
+    places = program.corners[(program.corners > 0) & (program.corners < question.poses.end)]
+    line, jumps = np.zeros(len(places), dtype=np.intp), np.zeros(len(places), dtype=bool)
+    for name in program.courses:
+        behind, before = (program.at(name, line, s, 1) for s in (places, np.nextafter(places, -1.0)))
+        jumps |= np.abs(behind - before) > TURNED * np.abs(question.poses.slopes[name]).max()
+    if not jumps.any():
+        return []
+    row = int(places[jumps][0])
+    first = pose_in_words(question.study, question.poses, row)
+    return [Caution(
+        "incomplete",
+        f"the velocity jumps at {counted(int(np.count_nonzero(jumps)), 'instant')}, the first: {first}; the "
+        "acceleration that a jump takes is in no row; of the laws only 'constant' jumps",
         _TABLE, row, first,
     )]  # fmt: skip
 

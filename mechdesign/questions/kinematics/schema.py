@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mechdesign.errors import counted
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.study.building.section import TwoLinks
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
-from mechdesign.study.text.fields import failure
 
 HELP_PAGE = "reference/study/kinematics"
 
@@ -22,27 +22,6 @@ PICTURES = {
     "hodographs": "velocities and accelerations of points over the motion, as the ways of their vectors' tips",
     "polygons": "velocity and acceleration polygons of a few poses, or of the listed ones",
 }
-
-
-class Load(fields.Model):
-    """A force at a point, a moment on a link, or both."""
-
-    at: fields.PointName | None = None
-    """Point that the force acts at. Example: T"""
-    force: tuple[fields.Force, fields.Force] | None = None
-    """Force [fx, fy] along the world's axes. Example: [0, -20]"""
-    link: fields.LinkName | None = None
-    """Link that the moment acts on. Example: boom"""
-    moment: fields.Moment | None = None
-    """Moment, counter-clockwise positive. Example: 3000"""
-
-    @model_validator(mode="after")
-    def _whole(self) -> Load:
-        if (self.at is None) != (self.force is None) or (self.moment is not None and self.link is None):
-            raise failure("a load is {at: point, force: [fx, fy]} or {link: name, moment: m}")
-        if self.force is None and self.moment is None:
-            raise failure("a load needs a force or a moment")
-        return self
 
 
 class KinematicsSection(MotionSection):
@@ -55,7 +34,7 @@ class KinematicsSection(MotionSection):
     """
     loads: tuple[Load, ...] = ()
     """Forces and moments that act on the mechanism; the efforts of the drives (torque of a motor,
-    force of a cylinder) that balance them are reported. The same in all poses. Example:
+    force of a cylinder) that balance them are reported, without weights and inertia (see dynamics). Example:
     [{at: T, force: [0, -20]}, {link: boom, moment: 3}]
     """
     characteristic_length: fields.PositiveLength | None = None
@@ -77,8 +56,9 @@ class KinematicsSection(MotionSection):
         """Check the outputs as well, what loads act on, pairs of links, and outputs with their inputs."""
         self._check_centres(checker)
         self._check_advantage(checker)
-        if self.pictures and not self.rates and self.speed is None:
-            message = f"{' and '.join(self.pictures)} show velocities: give 'rates' of the drives, or a 'speed'"
+        if self.pictures and not self.rates and self.speed is None and self.motion is None:
+            shown = " and ".join(self.pictures)
+            message = f"{shown} show velocities: give 'rates' of the drives, or a 'speed', or a 'motion'"
             checker.report(("kinematics", "pictures"), message, at_key=True)
         checker.outputs(self.outputs, ("kinematics", "outputs"))
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
@@ -86,12 +66,7 @@ class KinematicsSection(MotionSection):
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
             what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
             checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
-        for index, load in enumerate(self.loads):
-            path: KeyPath = ("kinematics", "loads", index)
-            if load.at is not None:
-                checker.known(load.at, checker.mechanism.owners, "point", (*path, "at"))
-            if load.link is not None:
-                checker.known(load.link, checker.mechanism.moving, "moving link", (*path, "link"))
+        check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 
     def _check_centres(self, checker: Checker) -> None:
@@ -106,8 +81,12 @@ class KinematicsSection(MotionSection):
                 checker.report(path, f"{' and '.join(pair)} are listed twice")
             seen.add(frozenset(pair))
         drives = len(checker.mechanism.drives)
-        if self.instant_centres and drives > 1 and not any(self.rates.values()) and self.speed is None:
-            message = f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed'"
+        moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
+        if self.instant_centres and drives > 1 and not moved:
+            message = (
+                f"with {drives} drives instant centres depend on how fast each moves: give 'rates' or a 'speed', or a "
+                "'motion'"
+            )
             checker.report(("kinematics", "instant_centres"), message, at_key=True)
 
     def _check_advantage(self, checker: Checker) -> None:

@@ -82,7 +82,8 @@ def special_poses(
     Of a grid there are none. `kept` are the solved poses that pictures show.
     """
     section, poses = motion.question.section, motion.question.poses
-    rates = bool(any(section.rates.values()) or any(section.accelerations.values()) or section.speed is not None)
+    rates = any(section.rates.values()) or any(section.accelerations.values())
+    rates = bool(rates or section.speed is not None or section.motion is not None)
     if not poses.motion and not poses.listed:
         return SpecialPoses((), 0, rates)
     special, more = list[SpecialPose](), 0
@@ -94,9 +95,8 @@ def special_poses(
     if poses.motion:
         some, left_out = _spread(motion, kept, [each.row for each in special]), len(special) + more - MOST
     configuration = kept.configuration.take(some)
-    swept = poses.numbers if poses.swept is None else poses.values[poses.swept]
     words = [
-        (float(poses.numbers[k]), float(swept[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
+        (float(poses.numbers[k]), float(poses.abscissa[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
         for k in kept.rows[some].tolist()
     ]
     solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)

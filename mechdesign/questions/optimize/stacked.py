@@ -15,6 +15,8 @@ from mechdesign.mechanism import Mechanism, Reason
 from mechdesign.mechanism.algebra import Value
 from mechdesign.mechanism.four_bars import four_bars
 from mechdesign.numerics.arrays import Flags, Floats, Ints
+from mechdesign.questions.dynamics import analysis as dynamics
+from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import course_of
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
@@ -37,6 +39,7 @@ TABLES: Mapping[str, Collection[str]] = {
     "kinematics": (*A_ROW_A_POSE, "extremes", "loops", "targets"),
     # A design may have more springs than another.
     "stiffness": tuple(name for name in stiffness.ORDER if name != "springs"),
+    "dynamics": dynamics.TABLES,
     "reliability": ("moments", "reliability", "capability", "contributions"),
 }
 
@@ -138,6 +141,12 @@ def tables(
             found["loops"] = loops_table(question, measured(study.mechanism, loops, poses, solved), loops, along)
         if motion.errors and "targets" in wanted:
             found["targets"] = targets_table(motion, along)
+        reason = motion.reason
+    elif command == "dynamics":
+        motion = move(force_question(study, poses), also=solved.append)
+        found, along = dynamics.tables(motion, motion.question, wanted, outputs, asked)
+        scope = Scope(course=partial(course_of, along)) if along is not None else None
+        found = {name: replace(table, scope=scope) for name, table in found.items()}
         reason = motion.reason
     elif command == "reliability":
         found, reason, solved = reliability.first_order_tables(study, poses, wanted)

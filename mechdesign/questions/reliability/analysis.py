@@ -19,6 +19,7 @@ from mechdesign.questions.reliability.allocation import allocate
 from mechdesign.questions.reliability.cycle import with_cycle
 from mechdesign.questions.reliability.deflection import Elastic, cautions, elasticity
 from mechdesign.questions.reliability.first_order import FirstOrder, linear_errors, linear_margins, nominal_values
+from mechdesign.questions.reliability.forces import force_model, pace
 from mechdesign.questions.reliability.method_warnings import method_warnings
 from mechdesign.questions.reliability.question import ambiguous_points, ask
 from mechdesign.questions.reliability.schema.methods import METHODS
@@ -141,27 +142,29 @@ def first_order_tables(
 def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _Groups, list[Caution]]:
     """The nominal mechanism and its linear error model at every pose, nan where it is not assembled; warnings.
 
-    Poses that do not hold the study's load have the reason `NOT_HELD`.
+    Poses that do not hold the study's load, or of whose forces some are asked and not finite, are `NOT_HELD`.
     """
     mechanism, section = study.mechanism, study.reliability
     assert section is not None
     question = ask(study, poses.section(section))
     bent, doubts = elasticity(study, poses)
-    channels = question.channels
+    channels, forces = question.channels, force_model(study, poses)
+    coordinates = [*question.coordinates, *(forces.coordinates if forces is not None else ())]
     reason = np.zeros(poses.count, dtype=np.int8)
     nominal = np.full((len(channels), poses.count), np.nan)
     elastic = None if bent is None else Elastic(np.full((len(channels), 3, poses.count), np.nan), bent.load)
     linear = FirstOrder.unknown(sources, len(channels), poses.count)
     closing = FirstOrder.unknown(sources, 0, poses.count)
     groups = []
-    for solved in solve_poses(study, poses, [channel.coordinate for channel in channels]):
+    for solved in solve_poses(study, poses, coordinates):
         configuration, rows = solved.configuration, solved.rows
         reason[rows] = configuration.reason
         rates = DriveRates((), ())
-        if any(channel.order for channel in channels):
+        if question.moving:
             # Made mechanisms have the same rates of the drives.
-            rates = drive_rates(study, section, poses, solved, mechanism.linearize(configuration))
-        for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates), strict=True):
+            rates = drive_rates(study, pace(study), poses, solved, mechanism.linearize(configuration))
+        own = None if forces is None else forces.take(rows)
+        for row, value in zip(nominal, nominal_values(mechanism, configuration, channels, rates, own), strict=True):
             row[rows] = value
         for begin in range(0, len(rows), _POSES_TOGETHER):
             block = np.arange(begin, min(begin + _POSES_TOGETHER, len(rows)))
@@ -171,7 +174,10 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
                 elastic.flexibility[:, :, rows[block]] = block_elastic.flexibility
             with np.errstate(invalid="ignore", divide="ignore"):
                 block_sources = sources.take(rows[block])
-                errors = linear_errors(mechanism, part, channels, block_sources, rates.take(block), block_elastic)
+                errors = linear_errors(
+                    mechanism, part, channels, block_sources, rates.take(block), block_elastic,
+                    None if own is None else own.take(block),
+                )  # fmt: skip
                 margins = linear_margins(mechanism, part, block_sources)
             linear.components[:, :, rows[block]] = errors.components
             if not len(closing.components):
@@ -182,6 +188,9 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
         doubts += cautions(study, bent, channels)
         reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~elastic.held, np.int8(Reason.NOT_HELD), reason)
         linear = replace(linear, offset=elastic.offset)
+    if question.columns:
+        held = np.isfinite(nominal[-len(question.columns) :]).all(axis=0)
+        reason = np.where(np.isin(reason, (Reason.OK, Reason.LIMIT)) & ~held, np.int8(Reason.NOT_HELD), reason)
     task = Task(study, poses, question, sources, reason, nominal, linear, closing, elastic)
     linear.components[:, :, ~task.assembled] = np.nan
     return task, groups, doubts
@@ -192,7 +201,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     mechanism, pair = task.study.mechanism, task.question.pair
     mean, sigma = task.linear.shift(), task.linear.deviation()
     assembled = np.flatnonzero(task.assembled).tolist()
-    followed = _followed(task)
+    followed, forces = _followed(task), force_model(task.study, task.poses)
     settings = []
     for solved, rates in groups:
         by_drives = set(solved.given) == set(mechanism.drives)
@@ -209,7 +218,8 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
                     task.question.at(task.nominal[:, row]), row, mechanism,
                     mechanism.forward if by_drives else forward_plan(mechanism, pose), pose, rates.take(k),
                     task.nominal[:, row].tolist(),
-                    None if task.elastic is None else task.elastic.take([row]), scale, row == followed,
+                    None if task.elastic is None else task.elastic.take([row]),
+                    None if forces is None else forces.take([row]), scale, row == followed,
                 )
             )  # fmt: skip
     return sorted(settings, key=lambda setting: setting.pose)

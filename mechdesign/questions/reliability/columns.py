@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import GIVEN, VALID
+from mechdesign.questions.columns import GIVEN, TIMED, VALID
 from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 METHOD = ColumnKind("method", "how it was computed")
-OUTPUT = ColumnKind("output", "coordinate")
-ORDER = ColumnKind("order", "position, velocity or acceleration")
+OUTPUT = ColumnKind("output", "coordinate, or column of dynamics")
+ORDER = ColumnKind("order", "position, velocity or acceleration; of efforts and forces 'dynamics'")
 MEAN = ColumnKind("mean", "mean over made mechanisms, in `unit`")
 EVALUATIONS = ColumnKind("evaluations", "mechanisms that were solved for it")
 MOMENTS = TableKind.of("moments", "mean and standard deviation of outputs per pose and method",
-    GIVEN, METHOD, OUTPUT, ORDER, ("nominal", "value of the nominal mechanism, in `unit`"), MEAN,
+    TIMED, GIVEN, METHOD, OUTPUT, ORDER, ("nominal", "value of the nominal mechanism, in `unit`"), MEAN,
     ("sigma", "standard deviation of the error, in `unit`", "",
      "analytic: sqrt(s^T V s), s the sensitivities and V the covariance of the sources"),
     ("worst_case", "sum of |sensitivity| times the larger end of the tolerance, in `unit`"),
@@ -19,7 +19,7 @@ MOMENTS = TableKind.of("moments", "mean and standard deviation of outputs per po
     ("worst_high", "highest error that the tolerances allow, in `unit`"), ("unit", "unit of the six columns before"),
     VALID)  # fmt: skip
 RELIABILITY = TableKind.of("reliability", "probability that the errors keep their limits",
-    ("scope", "a pose by itself, or one made mechanism at all poses, the steps between unseen"), GIVEN, METHOD,
+    ("scope", "a pose by itself, or one made mechanism at all poses, the steps between unseen"), TIMED, GIVEN, METHOD,
     ("reliability", "probability that every limit is kept"), ("low", "lower end of its interval, <kind of interval>"),
     ("high", "upper end of its interval, <kind of interval>"),
     ("failure", "1 - reliability, without loss of digits; 0 where no failure was seen, and failure_high bounds it"),
@@ -34,7 +34,7 @@ RELIABILITY = TableKind.of("reliability", "probability that the errors keep thei
     ("rho", "correlation of the two outputs"),
     ("valid", "1 where the nominal pose (all, of a cycle) is valid"))  # fmt: skip
 CAPABILITY = TableKind.of("capability", "process capability of each limited output",
-    GIVEN, METHOD, OUTPUT, ORDER, ("lsl", "lower specification limit of the value, in `unit`; nan: none"),
+    TIMED, GIVEN, METHOD, OUTPUT, ORDER, ("lsl", "lower specification limit of the value, in `unit`; nan: none"),
     ("usl", "upper specification limit of the value, of a point the radius of its error, in `unit`"),
     ("nominal", "value of the nominal mechanism, in `unit`; nan of a point"), MEAN,
     ("sigma", "standard deviation of the value, in `unit`"), ("cp", "(USL - LSL)/(6 sigma); nan of a single limit"),
@@ -46,7 +46,7 @@ CAPABILITY = TableKind.of("capability", "process capability of each limited outp
     ("ppm_high", "upper end of its interval, 99.7 %, where samples are counted"),
     ("unit", "unit of the five columns from lsl to sigma"), VALID)  # fmt: skip
 CONTRIBUTIONS = TableKind.of("contributions", "what the errors come from",
-    GIVEN, ("source", "parameter, dimension, drive, or joint's clearance"), OUTPUT, ORDER,
+    TIMED, GIVEN, ("source", "parameter, dimension, drive, or joint's clearance"), OUTPUT, ORDER,
     ("on", "links whose point the output is, where its pin has a clearance or gives; of several, midway"),
     ("sensitivity", "derivative by the source, all angles in radians; a pin's is sqrt(s_x^2 + s_y^2)", "",
      "d output/d source"), ("derivative", "the same for one unit of the source as the study counts it, in `unit`"),
@@ -70,16 +70,17 @@ DENSITY = TableKind.of("density", "density of two errors: bivariate normal and s
     ("normal", "bivariate normal density, standardised"),
     ("simulated", "density of the samples, standardised"))  # fmt: skip
 HISTOGRAM = TableKind.of("histogram", "errors drawn at the pose that is shown, and their normal fit",
-    GIVEN, OUTPUT, ORDER, ("low", "begin of the bin of errors, in `unit`"), ("high", "end of the bin, in `unit`"),
+    TIMED, GIVEN, OUTPUT, ORDER,
+    ("low", "begin of the bin of errors, in `unit`"), ("high", "end of the bin, in `unit`"),
     ("count", "samples in the bin, of <samples>"),
     ("density", "their density, in 1/`unit`", "", "count/(samples (high - low))"),
     ("normal", "density of the normal law of the samples' mean and deviation, in 1/`unit`"),
     ("unit", "unit of the error"))  # fmt: skip
 CONVERGENCE = TableKind.of("convergence", "trend of the means with the number of samples [S3, Fig. 4]",
-    GIVEN, ("samples", "valid samples so far"), OUTPUT, ORDER, ("mean", "their mean, in `unit`"),
+    TIMED, GIVEN, ("samples", "valid samples so far"), OUTPUT, ORDER, ("mean", "their mean, in `unit`"),
     ("unit", "unit of the mean"))  # fmt: skip
 ESTIMATE = TableKind.of("estimate", "probability of failure with the number of samples",
-    GIVEN, ("samples", "samples so far"), ("failure", "share of them that broke a limit or cannot be assembled"),
+    TIMED, GIVEN, ("samples", "samples so far"), ("failure", "share of them that broke a limit or cannot be assembled"),
     ("failure_low", "lower end of its interval, 99.7 %, Clopper-Pearson"),
     ("failure_high", "upper end of its interval, 99.7 %, Clopper-Pearson"))  # fmt: skip
 ALLOCATION = TableKind.of("allocation", "the cheapest tolerances that reach what is asked",
@@ -92,7 +93,8 @@ ALLOCATION = TableKind.of("allocation", "the cheapest tolerances that reach what
     ("share", "share of the limited errors' variance (over the square of each limit) with the allocated tolerances, "
      "at the pose that fails most often"))  # fmt: skip
 CONFIRMATION = TableKind.of("confirmation", "reliability, or Cpk, of the allocated tolerances",
-    GIVEN, ("asked", "reliability, or Cpk, asked for"), ("target", "what the analytic model had to reach for it"),
+    TIMED, GIVEN,
+    ("asked", "reliability, or Cpk, asked for"), ("target", "what the analytic model had to reach for it"),
     ("analytic", "reliability, or least Cpk of any limit, by the first-order model"),
     ("simulated", "the same by simulation"), ("low", "lower end of its interval, 99.7 %"),
     ("high", "upper end of its interval, 99.7 %"), ("method", "how it was simulated"), EVALUATIONS,

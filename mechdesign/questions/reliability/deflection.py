@@ -19,7 +19,7 @@ from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
-from mechdesign.questions.reliability.question import Channel
+from mechdesign.questions.reliability.question import Channel, CoordinateChannel
 from mechdesign.questions.reliability.schema.section import links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
@@ -90,7 +90,7 @@ class Elasticity:
 
     def knows(self, channel: Channel) -> bool:
         """Whether the stiffness model gives the deflection of a channel."""
-        return channel.order == 0 and self._knows(channel.coordinate)
+        return isinstance(channel, CoordinateChannel) and channel.order == 0 and self._knows(channel.coordinate)
 
     def _knows(self, coordinate: Coordinate) -> bool:
         kind = coordinate.kind
@@ -109,14 +109,15 @@ class Elasticity:
         `poses` are the rows of the batch where poses differ in their load or stiffness.
         """
         flexibility = np.zeros((len(channels), 3, *configuration.shape))
-        deflected = [k for k, channel in enumerate(channels) if self.knows(channel)]
+        deflected = [(k, channel.coordinate) for k, channel in enumerate(channels)
+                     if isinstance(channel, CoordinateChannel) and self.knows(channel)]  # fmt: skip
         assembled = np.flatnonzero(np.isfinite(configuration.point(self.asked.given.at)))
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
             part = configuration.take(assembled)
             rates, held = self._rates(part, self.asked if poses is None else self.asked.take(poses[assembled]))
-            for k in deflected:
-                moved = np.broadcast_to(first(part, channels[k].coordinate, rates), (self.asked.size, len(assembled)))
+            for k, coordinate in deflected:
+                moved = np.broadcast_to(first(part, coordinate, rates), (self.asked.size, len(assembled)))
                 flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load if poses is None else _of_poses(self.load, poses))
 
@@ -190,7 +191,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
 
 def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
     """Warnings of channels whose deflection is not known, or whose name could mean two points or angles."""
-    positions = [channel for channel in channels if channel.order == 0]
+    positions = [c for c in channels if isinstance(c, CoordinateChannel) and c.order == 0]
     warnings = []
     lost = [channel.name for channel in channels if not loaded.knows(channel)]
     if lost:

@@ -19,11 +19,10 @@ from mechdesign.mechanism.outputs import acceleration_sensitivity, first, second
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
-from mechdesign.questions.reliability.question import Channel
+from mechdesign.questions.reliability.forces import ForceModel
+from mechdesign.questions.reliability.question import Channel, CoordinateChannel, ForceChannel
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.reliability.sources import Pin, Sources
-
-ORDERS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,23 +151,34 @@ def correlation(covariance: Floats) -> Floats:
 
 
 def nominal_values(
-    mechanism: Mechanism, configuration: Configuration, channels: Sequence[Channel], rates: DriveRates
+    mechanism: Mechanism,
+    configuration: Configuration,
+    channels: Sequence[Channel],
+    rates: DriveRates,
+    forces: ForceModel | None = None,
 ) -> list[Value]:
-    """Values of the channels at solved configurations (radians, lengths)."""
-    orders = {channel.order for channel in channels}
+    """Values of the channels at solved configurations (radians, lengths, forces in the study's units)."""
+    orders = {channel.order for channel in channels if isinstance(channel, CoordinateChannel)}
+    columns = _columns(channels)
     velocity = acceleration = None
-    if orders - {0}:
+    if columns or orders - {0}:
         linear = mechanism.linearize(configuration)
+    if orders - {0}:
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations) if 2 in orders else None
     values = []
     for channel in channels:
+        if isinstance(channel, ForceChannel):
+            continue
         if velocity is None or channel.order == 0:
             values.append(configuration.value(channel.coordinate))
         elif acceleration is None or channel.order == 1:
             values.append(first(configuration, channel.coordinate, velocity))
         else:
             values.append(second(configuration, channel.coordinate, velocity, velocity, acceleration))
+    if columns:
+        assert forces is not None
+        values += forces.values(columns, linear, rates)
     return values
 
 
@@ -179,10 +189,12 @@ def derivatives(
     names: Sequence[str],
     rates: DriveRates,
     elastic: Elastic | None = None,
+    forces: ForceModel | None = None,
 ) -> Floats:
     """Derivative of each channel by places, drives and loads, shape (channels, names, n), at a flat batch.
 
-    `elastic` has these configurations, or the single nominal pose of all of them.
+    `elastic` has these configurations, or the single nominal pose of all of them. `forces` are those of the
+    configurations, and the derivatives of these are difference quotients.
 
     Raises
     ------
@@ -198,13 +210,14 @@ def derivatives(
     if not rows:
         return slopes
     names = [names[row] for row in rows]
+    columns, moved = _columns(channels), [c for c in channels if isinstance(c, CoordinateChannel)]
     linear = mechanism.linearize(configuration)
     position = linear.sensitivity(names)
-    if any(channel.order for channel in channels):
+    if any(channel.order for channel in moved):
         velocity = linear.velocity(rates.velocities)
         acceleration = linear.acceleration(velocity, rates.accelerations)
         velocity_z, acceleration_z = linear.rate_sensitivity(names, position, velocity, acceleration)
-    for row, channel in zip(slopes, channels, strict=True):
+    for row, channel in zip(slopes, moved, strict=False):
         if channel.order == 0:
             row[rows] = first(configuration, channel.coordinate, position)
         elif channel.order == 1:
@@ -213,7 +226,15 @@ def derivatives(
             row[rows] = acceleration_sensitivity(
                 configuration, channel.coordinate, velocity, acceleration, position, velocity_z, acceleration_z
             )
+    if columns:
+        assert forces is not None
+        slopes[len(moved) :, rows] = forces.slopes(columns, mechanism, configuration, position, names, rates)
     return slopes
+
+
+def _columns(channels: Sequence[Channel]) -> list[str]:
+    """The columns of dynamics among channels, which are the last of them."""
+    return [channel.name for channel in channels if isinstance(channel, ForceChannel)]
 
 
 def linear_errors(
@@ -223,10 +244,11 @@ def linear_errors(
     sources: Sources,
     rates: DriveRates,
     elastic: Elastic | None = None,
+    forces: ForceModel | None = None,
 ) -> FirstOrder:
     """Linear error model at a flat batch of nominal configurations with fixed drives; raises as `derivatives`."""
     names, slopes = _directions(sources)
-    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic)
+    by_name = derivatives(mechanism, configuration, channels, names, rates, elastic, forces)
     offset = np.zeros(by_name[:, 0].shape) if elastic is None else elastic.offset
     return FirstOrder(sources, _chained(slopes, by_name), offset)
 

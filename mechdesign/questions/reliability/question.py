@@ -16,16 +16,22 @@ from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.outputs import default_outputs, expand_outputs
-from mechdesign.questions.poses import radians
+from mechdesign.questions.reliability.forces import kinds_of_forces
 from mechdesign.questions.reliability.laws import at_rows
 from mechdesign.questions.reliability.schema.limits import SUFFIXES, split_order
 from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant, others
 from mechdesign.study import Study
+from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 from mechdesign.study.text import fields
+from mechdesign.study.text.units import Units
+
+# Orders of channels, as tables name them.
+OF_DYNAMICS = "dynamics"
+ORDERS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True)
-class Channel:
+class CoordinateChannel:
     """One quantity whose error is computed: a coordinate, or its velocity or acceleration (`order` 0, 1, 2)."""
 
     coordinate: Coordinate
@@ -35,6 +41,45 @@ class Channel:
     def name(self) -> str:
         """As a study's limits name it: ``P.x``, ``P.x_velocity``."""
         return self.coordinate.name + SUFFIXES[self.order]
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """Output and order, as tables name them."""
+        return self.coordinate.name, ORDERS[self.order]
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is computed in radians."""
+        return self.coordinate.quantity == "angle"
+
+    def unit(self, units: Units) -> str:
+        """Its unit in tables."""
+        return units.label(QUANTITIES.get(self.coordinate.quantity, ("none",) * 3)[self.order])
+
+
+@dataclass(frozen=True)
+class ForceChannel:
+    """A column of dynamics whose error is computed: an effort, a joint's force, an energy ..., in the study's units."""
+
+    name: str
+    kind: str
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """Output and order, as tables name them."""
+        return self.name, OF_DYNAMICS
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is computed in radians."""
+        return False
+
+    def unit(self, units: Units) -> str:
+        """Its unit in tables."""
+        return units.label(self.kind)
+
+
+Channel = CoordinateChannel | ForceChannel
 
 
 @dataclass(frozen=True)
@@ -61,7 +106,7 @@ class Disc:
 
 @dataclass(frozen=True, eq=False)
 class ReliabilityQuestion:
-    """Channels (outputs order by order, all positions first), and the limits on their errors.
+    """Channels (outputs order by order, all positions first, forces last), and the limits on their errors.
 
     `pair` are the two limited channels, or without limits the two outputs, where there are exactly two.
     """
@@ -70,6 +115,21 @@ class ReliabilityQuestion:
     bands: tuple[Band, ...]
     discs: tuple[Disc, ...]
     pair: tuple[int, int] | None
+
+    @property
+    def coordinates(self) -> list[Coordinate]:
+        """Coordinates of its channels."""
+        return [channel.coordinate for channel in self.channels if isinstance(channel, CoordinateChannel)]
+
+    @property
+    def columns(self) -> list[str]:
+        """Columns of dynamics among its channels, which are the last of them."""
+        return [channel.name for channel in self.channels if isinstance(channel, ForceChannel)]
+
+    @property
+    def moving(self) -> bool:
+        """Whether velocities count."""
+        return any(isinstance(channel, ForceChannel) or channel.order > 0 for channel in self.channels)
 
     @property
     def limited(self) -> bool:
@@ -97,7 +157,12 @@ class ReliabilityQuestion:
 
     def _about(self, band: Band, value: Any) -> Band:
         channel, middle = self.channels[band.output], 0.5 * (band.low + band.high)
-        if channel.order == 0 and channel.coordinate.quantity == "angle" and np.isfinite(middle).all():
+        if (
+            isinstance(channel, CoordinateChannel)
+            and channel.order == 0
+            and channel.turns
+            and np.isfinite(middle).all()
+        ):
             value = value - TURN * np.round((value - middle) / TURN)
         return Band(band.output, band.low - value, band.high - value)
 
@@ -164,38 +229,48 @@ def limits_at(bands: Sequence[Band], discs: Sequence[Disc], poses: Any) -> tuple
 def ask(study: Study, section: ReliabilitySection) -> ReliabilityQuestion:
     """Channels and limits of a section, whose numbers may be arrays of poses; limited coordinates are outputs, too."""
     mechanism = study.mechanism
-    limits = [(*_limited(mechanism, name), limit) for name, limit in section.limits.items()]
+    kinds = kinds_of_forces(study)
+    limits = [(name, 0, limit) if name in kinds else (*_limited(mechanism, name), limit)
+              for name, limit in section.limits.items()]  # fmt: skip
     limited = [
         part
         for base, _, limit in limits
         for part in ((f"{base}.x", f"{base}.y") if limit.radius is not None else (base,))
     ]
     names = section.outputs or (() if limited else default_outputs(mechanism))
-    outputs = expand_outputs(study, tuple(names))
+    outputs = expand_outputs(study, tuple(name for name in names if name not in kinds))
     listed = [output.name for output in outputs]
-    outputs += expand_outputs(study, tuple(dict.fromkeys(name for name in limited if name not in listed)))
-    places = [output.name for output in outputs]
-    orders = 3 if section.rates or section.accelerations or section.speed else 1
+    also = dict.fromkeys(name for name in limited if name not in listed and name not in kinds)
+    outputs += expand_outputs(study, tuple(also))
+    orders = 3 if section.rated else 1
+    forces = [name for name in dict.fromkeys([*names, *limited]) if name in kinds]
+    channels: list[Channel] = [CoordinateChannel(output, order) for order in range(orders) for output in outputs]
+    channels += [ForceChannel(name, kinds[name]) for name in forces]
+    places = {channel.words: k for k, channel in enumerate(channels)}
+
+    def place(base: str, order: int) -> int:
+        return places[base, OF_DYNAMICS if base in kinds else ORDERS[order]]
+
     bands, discs = [], []
     for base, order, limit in limits:
-        begin = order * len(outputs)
         if limit.radius is not None:
-            discs.append(Disc(begin + places.index(f"{base}.x"), begin + places.index(f"{base}.y"), limit.radius))
+            discs.append(Disc(place(f"{base}.x", order), place(f"{base}.y", order), limit.radius))
         else:
+            turns = channels[place(base, order)].turns
             low, high = (
-                radians(study, mechanism.coordinate(base), value) if value is not None else bound
+                (value * study.units.angle_factor if turns else value) if value is not None else bound
                 for value, bound in zip(limit.ends, (-np.inf, np.inf), strict=True)
             )
-            bands.append(Band(begin + places.index(base), low, high, limit.absolute))
+            bands.append(Band(place(base, order), low, high, limit.absolute))
     pair: tuple[int, int] | None = None
     if len(bands) == 2 and not discs:
         pair = (bands[0].output, bands[1].output)
     elif len(discs) == 1 and not bands:
         pair = (discs[0].x, discs[0].y)
-    elif not limited and len(outputs) == 2:
-        pair = (0, 1)
-    channels = tuple(Channel(output, order) for order in range(orders) for output in outputs)
-    return ReliabilityQuestion(channels, tuple(bands), tuple(discs), pair)
+    elif not limited and len(outputs) + len(forces) == 2:
+        one, other = (place(name, 0) for name in [output.name for output in outputs] + forces)
+        pair = (one, other)
+    return ReliabilityQuestion(tuple(channels), tuple(bands), tuple(discs), pair)
 
 
 def _limited(mechanism: Mechanism, name: str) -> tuple[str, int]:
@@ -217,7 +292,8 @@ def ambiguous_points(study: Study, question: ReliabilityQuestion) -> list[Cautio
     warnings = []
     for point, (link, rest) in others(study.reliability, study.mechanism.graph).items():
         plain = ("", study.mechanism.graph.node(point))
-        about = [c.name for c in question.channels if not c.order and plain in c.coordinate.ends]
+        positions = [c for c in question.channels if isinstance(c, CoordinateChannel) and not c.order]
+        about = [c.name for c in positions if plain in c.coordinate.ends]
         named = section["clearances"][point].get("link") or any(_named(str(name), point) for name in names)
         if about and rest and not named:
             warnings.append(Caution(
@@ -233,12 +309,14 @@ def _named(name: str, point: str) -> bool:
     return rest == point or rest.startswith((f"{point}.", f"{point}_"))
 
 
-def holders(study: Study, coordinate: Coordinate) -> str:
-    """Names of the links whose points a coordinate uses, for points with a clearance or an elastic bearing."""
+def holders(study: Study, channel: Channel) -> str:
+    """Names of the links whose points a channel uses, for points with a clearance or an elastic bearing."""
     graph = study.mechanism.graph
+    coordinates = [channel.coordinate] if isinstance(channel, CoordinateChannel) else []
     names = [
         link or " ".join(links)
         for point, links in links_meant(study.reliability, study.stiffness, graph).items()
+        for coordinate in coordinates
         for link, node in coordinate.ends
         if node == graph.node(point)
     ]

@@ -18,6 +18,7 @@ from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate, Problem, counted, slopes
 from mechdesign.questions.reliability.first_order import derivatives, nominal_values
+from mechdesign.questions.reliability.forces import ForceModel
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.sources import Made, Sources
 from mechdesign.work.chunks import map_chunks
@@ -64,6 +65,7 @@ class Setting:
     rates: DriveRates
     centres: Sequence[float]
     elastic: Elastic | None
+    forces: ForceModel | None = None
     scale: tuple[tuple[float, float], tuple[float, float]] | None = None
     followed: bool = False
 
@@ -73,6 +75,7 @@ class Setting:
         return replace(
             self, question=self.question.narrowed, centres=[self.centres[k] for k in channels], scale=None,
             elastic=None if self.elastic is None else self.elastic.only(channels),
+            forces=self.forces if self.question.narrowed.columns else None,
         )  # fmt: skip
 
 
@@ -104,20 +107,26 @@ def solve(setting: Setting, made: Made) -> Configuration:
         nominal.value(mechanism.coordinate(name)) + made.drives.get(name, 0.0) for name in mechanism.drives
     ]
     solved = setting.plan.solve(drives, made.places, start=nominal, limits=False)
-    return solved.beside(nominal, [channel.coordinate for channel in setting.question.channels])
+    loads = [] if setting.forces is None else setting.forces.coordinates
+    return solved.beside(nominal, [*setting.question.coordinates, *loads])
 
 
 def errors_of(setting: Setting, made: Made, count: int) -> tuple[Floats, Flags]:
-    """Errors (value minus nominal), shape (channels, count), and which of the made mechanisms are assembled."""
+    """Errors (value minus nominal), shape (channels, count), and which of the made mechanisms are assembled.
+
+    Where forces are asked, the drives must hold the mechanism as well.
+    """
     solved = solve(setting, made)
+    forces = None if setting.forces is None else setting.forces.made(made.parameters)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        values = nominal_values(setting.mechanism, solved, setting.question.channels, setting.rates)
+        values = nominal_values(setting.mechanism, solved, setting.question.channels, setting.rates, forces)
     errors = np.empty((len(values), count))
     for error, value, centre in zip(errors, values, setting.centres, strict=True):
         error[:] = value - centre
     if setting.elastic is not None:
         errors += setting.elastic.errors(made.loads, count)
-    return errors, np.broadcast_to(solved.valid, (count,))
+    valid = np.broadcast_to(solved.valid, (count,))
+    return errors, valid if forces is None else valid & np.isfinite(errors).all(axis=0)
 
 
 def problem_of(setting: Setting, sources: Sources) -> Problem:
@@ -135,8 +144,9 @@ def problem_of(setting: Setting, sources: Sources) -> Problem:
         made = sources.made(sources.at(u, directed=True))
         errors, valid = errors_of(setting, made, u.shape[1])
         names = [name for part in made for name in part]
+        forces = None if setting.forces is None else setting.forces.made(made.parameters)
         by_name = derivatives(
-            setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic
+            setting.mechanism, solve(setting, made), question.channels, names, setting.rates, setting.elastic, forces
         )
         by_variable = np.einsum("cnp,ndp->cdp", by_name, slopes(varying, u, _SOURCE_STEP))
         distances = question.margins(errors)

@@ -11,6 +11,7 @@ import numpy as np
 from mechdesign.expressions import Number
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.reliability.copula import Correlation
+from mechdesign.questions.reliability.forces import FOLLOWED
 from mechdesign.questions.reliability.laws import Marginal, at_rows
 from mechdesign.questions.reliability.pin_laws import PIN_LAWS, SLIDE_LAWS, PinLaw, SlideLaw
 from mechdesign.study import Study
@@ -20,8 +21,9 @@ from mechdesign.study import Study
 class Scalar:
     """A dimension that varies: by `kind` a ``parameter`` (in its own unit), a ``place``, a ``drive`` or a ``load``.
 
-    `moves` maps each place, drive or load that it changes onto the derivative (radians, lengths) and the quantity.
-    `factor` is one `unit` of the study in radians, lengths or loads; the unit of a parameter may be unknown (None).
+    `moves` maps each place, drive or load that it changes onto the derivative (radians, lengths) and the quantity; a
+    parameter that forces follow stands among them by its `FOLLOWED` name. `factor` is one `unit` of the study in
+    radians, lengths or loads; the unit of a parameter may be unknown (None).
     """
 
     name: str
@@ -108,11 +110,15 @@ class Pin:
 
 
 class Made(NamedTuple):
-    """Made mechanisms: varying places (radians, lengths), errors of drives and of loads, by name, shape (count,)."""
+    """Made mechanisms: varying places (radians, lengths), errors of drives and of loads, by name, shape (count,).
+
+    `parameters` are deviations of those that the numbers of dynamics follow, by their `FOLLOWED` names.
+    """
 
     places: dict[str, Floats]
     drives: dict[str, Floats]
     loads: dict[str, Floats]
+    parameters: dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -243,7 +249,10 @@ class Sources:
             for direction, part in zip(pin.directions, parts, strict=False):
                 for name, slope in direction.items():
                     places[name] = places.get(name, nominal.get(name, 0.0)) + slope * part
-        return Made(places, by_kind["drive"], by_kind["load"])
+        parameters = {f"{FOLLOWED}{name}": value for name, value in by_kind["parameter"].items()}
+        followed = {name for scalar in self.scalars for name in scalar.moves}
+        parameters = {name: value for name, value in parameters.items() if name in followed}
+        return Made(places, by_kind["drive"], by_kind["load"], parameters)
 
 
 def geometric(values: Mapping[str, Number]) -> dict[str, Number]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.geometry import offset_names, slide_offset
 from mechdesign.mechanism.model import MEASURED, Joint, Prismatic
 from mechdesign.questions.reliability.copula import Correlation
+from mechdesign.questions.reliability.forces import FOLLOWED, followed
 from mechdesign.questions.reliability.laws import Marginal, Measured, fit_law
 from mechdesign.questions.reliability.schema.clearances import Clearance
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
@@ -25,7 +26,7 @@ from mechdesign.study.poses import Poses
 
 # Largest deviation, in radians or in sizes of the mechanism.
 MAX_DEVIATION = 1e6
-# Largest deviation of a force or moment, in the study's units.
+# Largest deviation of a force, a mass or a spring's constant, in the study's units.
 MAX_LOAD = 1e100
 
 
@@ -48,16 +49,18 @@ def find_sources(study: Study, poses: Poses | None = None) -> tuple[Sources, lis
     section = poses.section(section)
     sizes: dict[str, Number] = {**study.sizes, **poses.places, **poses.parameters}
     scalars = []
-    slopes: Mapping[str, Number]
+    slopes: dict[str, Number]
     warnings: list[Caution] = []
     together: list[str] = []
+    counting = followed(study)
     for name, dimension in section.dimensions.items():
         nominal = sizes.get(name, 0.0)
         if name in study.parameters.nominal:
             kind = "parameter"
             slopes = geometric(study.parameters.derivatives(name, poses.parameters, poses.changed))
+            slopes |= {f"{FOLLOWED}{name}": 1.0} if name in counting else {}
             moved = [place for place, slope in slopes.items() if np.any(slope)]
-            dimensions = [place for place in moved if not place.startswith(MEASURED)]
+            dimensions = [place for place in moved if not place.startswith((MEASURED, FOLLOWED))]
             if not moved:
                 idle = f"parameter '{name}' changes no dimension of the mechanism"
                 warnings.append(Caution("ignored", idle))
@@ -98,19 +101,23 @@ def _law(study: Study, name: str, dimension: Dimension, nominal: Number, factor:
 
 
 def _quantity(mechanism: Mechanism, name: str) -> str:
-    """Quantity of a place, a drive or a load."""
+    """Quantity of a place, a drive or a load, or of a parameter that forces follow."""
     places = mechanism.description.places
+    if name.startswith(FOLLOWED):
+        return "none"
     return LOADS[name] if name in LOADS else places[name].quantity if name in places else mechanism.quantity(name)
 
 
 def _check_sizes(sources: Sources) -> None:
     """Raise a StudyError for deviations so large that their squares overflow."""
     study, size = sources.study, sources.study.mechanism.size or 1.0
-    loads = (MAX_LOAD, "1e100")
-    most = {"angle": (MAX_DEVIATION, "a million radians"), "force": loads, "moment": loads, "none": loads}
+    most = {
+        "angle": (MAX_DEVIATION, "a million radians"),
+        "length": (MAX_DEVIATION * size, "a million times the size of the mechanism"),
+    }
     for scalar in sources.scalars:
         for slope, quantity in scalar.moves.values():
-            allowed, words = most.get(quantity, (MAX_DEVIATION * size, "a million times the size of the mechanism"))
+            allowed, words = most.get(quantity, (MAX_LOAD, "1e100"))
             if not max(np.max(np.abs(slope * end)) for end in scalar.ends) <= allowed:
                 message = f"varies by more than {words}; look at its unit"
                 raise StudyError((study.problem(message, "reliability", "dimensions", scalar.name),))

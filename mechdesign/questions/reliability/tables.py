@@ -188,7 +188,7 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     units = np.array(
         [[study.units.ratio(unit, source_unit) for source_unit in below] for unit in task.labels[2].tolist()]
     )
-    links = np.array([holders(task.study, c.coordinate) for c in task.question.channels])
+    links = np.array([holders(task.study, channel) for channel in task.question.channels])
     return CONTRIBUTIONS.table(at_poses(task, pose) + CONTRIBUTIONS.columns(
         {}, source=names[source], **_channels(task, channel), on=links[channel], sensitivity=sensitivity.ravel(),
         derivative=(sensitivity * task.scale[:, None] * factors).ravel(), unit=units[channel, source],

@@ -16,14 +16,13 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.deflection import Elastic
 from mechdesign.questions.reliability.engine.problem import Estimate
-from mechdesign.questions.reliability.first_order import ORDERS, FirstOrder
+from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.question import ReliabilityQuestion
 from mechdesign.questions.reliability.schema.section import Precision
 from mechdesign.questions.reliability.simulation import Setting, Sums
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
-from mechdesign.study.schema.checker import ORDERS as QUANTITIES
 
 Strings = NDArray[np.str_]
 
@@ -85,17 +84,14 @@ class Task:
     def scale(self) -> Floats:
         """Study units in one unit of the core, shape (channels,)."""
         turn = 1.0 / self.study.units.angle_factor
-        return np.array([turn if c.coordinate.quantity == "angle" else 1.0 for c in self.question.channels])
+        return np.array([turn if channel.turns else 1.0 for channel in self.question.channels])
 
     @cached_property
     def labels(self) -> tuple[Strings, Strings, Strings]:
         """Output, order and unit of each channel."""
-        channels, label = self.question.channels, self.study.units.label
-        return (
-            np.array([c.coordinate.name for c in channels]),
-            np.array([ORDERS[c.order] for c in channels]),
-            np.array([label(QUANTITIES.get(c.coordinate.quantity, ("none",) * 3)[c.order]) for c in channels]),
-        )
+        channels = self.question.channels
+        outputs, orders = zip(*(channel.words for channel in channels), strict=True)
+        return np.array(outputs), np.array(orders), np.array([channel.unit(self.study.units) for channel in channels])
 
     def where(self, pose: int) -> str:
         """A pose in words."""

@@ -63,8 +63,8 @@ Pose = tuple[int, Configuration]
 @one_thread()
 def stiffness(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Stiffness of a body or a pin at every pose of the study [S4]; see `mechdesign.stiffness`."""
-    poses = study_poses(study, "stiffness")
     body = ask(study)
+    poses = study_poses(study, "stiffness")
     progress.start(poses.count, "poses")
     result = _group(study, body, poses, jobs, progress).of(0)
     if isinstance(result, Exception):

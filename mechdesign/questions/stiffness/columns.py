@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mechdesign.questions.columns import GIVEN, VALID
+from mechdesign.questions.columns import GIVEN, TIMED, VALID
 from mechdesign.results import ColumnKind, KeyNumber, TableKind
 
 LOAD = ColumnKind("load", "which of the study's loads")
 STIFFNESS = TableKind.of("stiffness", "stiffness at the asked point per pose, axes of the world, per radian",
-    GIVEN, ("k_x, k_y", "load over its own displacement, the others free", "stiffness", "1/C11, 1/C22"),
+    TIMED, GIVEN, ("k_x, k_y", "load over its own displacement, the others free", "stiffness", "1/C11, 1/C22"),
     ("k_phi", "load over its own displacement, the others free", "rotational_stiffness", "1/C33"),
     ("k_min", "stiffness to a force in the softest direction, the body free to turn", "stiffness",
      "1/largest eigenvalue of [[C11, C12], [C12, C22]]"),
@@ -24,27 +24,27 @@ STIFFNESS = TableKind.of("stiffness", "stiffness at the asked point per pose, ax
     ("method", "serial legs: reciprocal screws [S4]; force method: any other"))  # fmt: skip
 COMPLIANCE = TableKind.of(
     "compliance", "twist (dx, dy, dphi in radians) at the asked point per load, axes of the world",
-    GIVEN, ("C11, C12, C22", "displacement per load", "compliance"),
+    TIMED, GIVEN, ("C11, C12, C22", "displacement per load", "compliance"),
     ("C13, C23", "displacement per load", "coupling_compliance"),
     ("C33", "displacement per load", "rotational_compliance"))  # fmt: skip
 EIGEN = TableKind.of("eigen", "eigen-stiffnesses by the characteristic length",
-    GIVEN, ("mode", "softest first"),
+    TIMED, GIVEN, ("mode", "softest first"),
     ("stiffness", "eigenvalue of the scaled stiffness matrix", "stiffness",
      "eigenvalues of S K S, S = diag(1, 1, 1/length)"), ("dx, dy", "its twist, of unit size"),
     ("turn", "its twist: the characteristic length times dphi"))  # fmt: skip
 SPRINGS = TableKind.of("springs", "springs that hold the body as its legs do",
-    GIVEN, ("leg", "links of the leg, from the base"),
+    TIMED, GIVEN, ("leg", "links of the leg, from the base"),
     ("stiffness", "along its line, inf where rigid; where angle is nan about its point (<unit>)", "stiffness"),
     ("x, y", "a point on its line", "length"), ("angle", "direction of its line", "angle"))  # fmt: skip
 DEFLECTIONS = TableKind.of("deflections", "deflections under the study's loads",
-    GIVEN, ("fx, fy", "load at the asked point", "force"), ("mz", "load at the asked point", "moment"),
+    TIMED, GIVEN, ("fx, fy", "load at the asked point", "force"), ("mz", "load at the asked point", "moment"),
     ("dx, dy", "deflection of the asked point", "length"),
     ("dphi", "deflection of the asked point", "as radians"))  # fmt: skip
 DISPLACEMENTS = TableKind.of("displacements", "displacements of all points under the study's loads",
-    GIVEN, LOAD, ("link", "link"), ("point", "its point"), ("x, y", "place without a load", "length"),
+    TIMED, GIVEN, LOAD, ("link", "link"), ("point", "its point"), ("x, y", "place without a load", "length"),
     ("dx, dy", "displacement", "length"))  # fmt: skip
 FORCES = TableKind.of("forces", "what the joints bear under the study's loads",
-    GIVEN, LOAD, ("joint", "point or slide"),
+    TIMED, GIVEN, LOAD, ("joint", "point or slide"),
     ("on", "what the force acts on: a link, 'asked' (the asked point), or the pin of a slot ('slot:') or of several "
      "links ('pin:')"), ("by", "what exerts it; in a telescopic leg its rod, on the part at its first end"),
     ("fx, fy", "force on the one by the other, axes of the world", "force"),

@@ -15,7 +15,8 @@ import numpy as np
 
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
-from mechdesign.mechanism.model import Link
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.model import Link, Spring
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.schema import Profile, StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist
@@ -75,7 +76,39 @@ class Bearing:
     give: float = 1.0
 
 
-Element = Hinge | Guide | Beam | Shift | Bearing
+@dataclass(frozen=True, eq=False)
+class Coil:
+    """A spring of the mechanism: it gives along its line, or where it `turns` about its point.
+
+    One of no free length and no preload gives alike in every direction.
+    """
+
+    spring: Spring
+    geometry: Geometry
+
+    def freedoms(self, configuration: Configuration, at: Complexes) -> Iterator[tuple[Floats, Value]]:
+        """Twists (3, n) that it allows, seen from places `at`, and their compliances."""
+        spring, places = self.spring, configuration.places
+        soft = 1 / self.geometry.term(spring.stiffness, places)
+        if spring.turning:
+            yield hinge_twist(at - at), soft
+            return
+        one, other = (configuration.point(point.rpartition(".")[2]) for point in spring.between)
+        span = other - one
+        along: Complexes = np.where(span == 0, 1.0 + 0j, span / np.where(span == 0, 1.0, np.abs(span)))
+        yield slide_twist(along), soft
+        if self.isotropic:
+            across: Complexes = np.asarray(1j * along)
+            yield slide_twist(across), soft
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether it gives alike in every direction."""
+        spring = self.spring
+        return not any(self.geometry.term(term, {}) for term in (spring.free, spring.preload, spring.push))
+
+
+Element = Hinge | Guide | Beam | Shift | Bearing | Coil
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +207,8 @@ def freedoms(
             yield from _beam_freedoms(element, section, configuration, at)
         elif isinstance(element, Shift):
             yield slide_twist(np.full(configuration.shape, element.direction)), None
+        elif isinstance(element, Coil):
+            yield from element.freedoms(configuration, at)
         elif isinstance(element, Bearing):
             yield from _bearing_freedoms(element, section, configuration, at)
         else:

@@ -20,9 +20,9 @@ import numpy as np
 
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
-from mechdesign.mechanism.model import Drive, Fixed, Prismatic
+from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.stiffness.elements import Beam, Bearing, Element, Guide, Hinge, Shift, corners_of
+from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift, corners_of
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
@@ -131,6 +131,8 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
     for drive in description.drives.values():
         if drive.kind == "angle" and drive.name not in builder.held:
             builder.motor(drive, pins)
+    for spring in description.springs.values():
+        builder.spring(spring, holders)
     for name in section.elastic:
         builder.beams(name)
     return Bodies(tuple(builder.edges), asked, link, builder.points())
@@ -195,6 +197,23 @@ class _Builder:
                 break
         elements = (Shift(1.0 + 0j), Shift(1j), *self._freedom(Hinge(point, drive.name)))
         self.join(a, b, elements, drive.name, point, seat)
+
+    def spring(self, spring: Spring, holders: Mapping[str, list[str]]) -> None:
+        """Add a spring between two links, or between bodies at its points, about which it turns freely."""
+        coil = Coil(spring, self.mechanism.geometry)
+        if not self.mechanism.geometry.term(spring.stiffness, {}):
+            return
+        one, other = spring.between
+        if spring.turning:
+            seat, point = (next(iter(self.mechanism.description.links[link].points)) for link in spring.between)
+            self.join(one, other, (Shift(1.0 + 0j), Shift(1j), coil), spring.name, point, seat)
+            return
+        bodies, points = [], [end.rpartition(".")[2] for end in spring.between]
+        for end, point in zip(spring.between, points, strict=True):
+            link = end.rpartition(".")[0]
+            bodies.append(next((body for body in holders[point] if link_of(body) == link), holders[point][0]))
+        hinges = (Hinge(points[1]),) if coil.isotropic else (Hinge(points[0]), Hinge(points[1]))
+        self.join(bodies[0], bodies[1], (*hinges, coil), spring.name, points[1], points[0])
 
     def beams(self, name: str) -> None:
         """Add the beams of a link, from their beginning to each other point and to each slide on the link."""

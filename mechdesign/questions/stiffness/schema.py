@@ -44,6 +44,8 @@ class Profile(fields.Model):
     """Area of any other section. Example: 800 mm^2"""
     inertia: fields.PositiveInertia | None = None
     """Second moment of area for bending in the plane. Example: 1e5 mm^4"""
+    density: fields.PositiveDensity | None = None
+    """Mass per volume: a link that bends and has no ``mass`` has that of its beams in dynamics. Example: 7850 kg/m^3"""
     shear: bool = False
     """Whether shear gives too (Timoshenko's beam)."""
     shear_factor: fields.Positive | None = None
@@ -119,6 +121,23 @@ def _series(raw: Any, context: Context) -> float:
 _SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
 
 
+_LOADS: fields.Form = {"type": "array", "items": {"type": "object", "title": "load"}}
+
+
+def _numbers(load: dict[str, Any], section: dict[str, Any]) -> list[Any]:
+    """A load by the names of its point and link as [fx, fy, mz]."""
+    force, moment = load.get("force"), load.get("moment")
+    if not load.keys() <= {"at", "force", "link", "moment"} or (force is None and moment is None):
+        raise failure("a load is [fx, fy, mz], {at: point, force: [fx, fy]} or {link: name, moment: mz}")
+    for key, place in (("at", force), ("link", moment)):
+        if (place is None) != (load.get(key) is None) or (place is not None and load[key] != section.get(key)):
+            what = f"its point, at: {section.get('at')}" if key == "at" else f"its link, link: {section.get('link')}"
+            raise failure(f"a force or moment of stiffness acts on {what}; for loads elsewhere ask dynamics")
+    if force is not None and (not isinstance(force, list) or len(force) != 2):
+        raise failure(f"a force is [fx, fy], not {fields.shown(force)}")
+    return [*(force or [0.0, 0.0]), 0.0 if moment is None else moment][: 3 if section.get("link") else 2]
+
+
 class StiffnessSection(PoseSection):
     """What bends, turns or gives, and the point at which stiffness and deflections are asked."""
 
@@ -150,12 +169,20 @@ class StiffnessSection(PoseSection):
     """Angle from the world's x axis of the direction whose stiffness is k_direction. Left out: that column is not
     there. Example: 90
     """
-    loads: tuple[tuple[fields.Number, ...], ...] = ()
-    """Loads on the point, [fx, fy, mz]; their deflections are reported. Without ``link`` [fx, fy] is enough. Example:
-    [[100, 0, 0], [0, 100, 0]]
+    loads: Annotated[tuple[tuple[fields.Number, ...], ...], fields.OrShort(_LOADS)] = ()
+    """Loads on the point, each a case of its own, [fx, fy, mz]; their deflections are reported. Without ``link`` [fx,
+    fy] is enough; {at: P, force: [fx, fy]} and {link: platform, moment: mz} are the same. Example: [[100, 0, 0], [0,
+    100, 0]] Example: [{at: P, force: [100, 0]}]
     """
     characteristic_length: fields.PositiveLength | None = None
     """Length as which a radian counts; then the eigen-stiffnesses of ``link`` are reported. Example: 0.1"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _loads_in_numbers(cls, raw: Any) -> Any:
+        if not isinstance(raw, dict) or not isinstance(raw.get("loads"), list):
+            return raw
+        return {**raw, "loads": [_numbers(load, raw) if isinstance(load, dict) else load for load in raw["loads"]]}
 
     @property
     def point(self) -> str:

@@ -23,7 +23,7 @@ from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 HELP_PAGE = "howto/batch"
 
-_POSE_KEYS = ("poses", "sweep", "path")
+_POSE_KEYS = ("poses", "sweep", "path", "motion")
 _MOST_ENTRIES = 4  # of the study, that a note names
 
 
@@ -250,5 +250,5 @@ def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], An
             continue
         listed = [pose for pose in poses.get("poses", ()) if isinstance(pose, dict)]
         names = {f"{point}.{axis}" for point in poses.get("path", ()) for axis in "xy"}
-        return frozenset(names.union(poses.get("sweep", ()), *listed)), poses
+        return frozenset(names.union(poses.get("sweep", ()), poses.get("motion", ()), *listed)), poses
     return frozenset(), None

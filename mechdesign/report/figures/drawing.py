@@ -11,14 +11,15 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import Normal, TickedStroke
-from matplotlib.transforms import Affine2D, ScaledTranslation, Transform
+from matplotlib.transforms import Affine2D, Affine2DBase, ScaledTranslation, Transform
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.figures import shapes
 from mechdesign.report.figures.labels import Label, covered, place_labels, rows
 from mechdesign.report.figures.scene import pose
-from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
+from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol, Travel
 
 
 def draw_mechanism(
@@ -64,7 +65,7 @@ def draw_mechanism(
     draw(axes, [*drawn, *arrows], size=size)
     if labels:
         # The most important first.
-        named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene)]
+        named = [*shapes.point_labels(scene), *named, *shapes.slide_labels(scene), *shapes.spring_labels(scene)]
         named += [*more, *shapes.link_labels(scene, colors)]
         place_labels(axes, named, covered(axes), order=5.0)
 
@@ -87,6 +88,12 @@ def draw(axes: Axes, drawn: Iterable[Shape], *, order: float = 3.0, alpha: float
                 PathPatch(_path(shape), transform=_at(axes, shape, size), facecolor=shape.fill or "none",
                           edgecolor=shape.edge or "none", lw=shape.width, linestyle=shape.dashes, alpha=alpha,
                           zorder=order + shape.layer, clip_on=True)
+            )  # fmt: skip
+        elif isinstance(shape, Strut):
+            axes.add_artist(
+                PathPatch(_lines(shape.outlines), transform=_Between(axes, shape.places, size), lw=shape.width * size,
+                          facecolor=shape.fill or "none", edgecolor=shape.color, capstyle=shape.cap, joinstyle="round",
+                          alpha=alpha, zorder=order + shape.layer, clip_on=True)
             )  # fmt: skip
         elif shape.filled:
             axes.add_patch(
@@ -119,9 +126,31 @@ def _line(axes: Axes, line: Line, order: float, alpha: float, size: float) -> Li
 def _path(symbol: Symbol) -> Path:
     if symbol.radius:
         return Path.circle(radius=symbol.radius)
-    closed = symbol.fill is not None
-    lines = (rows(np.array([*line, *line[:closed]])) for line in symbol.outlines)
+    return _lines(symbol.outlines, closed=symbol.fill is not None)
+
+
+def _lines(outlines: Iterable[Sequence[complex]], *, closed: bool = False) -> Path:
+    """Lines as one path."""
+    lines = (rows(np.array([*line, *line[:closed]])) for line in outlines)
     return Path.make_compound_path(*(Path(line, closed=closed) for line in lines))
+
+
+class _Between(Affine2DBase):
+    """From shares of the way between two places of the drawing, and points on paper across, to pixels."""
+
+    def __init__(self, axes: Axes, places: tuple[complex, complex], size: float) -> None:
+        super().__init__()
+        self.axes, self.places, self.size = axes, places, size
+        self.set_children(axes.transData)
+
+    def get_matrix(self) -> Floats:
+        """The matrix for the limits of the axes now."""
+        begin, end = self.axes.transData.transform(rows(np.array(self.places)))
+        way = end - begin
+        figure = self.axes.get_figure(root=True)
+        assert figure is not None
+        left = np.array([-way[1], way[0]]) / (np.hypot(*way) or 1.0) * self.size * figure.dpi / 72
+        return np.array([[way[0], left[0], begin[0]], [way[1], left[1], begin[1]], [0.0, 0.0, 1.0]])
 
 
 def _at(axes: Axes, symbol: Symbol, size: float) -> Transform:

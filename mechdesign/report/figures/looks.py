@@ -10,7 +10,7 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.poses import pose_in_words
-from mechdesign.questions.reliability.first_order import ORDERS
+from mechdesign.questions.reliability.question import OF_DYNAMICS, ORDERS
 from mechdesign.questions.reliability.schema.limits import SUFFIXES as ORDER_SUFFIXES
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
 from mechdesign.questions.reliability.tables import Samples
@@ -19,7 +19,7 @@ from mechdesign.results import Table
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
-SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True))
+SUFFIXES = dict(zip(ORDERS, ORDER_SUFFIXES, strict=True)) | {OF_DYNAMICS: ""}
 
 
 def look(name: str) -> Method:
@@ -89,7 +89,7 @@ def channels(table: Table) -> list[tuple[str, str, str]]:
 
 def heading(output: str, order: str) -> str:
     """An output by its name, its velocity as such."""
-    return output if order == "position" else f"{output} {order}"
+    return output if order in ("position", OF_DYNAMICS) else f"{output} {order}"
 
 
 def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: str) -> Floats:

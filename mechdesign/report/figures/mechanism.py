@@ -12,14 +12,16 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
+from mechdesign.questions.dynamics.analysis import DrawnForces
+from mechdesign.questions.dynamics.free_bodies import mass_centers
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown
 from mechdesign.report.figures import style
-from mechdesign.report.figures.drawing import draw_mechanism
+from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import LEFT, RIGHT, fit, framed, windows
 from mechdesign.report.figures.labels import paper
 from mechdesign.report.figures.scene import Scene, Sweep, pose, travels
-from mechdesign.report.figures.shapes import Travel
+from mechdesign.report.figures.shapes import Travel, center_shapes
 from mechdesign.results import Result
 from mechdesign.study import Study
 
@@ -47,11 +49,17 @@ def mechanism_figure(study: Study, result: Result) -> Figure:
         scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
         if scenes[1] is not None:
             return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
-    return sketch_and_first_pose(study, result.drawn.shown if isinstance(result.drawn, DrawnMotion) else None)
+    shown = result.drawn.shown if isinstance(result.drawn, DrawnMotion | DrawnForces) else None
+    return sketch_and_first_pose(study, shown, masses=isinstance(result.drawn, DrawnForces))
 
 
-def sketch_and_first_pose(study: Study, shown: Shown | None, title: str = SKETCH_POSE) -> Figure:
-    """The sketch pose under a title, and the first of some poses; without any, a few of the kinematics are solved."""
+def sketch_and_first_pose(
+    study: Study, shown: Shown | None, title: str = SKETCH_POSE, *, masses: bool = False
+) -> Figure:  # fmt: skip
+    """The sketch pose under a title, and the first of some poses; without any, a few of the kinematics are solved.
+
+    With `masses` the centres of mass are marked.
+    """
     mechanism = study.mechanism
     sketch = mechanism.sketch_configuration
     panels: list[Panel] = [(title, sketch, 0)]
@@ -59,7 +67,7 @@ def sketch_and_first_pose(study: Study, shown: Shown | None, title: str = SKETCH
     try:
         sweep = Sweep.of(shown or solve_shown(study, _POSES))
     except MechdesignError:
-        return _compose(study, panels, travels(scenes))
+        return _compose(study, panels, travels(scenes), masses)
     some = evenly(len(sweep.rows), _POSES).tolist()
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
@@ -70,7 +78,7 @@ def sketch_and_first_pose(study: Study, shown: Shown | None, title: str = SKETCH
             note = f"{title.removesuffix(' pose')} and {note}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses.values()
-    return _compose(study, panels, travels(scenes))
+    return _compose(study, panels, travels(scenes), masses)
 
 
 def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
@@ -118,7 +126,7 @@ def _same(one: Scene | None, other: Scene | None) -> bool:
     return all(abs(one.points[name] - other.points[name]) <= _ALIKE * one.span for name in one.points)
 
 
-def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
+def _compose(study: Study, panels: list[Panel], travel: Travel, masses: bool = False) -> Figure:
     """Panels beside or above each other, whichever shows the mechanism larger."""
     mechanism = study.mechanism
     places: list[complex] = []
@@ -135,6 +143,8 @@ def _compose(study: Study, panels: list[Panel], travel: Travel) -> Figure:
     for axes, title, (_, configuration, index) in zip(grid, titles, panels, strict=True):
         axes.set_title(title, loc="left")
         _draw_beams(axes, study, configuration, index)
+        if masses:
+            draw(axes, center_shapes(mass_centers(study, configuration, index).values()))
         draw_mechanism(axes, mechanism, configuration, index, travel=travel)
     return figure
 

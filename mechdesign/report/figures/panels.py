@@ -17,7 +17,7 @@ from mechdesign.numerics.arrays import Complexes, Floats, evenly
 from mechdesign.report.figures import style
 from mechdesign.report.figures.framing import LEFT
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses, Sector, Sectors, with_length
+from mechdesign.study.poses import TIME, Poses, Sector, Sectors, with_length
 
 # More of them in one picture cannot be told apart.
 MAX_PANELS = 6
@@ -75,11 +75,12 @@ def along(study: Study, poses: Poses) -> Along | None:
 
 
 def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
-    """The one coordinate that moves, always the same way, or else the number of the pose; the time at a given speed."""
+    """Time, of a motion over time or at a given speed; the coordinate that moves, always the same way; or the pose."""
+    label = style.axis_label(TIME, study.units.label("time"))
+    if poses.times is not None:
+        return Along(poses.times, label, TIME)
     if speed is not None:
-        return Along(
-            times(poses, poses.numbers.astype(float), speed), style.axis_label("time", study.units.label("time"))
-        )
+        return Along(times(poses, poses.numbers.astype(float), speed), label)
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(poses.numbers + 1, "pose along the path")
@@ -198,8 +199,8 @@ def quantity(value: float, unit: str) -> str:
     """A value with three digits and its unit, ``3.74e+07 N/m`` as 3.74·10⁷ N/m; an infinite stiffness in a word."""
     if np.isinf(value):
         return "rigid"
-    if 1e-2 <= value < 1e5:
-        return f"{value:.3g} {style.printed(unit)}" if value < 1e3 else f"{value:.0f} {style.printed(unit)}"
+    if value == 0 or 1e-2 <= abs(value) < 1e5:
+        return f"{value:.3g} {style.printed(unit)}" if abs(value) < 1e3 else f"{value:.0f} {style.printed(unit)}"
     return f"{style.in_powers(value)} {style.printed(unit)}"
 
 

@@ -15,7 +15,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Description, Fixed, Link, Slot
+from mechdesign.mechanism.model import Description, Fixed, Link, Slot, Spring
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.poses import Shown, pose_in_words, radians
 from mechdesign.report.figures.framing import extent
@@ -84,9 +84,10 @@ class Scene:
         clamps = Counter(joint.point for joint in self.description.joints.values() if isinstance(joint, Fixed))
         slots = {joint.point for joint in self.description.joints.values() if isinstance(joint, Slot)}
         slid = {guide.point for guide in self.guides if guide.slider is not None}
+        hung = self.sprung & set(self.link_points(GROUND))
         kinds = {}
         for point, count in uses.items():
-            if point in slots or count - clamps[point] > 1:
+            if point in slots or point in hung or count - clamps[point] > 1:
                 kinds[point] = "pin"
             elif clamps[point]:
                 kinds[point] = "clamp"
@@ -97,14 +98,26 @@ class Scene:
         return kinds
 
     def pivots(self) -> tuple[str, ...]:
-        """Points of the ground to which something is pinned or clamped."""
+        """Points of the ground to which something is pinned, clamped or hung by a spring."""
         moving = {point for name in self.description.links if name != GROUND for point in self.link_points(name)}
-        return tuple(point for point in self.link_points(GROUND) if point in moving)
+        return tuple(point for point in self.link_points(GROUND) if point in moving | self.sprung)
+
+    @property
+    def sprung(self) -> set[str]:
+        """Points at which springs between points end."""
+        springs = self.description.springs.values()
+        return {point for spring in springs if not spring.turning for point in spring_points(spring)}
 
 
 def link_points(link: Link) -> tuple[str, ...]:
     """Names of a link's points, its ends first; those of a telescopic leg include its tip."""
     return tuple(dict.fromkeys((*(link.ends or ()), *link.points)))
+
+
+def spring_points(spring: Spring) -> tuple[str, str]:
+    """Names of the two points between which a spring is, without those of links."""
+    one, other = (end.rpartition(".")[2] for end in spring.between)
+    return one, other
 
 
 def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> Scene | None:
@@ -219,7 +232,7 @@ class Sweep(Shown):
         poses, ends = self.poses, self.rows[np.arange(len(self.rows) + self.poses.closed) % len(self.rows)]
         values = poses.values[name][ends]
         begin = end = steps = np.diff(values)
-        if np.any(poses.bends.get(name, 0.0)):
+        if poses.times is None and np.any(poses.bends.get(name, 0.0)):
             bent = [poses.values[each][ends] for each, bends in poses.bends.items() if np.any(bends)]
             slopes, length = poses.slopes[name][ends], np.linalg.norm(np.diff(bent), axis=0)
             begin, end = slopes[:-1] * length, slopes[1:] * length

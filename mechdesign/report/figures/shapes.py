@@ -5,17 +5,18 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.colors import to_rgb
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.mechanism.model import Spring
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.scene import Guide, Scene, hull
+from mechdesign.report.figures.scene import Guide, Scene, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -25,6 +26,10 @@ GROUND_HEIGHT = 13.0
 SLIDER_SIZE = (22.0, 13.0)  # along its guide and across
 ARC = 25.0  # radius of an angle drive's arrow
 FORCE = 34.0  # length of a force's arrow
+SPRING_COLOR = "#444444"
+_COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its turns to either side
+_SPIRAL = 15.0  # radius of a spiral spring
+_CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
 _NESTING = 9.0  # between the arrows of drives at one pivot
 _PUSH = 30.0  # length of a straight arrow
@@ -50,8 +55,6 @@ class Line:
         A shape lies above those of lower layers, and above earlier ones of its own.
     link : str
         The link in which its places are fixed.
-    leg : tuple, optional
-        A part of a telescopic leg: both end points, and between which shares of its length the line runs.
     rail : complex
         Displacement on paper (points) of a rail, which is hatched on its left; 0 for a plain line.
     """
@@ -61,7 +64,6 @@ class Line:
     width: float
     layer: float
     link: str = GROUND
-    leg: tuple[str, str, float, float] | None = None
     filled: bool = False
     cap: Literal["round", "butt", "projecting"] = "round"
     dashes: Dashes = "-"
@@ -99,7 +101,36 @@ class Symbol:
     link: str = GROUND
 
 
-Shape = Line | Symbol
+@dataclass(frozen=True)
+class Strut:
+    """Lines between two points that move apart: a part of a telescopic leg, or a spring.
+
+    Parameters
+    ----------
+    places, points : tuple
+        Both ends, and their names.
+    outlines : sequence of sequences of complex
+        Lines, or closed ones around one area where there is a `fill`: x is a share of the way from the first end to the
+        second, y a distance to its left in points on paper.
+    """
+
+    places: tuple[complex, complex]
+    points: tuple[str, str]
+    outlines: Sequence[Sequence[complex]]
+    color: Color
+    width: float
+    layer: float
+    fill: Color | None = None
+    cap: Literal["round", "butt", "projecting"] = "round"
+
+    def drawn(self, begin: complex, end: complex) -> list[list[complex]]:
+        """Its outlines on paper between these places there."""
+        way = end - begin
+        left = 1j * way / abs(way) if way else 0j
+        return [[begin + corner.real * way + corner.imag * left for corner in line] for line in self.outlines]
+
+
+Shape = Line | Symbol | Strut
 
 
 def lighter(color: str, share: float = 0.62) -> Color:
@@ -149,6 +180,8 @@ def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) ->
             shapes.append(Symbol(place, 0.5, (_rectangle(PIN, PIN),), fill=style.INK, point=point))
         elif kind == "tracer":
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
+    for spring in scene.description.springs.values():
+        shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
     return shapes
 
 
@@ -204,10 +237,56 @@ def _leg(scene: Scene, ends: tuple[str, str], color: str) -> list[Shape]:
     parts = ((0.0, 1.0, color, 3.6, 0.1), (0.0, 1.0, lighter(color), 1.6, 0.11),
              (0.12, 0.58, color, BAR + 3, 0.12), (0.123, 0.577, lighter(color), BAR + 0.6, 0.13))  # fmt: skip
     return [
-        Line((base + first * (tip - base), base + last * (tip - base)), shade, width, layer,
-             leg=(*ends, first, last), cap="round" if last == 1 else "butt")
+        Strut((base, tip), ends, ((first + 0j, last + 0j),), shade, width, layer, cap="round" if last == 1 else "butt")
         for first, last, shade, width, layer in parts
-    ]  # fmt: skip
+    ]
+
+
+def _spring(scene: Scene, spring: Spring) -> list[Shape]:
+    """A coil spring as a zigzag, a damper as a piston in its cup, both side by side, or a gas spring."""
+    points = spring_points(spring)
+    places = scene.points[points[0]], scene.points[points[1]]
+    looks: dict[str, Any] = {"color": SPRING_COLOR, "width": 1.4, "layer": 0.14}
+    if spring.push != 0.0:
+        cylinder = [complex(x, y) for x, y in ((0.08, -4), (0.6, -4), (0.6, 4), (0.08, 4), (0.08, -4))]
+        return [Strut(places, points, ((0j, 1 + 0j),), **looks | {"width": 2.4}),
+                Strut(places, points, (cylinder,), fill="#DDDDDD", **looks | {"layer": 0.15})]  # fmt: skip
+    coil = [0.12 + 0j, *(complex(0.12 + 0.76 * (k + 0.5) / _WINDINGS, _COIL * (-1) ** k) for k in range(_WINDINGS)),
+            0.88 + 0j]  # fmt: skip
+    cup = [complex(x, y) for x, y in ((0.68, -_COIL), (0.32, -_COIL), (0.32, _COIL), (0.68, _COIL))]
+    piston = [complex(0.55, -0.7 * _COIL), complex(0.55, 0.7 * _COIL)]
+    dashpot = [[0.12 + 0j, 0.32 + 0j], cup, piston, [0.55 + 0j, 0.88 + 0j]]
+    parts = [[coil]] * (spring.stiffness != 0.0 or spring.preload != 0.0) + [dashpot] * (spring.damping != 0.0)
+    outlines: list[list[complex]] = [[0j, 0.12 + 0j], [0.88 + 0j, 1 + 0j]]
+    for part, aside in zip(parts, (0.0,) if len(parts) == 1 else (1.4 * _COIL, -1.4 * _COIL), strict=True):
+        outlines += [[corner + 1j * aside for corner in line] for line in part]
+    if len(parts) > 1:
+        outlines += [[complex(end, 1.4 * _COIL), complex(end, -1.4 * _COIL)] for end in (0.12, 0.88)]
+    return [Strut(places, points, outlines, **looks)]
+
+
+def _torsion(scene: Scene, spring: Spring) -> list[Shape]:
+    """A spiral spring at the pivot of two links, which ends on the one that moves."""
+    link, reference = spring.between if spring.between[0] != GROUND else spring.between[::-1]
+    pivot = scene.pivot(link, reference)
+    others = [scene.points[point] for point in scene.link_points(link) if point != pivot]
+    way = sum(others) / len(others) - scene.points[pivot] if others else scene.rotations[link]
+    angles = np.linspace(-3.5 * math.pi, 0.0, 64)
+    spiral = np.linspace(PIN, _SPIRAL, 64) * np.exp(1j * angles)
+    return [Symbol(scene.points[pivot], 0.45, (spiral.tolist(),), edge=SPRING_COLOR, width=1.4,
+                   direction=way / (abs(way) or 1.0), link=link)]  # fmt: skip
+
+
+def center_shapes(places: Iterable[complex]) -> list[Shape]:
+    """Centres of mass: circles with two black quarters."""
+    turns = np.exp(0.5j * np.pi * np.linspace(0, 1, 9))
+    quarter = (0j, *(_CENTER * turns).tolist())
+    shapes: list[Shape] = []
+    for place in places:
+        shapes += [Symbol(place, 0.6, radius=_CENTER, fill="white", width=1.1),
+                   *(Symbol(place, 0.61, ([side * corner for corner in quarter],), fill=style.INK, edge=None)
+                     for side in (1, -1))]  # fmt: skip
+    return shapes
 
 
 def ghost_shapes(scene: Scene, dashes: Dashes) -> list[Shape]:
@@ -295,6 +374,18 @@ def force(place: complex, direction: complex, color: str) -> list[Shape]:
     return _arrow(place, (complex(-FORCE - PIN), complex(-PIN - 6)), complex(-PIN), 1.0, 9.0, color, direction)
 
 
+def arrow(place: complex, tail: complex, tip: complex, color: str, dashes: Dashes = "-") -> list[Shape]:
+    """A straight arrow from and to points on paper beside a place."""
+    way = tip - tail
+    if not way:
+        return []
+    along, head = way / abs(way), min(8.0, 0.7 * abs(way))
+    stem = (tail, tip - 0.6 * head * along)
+    line, *rest = _arrow(place, stem, tip, along, head, color)
+    assert isinstance(line, Symbol)
+    return [replace(line, dashes=dashes), *rest]
+
+
 def _arrow(
     place: complex, stem: Sequence[complex], tip: complex, along: complex, head: float, color: str,
     direction: complex = 1.0,
@@ -325,6 +416,19 @@ def slide_labels(scene: Scene) -> list[Label]:
         for guide in scene.guides
         if guide.joint not in scene.description.drives
     ]
+
+
+def spring_labels(scene: Scene) -> list[Label]:
+    """Names of the springs between points."""
+    labels = []
+    for name, spring in scene.description.springs.items():
+        if not spring.turning:
+            begin, end = (scene.points[point] for point in spring_points(spring))
+            anchors = tuple(begin + share * (end - begin) for share in (0.5, 0.35, 0.65))
+            labels.append(
+                Label(name, anchors, SPRING_COLOR, 2 * _COIL + 2, cmath.phase(1j * (end - begin)), 9, optional=True)
+            )
+    return labels
 
 
 def link_labels(scene: Scene, colors: Mapping[str, str], *, driven: bool = False) -> list[Label]:

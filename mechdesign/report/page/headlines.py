@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mechdesign.errors import counted
-from mechdesign.questions.columns import DRIVE, GIVEN, key_numbers
+from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, key_numbers
 from mechdesign.questions.kinematics.columns import EXTREMES, MOTION
 from mechdesign.questions.optimize.columns import OPTIMUM
 from mechdesign.questions.workspace.columns import HELD
@@ -29,7 +29,7 @@ _RATES_AND_FORCES = [
     MOTION[name] for name in ("<drive>_effort", "<output>_advantage", "<output>_velocity", "<output>_acceleration")
 ]
 # Kinds of columns that say which pose a row is of.
-_POSE = (DRIVE, GIVEN, HELD)
+_POSE = (TIMED, DRIVE, GIVEN, HELD)
 # A number below this part of the others in its unit is zero up to rounding.
 _NOISE = 1e-12
 _DIGITS = 4

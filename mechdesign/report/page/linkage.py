@@ -1,7 +1,8 @@
 """A mechanism as SVG whose parts a script moves: a group for each rigid part, drawn in the frame of its link.
 
 What moves says so by attributes: `data-at` names the point that a group stays at, `data-turn` the link that it turns
-with; a line with `data-from`, `data-to` and `data-part` runs between two shares of the way from one point to another.
+with; a path with `data-from`, `data-to` and `data-way` runs through shares of the way from one point to another, and so
+far to its left.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from mechdesign.report.figures.framing import fit
 from mechdesign.report.figures.labels import HATCHED, Label, Position, net, positions, rows
 from mechdesign.report.figures.panels import round_down
 from mechdesign.report.figures.scene import Scene
-from mechdesign.report.figures.shapes import Dashes, Line, Shape, Symbol, Travel
+from mechdesign.report.figures.shapes import Dashes, Line, Shape, Strut, Symbol, Travel
 
 # Width, greatest height and margin of a drawing, in its own units of about one point on paper.
 WIDTH = 520.0
@@ -91,8 +92,8 @@ class Sketcher:
         for shape in sorted(self._shapes(self.scene), key=lambda shape: shape.layer):
             if isinstance(shape, Symbol):
                 self._symbol(shape)
-            elif shape.leg:
-                self._leg(shape, *shape.leg)
+            elif isinstance(shape, Strut):
+                self._strut(shape)
             else:
                 self._line(shape)
 
@@ -122,12 +123,15 @@ class Sketcher:
         path = add(parent, "path", d=way, stroke=to_hex(line.color), stroke_width=line.width, **look)
         dashed(path, line.dashes, line.width)
 
-    def _leg(self, line: Line, base: str, tip: str, first: float, last: float) -> None:
-        """A part of a telescopic leg."""
-        begin, end = (self.sheet.at(place) for place in line.places)
-        add(self.root, "line", data_from=base, data_to=tip, data_part=f"{first:g} {last:g}", x1=begin.real,
-            y1=begin.imag, x2=end.real, y2=end.imag, stroke=to_hex(line.color), stroke_width=line.width,
-            stroke_linecap=line.cap)  # fmt: skip
+    def _strut(self, strut: Strut) -> None:
+        """A part of a telescopic leg, or a spring."""
+        way = ",".join(" ".join(_digits(corner) for corner in line) for line in strut.outlines)
+        lines = strut.drawn(*(self.sheet.at(place).conjugate() for place in strut.places))
+        path = "".join(f"M{'L'.join(_pair(corner.conjugate()) for corner in line)}" for line in lines)
+        base, tip = strut.points
+        look = {"fill": to_hex(strut.fill)} if strut.fill else {}
+        add(self.root, "path", data_from=base, data_to=tip, data_way=way, d=path, stroke=to_hex(strut.color),
+            stroke_width=strut.width, stroke_linecap=strut.cap, **look)  # fmt: skip
 
     def _symbol(self, symbol: Symbol) -> None:
         colors = (("fill", symbol.fill), ("stroke", symbol.edge))
@@ -202,6 +206,9 @@ class Sketcher:
         if isinstance(shape, Line):
             outline = self.sheet.all(np.array(shape.places)).conj() + shape.rail
             return outline, HATCHED if shape.rail else shape.width, shape.filled
+        if isinstance(shape, Strut):
+            lines = shape.drawn(*(self.sheet.at(place).conjugate() for place in shape.places))
+            return np.concatenate(lines), shape.width, False
         outlines = shape.outlines or ([1, 1j, -1, -1j] * np.array(shape.radius),)
         around = self.sheet.at(shape.place).conjugate() + np.concatenate(outlines) * shape.direction
         return around, shape.width, shape.fill is not None
@@ -238,6 +245,11 @@ def _number(value: float) -> str:
 
 def _pair(place: complex) -> str:
     return f"{_number(place.real)} {_number(place.imag)}"
+
+
+def _digits(corner: complex) -> str:
+    """A corner of a strut: three decimals of a share."""
+    return f"{round(corner.real, 3):g} {_number(corner.imag)}"
 
 
 def _shift(place: complex) -> str:

@@ -91,7 +91,7 @@ def _motion(
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
-    for given in [table.column(name) for name in sweep.poses.values if name in table]:
+    for given in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(given).unit
         data["given"].append([given.name, unit, numbers.scaled[given.name][0]])
     # What names a pose: the coordinates that are given, or the drives.
@@ -157,9 +157,10 @@ def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, li
 
 
 def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
-    """Time of each pose, from the rates of the study if these follow the motion; else evenly spaced."""
+    """Time of each pose, of a motion over time or from the rates of the study if these follow it; else even."""
     section, unit = study.kinematics, study.units.label("time")
-    steps, own = _steps(sweep, table, section.rates if section else {}), None
+    timed = None if sweep.poses.times is None else sweep.poses.times[sweep.rows]
+    steps, own = _steps(sweep, table, section.rates if section else {}) if timed is None else np.diff(timed), None
     times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
     if sweep.poses.closed:
         times = np.append(times, times[-1] + np.diff(times).mean())
@@ -167,7 +168,8 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
     if steps is not None:
         own = float(times[-1])
         seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
-        note = ", as at the study's rates" if seconds == own else f"; at the study's rates {own:.3g} {unit}".rstrip()
+        what = "at the study's rates" if timed is None else "in the study's motion"
+        note = f", as {what}" if seconds == own else f"; {what} {own:.3g} {unit}".rstrip()
     pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
     return {"times": deltas(times / times[-1], TIMES), "seconds": round(seconds, 3), "pace": pace,
             "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
@@ -206,7 +208,7 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
 def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     """Velocities of the moving points as arrows of the drawing, and the length of a round one; empty without rates."""
     section, configuration = study.kinematics, sweep.configuration
-    if section is None or not (section.rates or section.speed):
+    if section is None or not section.rated:
         return {}
     linear = sweep.mechanism.linearize(configuration)
     solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)

@@ -143,6 +143,19 @@ def deltas(values: Floats, factor: float) -> str:
     return "".join(letters).rstrip(_letters(0))
 
 
+def steps(text: str, count: int) -> Floats:
+    """The integers that `deltas` has written, shape (count,); where there is no value the last one before it."""
+    found, value, place = [], 0, 1
+    for letter in text:
+        digit = _LETTERS.find(letter)
+        value += place * (digit % _BASE if digit >= 0 else 0)
+        place *= _BASE
+        if digit < _BASE:
+            found.append(-(value + 1) // 2 if value % 2 else value // 2)
+            value, place = 0, 1
+    return np.cumsum([*found, *[0] * (count - len(found))]).astype(np.float64)
+
+
 def _letters(number: int) -> str:
     letters = ""
     while number >= _BASE:

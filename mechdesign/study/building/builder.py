@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 
 from mechdesign.errors import suggestion
 from mechdesign.expressions import Expression
-from mechdesign.mechanism.graph import GROUND
-from mechdesign.mechanism.model import Link, Place, Quantity, Term
+from mechdesign.mechanism.graph import GROUND, rod_of
+from mechdesign.mechanism.model import Link, Mass, Physical, Place, Quantity, Term
 from mechdesign.study.building import section as models
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
@@ -35,6 +35,7 @@ class Builder:
         self.formulas: dict[str, Expression] = {}
         self.measured: set[str] = set()
         self.links: dict[str, Link] = {}
+        self.masses: dict[str, Mass] = {}
         self.sketch = {name: complex(x, y) for name, (x, y) in section.sketch.items()}
 
     def parameters(self, formulas: Mapping[str, Expression]) -> Parameters:
@@ -52,7 +53,9 @@ class Builder:
         """Note a problem at a path below ``mechanism``."""
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
-    def place(self, name: str, value: float, quantity: Quantity = "length", *, measured: bool = False) -> Term:
+    def place(
+        self, name: str, value: float, quantity: Quantity | Physical = "length", *, measured: bool = False
+    ) -> Term:
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
         self.places[name] = Place(name, value * factor, quantity)
@@ -94,6 +97,7 @@ class Builder:
             ("point", "", self.section.owners),
             ("joint", "joints", section.joints),
             ("measure", "measures", section.measures),
+            ("spring", "springs", section.springs),
         ]
         for what, key, names in groups:
             for name in names:
@@ -130,10 +134,32 @@ class Builder:
         order = [GROUND] * (GROUND in self.section.links) + self.section.moving
         for name in order:
             self.links[name] = self._link(name, self.section.links[name])
+            self._weigh(name, self.section.links[name])
             if name == GROUND:
                 # Points of the ground need not be in the sketch; if they are, the ground's own numbers count.
                 for point, (x, y) in self.links[name].points.items():
                     self.sketch[point] = complex(self.nominal(x), self.nominal(y))
+
+    def _weigh(self, name: str, section: models.Link) -> None:
+        """Masses of a link's bodies, with places for their numbers."""
+        bodies: list[tuple[str, str, models.Link | models.Rod | None]] = [
+            (name, name, section), (rod_of(name), f"{name}.rod", section.rod),
+        ]  # fmt: skip
+        for body, prefix, given in bodies:
+            if given is None or given.mass is None:
+                continue
+            if name == GROUND:
+                self.report(("links", name, "mass"), "the ground does not move: its mass changes nothing; leave it out")
+                continue
+            center = None
+            if given.center is not None:
+                x, y = (self.place(f"{prefix}.center.{axis}", at) for axis, at in zip("xy", given.center, strict=True))
+                center = x, y
+            inertia = 0.0 if given.inertia is None else given.inertia
+            self.masses[body] = Mass(
+                self.place(f"{prefix}.mass", given.mass, "mass"), center,
+                self.place(f"{prefix}.inertia", inertia, "moment_of_inertia"),
+            )  # fmt: skip
 
     def nominal(self, term: Term) -> float:
         """Nominal value of a term (angles in radians)."""

@@ -21,9 +21,11 @@ from mechdesign.mechanism.model import (
     Line,
     Link,
     Measure,
+    Physical,
     Prismatic,
     Quantity,
     Slot,
+    Spring,
     Term,
 )
 from mechdesign.study.building import section as models
@@ -41,10 +43,11 @@ def build(builder: Builder) -> Description:
     _check_connected(builder)
     _check_pins(builder)
     drives, measures, limits = _drives(builder), _measures(builder), _limits(builder)
+    springs = _springs(builder)
     branch: Literal["side", "follow"] = "follow" if builder.section.branch == "follow" else "side"
     return Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
-        builder.units.angle_factor,
+        builder.units.angle_factor, builder.masses, springs,
     )  # fmt: skip
 
 
@@ -272,6 +275,50 @@ def _measures(builder: Builder) -> dict[str, Measure]:
                 message = f"{one!r} twice is one place, whose distance has no sign: give {pair[1]}.x - {pair[0]}.x"
                 builder.report((*path, "distance"), message)
         known.append(name)
+    return found
+
+
+# Kinds of a spring's numbers between points, and between links.
+_SPRING_KINDS: Mapping[str, tuple[Physical | Quantity, Physical | Quantity]] = {
+    "stiffness": ("stiffness", "rotational_stiffness"),
+    "preload": ("force", "moment"),
+    "damping": ("damping", "rotational_damping"),
+    "force": ("force", "moment"),
+    "rise": ("stiffness", "rotational_stiffness"),
+    "free_length": ("length", "length"),
+    "free_angle": ("angle", "angle"),
+}
+
+
+def _springs(builder: Builder) -> dict[str, Spring]:
+    """Springs without mistakes in their names; their numbers become places."""
+    section, found = builder.section, dict[str, Spring]()
+    for name, spring in section.springs.items():
+        path: KeyPath = ("springs", name)
+        one, other = spring.between
+        turning = any(end in section.links for end in spring.between)
+        turning &= not any(end in section.owners or end in section.ends for end in spring.between)
+        if not builder.check_named("link" if turning else "point", spring.between, (*path, "between")):
+            continue
+        if one.rpartition(".")[2] == other.rpartition(".")[2]:
+            what = f"{one!r} and itself" if one == other else f"{one!r} and {other!r}, which are one place,"
+            builder.report((*path, "between"), f"a spring between {what} does nothing")
+            continue
+        wrong = ("free_length", "force", "rise") if turning else ("free_angle",)
+        for key in spring.given(*wrong):
+            kind, right = ("links", "free_angle") if turning else ("points", "free_length")
+            builder.report((*path, key), f"between two {kind} there is no {key!r}; its stiffness counts from {right!r}",
+                           at_key=True)  # fmt: skip
+        terms: dict[str, Term] = {}
+        for key in spring.given(*_SPRING_KINDS):
+            kind = _SPRING_KINDS[key][turning]
+            builder.reporter.kind((*ROOT, *path, key), kind)
+            terms[key] = builder.place(f"{name}.{key}", getattr(spring, key), kind)
+        found[name] = Spring(
+            name, spring.between, turning, terms.get("stiffness", terms.get("rise", 0.0)),
+            terms.get("free_angle" if turning else "free_length", 0.0), terms.get("preload", 0.0),
+            terms.get("force", 0.0), terms.get("damping", 0.0),
+        )  # fmt: skip
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mechdesign.expressions import Expression, Number
-from mechdesign.mechanism.model import MEASURED, Place, Quantity
+from mechdesign.mechanism.model import MEASURED, Place
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,11 @@ class Parameters:
         needed = self.needed(name, places)
         return needed.pop() if len(needed) == 1 else self.kinds.get(name)
 
-    def needed(self, name: str, places: Mapping[str, Place]) -> set[Quantity]:
+    def needed(self, name: str, places: Mapping[str, Place]) -> set[str]:
         """Quantities of the numbers of the geometry (`places`) that change as much as a parameter does."""
         slopes = self.derivatives(name).items()
-        return {places[place].quantity for place, slope in slopes if abs(slope) == self.factors[place]} - {"none"}
+        kinds: set[str] = {places[place].quantity for place, slope in slopes if abs(slope) == self.factors[place]}
+        return kinds - {"none"}
 
     def match(self, pattern: str) -> tuple[str, ...]:
         """Places that a pattern such as ``*.length`` names."""

@@ -22,7 +22,7 @@ from mechdesign.study.text.fields import Context, failure, read_expression, read
 from mechdesign.study.text.inputs import file_of
 from mechdesign.study.text.units import Amount, QuantityError, check_unit
 
-LINK_KEYS = ("from", "to", "length", "points", "telescopic")
+LINK_KEYS = ("from", "to", "length", "points", "telescopic", "mass", "center", "inertia", "rod")
 _BRANCHES = {
     "side": "in every pose each joint lies on the side on which the sketch has it",
     "follow": "a sweep goes on smoothly through change points, where the sides meet",
@@ -47,6 +47,17 @@ PointValues = tuple[Amount, Amount]
 TwoLinks = Annotated[tuple[fields.LinkName, fields.LinkName], fields.pair_of("a list of two names")]
 TwoPoints = Annotated[tuple[fields.PointName, fields.PointName], fields.pair_of("a list of two names")]
 TwoEnds = Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two names")]
+
+
+class Rod(fields.Model):
+    """Mass of the second body of a telescopic link, whose frame has its origin at ``to`` and the link's direction."""
+
+    mass: fields.NonNegativeMassPlace
+    """Mass. Example: 1.2 kg"""
+    center: Point | None = None
+    """Centre of mass, [x, y] from ``to``, x along the link. Left out: at ``to``. Example: [-100, 0]"""
+    inertia: fields.NonNegativeInertiaPlace | None = None
+    """Moment of inertia about the centre of mass. Left out: 0. Example: 0.004 kg*m^2"""
 
 
 class Link(fields.Model):
@@ -82,6 +93,19 @@ class Link(fields.Model):
     without a place, is measured from the sketch. Example: {P: [60, 15]}
     """
 
+    mass: fields.NonNegativeMassPlace | None = None
+    """Mass; of a telescopic link that of the body at ``from``. Left out: that of its beams where stiffness has a
+    ``density``, else massless. Example: 0.5 kg
+    """
+    center: Point | None = None
+    """Centre of mass in the coordinates of the link's points, [x, y]. Left out: the middle of its points. Example: [45,
+    0]
+    """
+    inertia: fields.NonNegativeInertiaPlace | None = None
+    """Moment of inertia about the centre of mass. Left out: 0, a point mass. Example: 0.002 kg*m^2"""
+    rod: Rod | None = None
+    """Mass of the second body of a telescopic link, the one with ``to``. Example: {mass: 1.2 kg, center: [-100, 0]}"""
+
     @model_validator(mode="before")
     @classmethod
     def _long_form(cls, raw: Any) -> Any:
@@ -92,7 +116,8 @@ class Link(fields.Model):
         if not isinstance(raw, dict):
             expected = "[from, to, length], {from, to, length} or its points {A: [x, y], ...}"
             raise failure(f"expected a link, {expected}, not {shown(raw)}")
-        if any(key in raw for key in LINK_KEYS):
+        # A point may be named `center`, or `rod`.
+        if any(key in raw and (key in LINK_KEYS[:6] or not isinstance(raw[key], list)) for key in LINK_KEYS):
             for key, value in raw.items():
                 if key not in LINK_KEYS and isinstance(value, list):
                     raise failure(f"beside 'from', 'to' and 'length' a point stands under 'points': {{{key}: [x, y]}}")
@@ -116,6 +141,10 @@ class Link(fields.Model):
             raise failure(f"a link from {self.from_!r} to itself")
         elif self.telescopic and self.length is not None:
             raise failure("a telescopic leg has no fixed length; leave out 'length', or 'telescopic'")
+        if self.mass is None and (extra := self.given("center", "inertia")):
+            raise failure(f"{extra[0]!r} belongs to a mass; give 'mass'")
+        if self.rod is not None and not self.telescopic:
+            raise failure("'rod' is the second body of a telescopic link; give 'mass'")
         for end in (self.from_, self.to):
             if end in self.points:
                 raise failure(f"point {end!r} is an end of the link; its place in the frame is not given twice")
@@ -216,6 +245,46 @@ class Measure(fields.Model):
     """
 
 
+class Spring(fields.Model):
+    """A spring or damper between two points of any links, or between two links."""
+
+    between: Annotated[tuple[fields.EndName, fields.EndName], fields.pair_of("a list of two points or two links")]
+    """Two points, which it pulls together, or two links [a, b], of which it turns b back. Example: [S, B] Example:
+    [ground, rocker]
+    """
+    stiffness: fields.NonNegativePlace | None = None
+    """Force per length, or moment per radian. Example: 2 N/mm Example: 3 N*m/rad"""
+    free_length: fields.NonNegativeLengthPlace | None = None
+    """Distance of the points at which the stiffness pulls with no force; 0 is allowed. Example: 60"""
+    free_angle: fields.AnglePlace | None = None
+    """Angle from the first link's x axis to the second's at which it turns with no moment. Example: 20 deg"""
+    preload: fields.AnyPlace | None = None
+    """Pull, or moment, at the free length or angle. Left out: 0. Example: 5 N"""
+    damping: fields.NonNegativePlace | None = None
+    """Force per velocity, or moment per radian in a unit of time. Left out: 0. Example: 0.01 N*s/mm"""
+    force: fields.AnyPlace | None = None
+    """Of a gas spring the force with which it pushes its points apart. Example: 400 N"""
+    rise: fields.NonNegativePlace | None = None
+    """Of a gas spring what this force grows by per length that it is shorter than ``free_length``. Left out: 0.
+    Example: 0.4 N/mm
+    """
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Spring:
+        if self.force is not None:
+            if other := self.given("stiffness", "preload", "free_angle"):
+                raise failure(f"a gas spring has 'force' and 'rise', no {other[0]!r}")
+            if (self.rise is None) != (self.free_length is None):
+                raise failure("the 'rise' of a gas spring counts from its 'free_length'; give both or none")
+        elif self.rise is not None:
+            raise failure("'rise' belongs to the 'force' of a gas spring")
+        elif not self.given("stiffness", "preload", "damping"):
+            raise failure("a spring needs a 'stiffness', a 'preload', a 'damping' or the 'force' of a gas spring")
+        elif self.stiffness is not None and len(self.given("free_length", "free_angle")) != 1:
+            raise failure("a stiffness counts from a 'free_length' between points, or a 'free_angle' between links")
+        return self
+
+
 class Limit(fields.Model):
     """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
 
@@ -311,6 +380,8 @@ class MechanismSection(fields.Model):
     """Driven coordinates by name, as many as the mobility. A list names links (their angle), telescopic links (their
     length) or joints (their slide). Example: [crank] Example: {theta: {angle: crank}}
     """
+    springs: dict[fields.SpringName, Spring] = Field(default_factory=dict)
+    """Springs and dampers by name. Example: {return: {between: [S, B], stiffness: 2, free_length: 60}}"""
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
@@ -445,5 +516,7 @@ class UnitsSection(fields.Model):
     """
     time: Annotated[str, _unit_of("time")] = "s"
     """Unit of time. Example: min"""
+    mass: Annotated[str, _unit_of("mass")] = "kg"
+    """Unit of masses; moments of inertia and densities follow from it and the length. Example: g"""
     force: Annotated[str, _unit_of("force")] = "N"
     """Unit of forces; moments and stresses follow from it and the length. Example: kN"""

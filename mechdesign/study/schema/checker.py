@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any
 
+from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.model import Quantity
 from mechdesign.study.building.builder import Builder
 from mechdesign.study.building.parameters import Parameters
@@ -23,8 +24,11 @@ class Checker:
     """Checks names and units, and reports mistakes in them."""
 
     def __init__(
-        self, builder: Builder, parameters: Parameters, parts: dict[str, Any], folder: Folder
+        self, builder: Builder, parameters: Parameters, parts: dict[str, Any], folder: Folder,
+        compiled: Mechanism | None,
     ) -> None:  # fmt: skip
+        #: None where the mechanism itself has mistakes.
+        self.compiled = compiled
         self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters
         self.parts, self.folder = parts, folder
@@ -32,12 +36,13 @@ class Checker:
         self.report, self.doubt, self.units = builder.reporter.report, builder.reporter.doubt, builder.units
 
     def coordinate(
-        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), order: int | None = None
-    ) -> Quantity | None:
+        self, name: str, path: KeyPath, *, at_key: bool = False, others: Iterable[str] = (), also: str = "parameter",
+        order: int | None = None,
+    ) -> Quantity | None:  # fmt: skip
         """Kind of a coordinate; an unknown name is reported, and None returned.
 
-        `others` are names that might have stood there as well. With an `order` the unit of its value (0), rate (1) or
-        acceleration (2) is checked.
+        `others` are names that might have stood there as well, each of `also`. With an `order` the unit of its value
+        (0), rate (1) or acceleration (2) is checked.
         """
         quantity = self.mechanism.coordinates.get(name)
         if order is not None and quantity in ORDERS:
@@ -50,7 +55,7 @@ class Checker:
                 also = f", and its drive is {drives[0]}" if drives else ""
                 self.report(path, f"{name!r} is a link; its coordinate is {name}.angle{also}", at_key=at_key)
             else:
-                what = "coordinate or parameter" if others else "coordinate"
+                what = f"coordinate or {also}" if others else "coordinate"
                 self.known(name, [*self.mechanism.coordinates, *others], what, path, at_key=at_key)
         return quantity
 
@@ -69,13 +74,13 @@ class Checker:
         for name in names:
             self.coordinate(name, (*path, name), at_key=True, order=order)
 
-    def outputs(self, outputs: Iterable[str] | None, path: KeyPath) -> None:
-        """Check the names in a list of outputs."""
+    def outputs(self, outputs: Iterable[str] | None, path: KeyPath, columns: Collection[str] = ()) -> None:
+        """Check the names in a list of outputs: coordinates, points, and `columns` of dynamics where they may stand."""
         seen: set[str] = set()
         for index, name in enumerate(outputs or ()):
             parts = self.mechanism.coordinates_of(name)
-            if parts == (name,):
-                self.coordinate(name, (*path, index))
+            if parts == (name,) and name not in columns:
+                self.coordinate(name, (*path, index), others=columns, also="column of dynamics")
             if seen.intersection(parts):
                 self.report((*path, index), f"{name!r} is listed twice")
             seen.update(parts)

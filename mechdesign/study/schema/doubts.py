@@ -11,7 +11,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Description, Link
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.poses import PoseSection
+from mechdesign.study.schema.poses import MotionSection, PoseSection
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 
@@ -61,7 +61,7 @@ def _angles(checker: Checker, section: PoseSection) -> None:
 
 
 def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
-    """Sizes of the values without a unit of each coordinate, and of the ranges of sweeps."""
+    """Sizes of the values without a unit of each coordinate, and of the ranges of sweeps and moves."""
     for name, sweep in (section.sweep or {}).items():
         if not text_of(sweep.from_) and not text_of(sweep.to):
             sizes = [abs(sweep.to - sweep.from_), abs(sweep.from_), abs(sweep.to)]
@@ -70,6 +70,9 @@ def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
         for name, value in pose.items():
             if not text_of(value):
                 yield (section.command, "poses", index, name), [abs(value)]
+    for name, course in (section.motion or {}).items() if isinstance(section, MotionSection) else ():
+        ends = [end for segment in course.segments or () for end in (segment.from_, segment.to) if end is not None]
+        yield (section.command, "motion", name), [abs(end) for end in ends if not text_of(end)]
 
 
 def _lengths(checker: Checker, description: Description) -> None:

@@ -1,21 +1,25 @@
-"""Poses and rates as the study file gives them: a list, a sweep, a path; and the kinematics section, which has both."""
+"""Poses and rates as the study file gives them: a list, a sweep, a path; or both as a motion over time."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from mechdesign.errors import cut
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.paths import PathSection, Speed
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
 
 HELP_PAGE = "reference/study/kinematics"
+
+# Default number of poses of a motion over time.
+INSTANTS = 181
 
 
 def _range(raw: list[Any] | str) -> str:
@@ -98,11 +102,12 @@ class PoseSection(fields.Model):
     """
 
     command: ClassVar[str]
+    sources: ClassVar[tuple[str, ...]] = ("poses", "sweep", "path")  # keys of which one gives the poses
     poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort({"const": "workspace"})] | None = None
     """Poses one by one, each with as many coordinates as the mobility: drives, others (C.x, platform.angle) or a mix.
-    ``workspace``: the nodes of the workspace section. Without ``poses``, ``sweep`` and ``path``: those of kinematics,
-    and there a turn of the drive or its limits. Example: [{theta1: 30, theta2: 60}, {C.x: 0.2, C.y: 1.1}] Example:
-    workspace
+    ``workspace``: the nodes of the workspace section. Left out, with no ``sweep``, ``path`` or ``motion``: those of
+    kinematics, and there a turn of the drive or its limits. Example: [{theta1: 30, theta2: 60}, {C.x: 0.2, C.y: 1.1}]
+    Example: workspace
     """
     sweep: Annotated[dict[fields.CoordinateName, Sweep], BeforeValidator(_sweeps)] | None = None
     """Ranges of coordinates; several make a grid, and a number alone is held. Example: {theta: {from: 0, to: 360, step:
@@ -122,11 +127,11 @@ class PoseSection(fields.Model):
     @property
     def source(self) -> str | None:
         """The key that gives the poses; None if there is none."""
-        return next(iter(self.given("poses", "sweep", "path")), None)
+        return next(iter(self.given(*self.sources)), None)
 
     @model_validator(mode="after")
     def _one_source(self) -> PoseSection:
-        given = self.given("poses", "sweep", "path")
+        given = self.given(*self.sources)
         if len(given) > 1:
             raise failure(f"{' and '.join(given)} are both given; poses come from one of them")
         return self
@@ -151,9 +156,11 @@ class PoseSection(fields.Model):
 class MotionSection(PoseSection):
     """Poses, how the mechanism moves through them, and the coordinates that are asked for."""
 
+    sources: ClassVar[tuple[str, ...]] = (*PoseSection.sources, "motion")
     outputs: fields.CoordinateNames | None = None
-    """Coordinates, measures and points (their x and y) that are asked for. Left out: every moving point, link and
-    slide; in reliability what is limited, if anything is. Example: [C, rod.angle, mu]
+    """Coordinates, measures and points (their x and y) that are asked for; in reliability columns of dynamics as well
+    (theta_effort, A_force). Left out: every moving point, link and slide; in reliability what is limited, if anything
+    is. Example: [C, rod.angle, mu]
     """
     rates: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     """Velocities of drives, or of all coordinates that the poses give; velocities and accelerations of the outputs (or
@@ -165,16 +172,64 @@ class MotionSection(PoseSection):
     """Constant speed of the path's point along it, instead of ``rates``; those of the drives follow from the path's
     direction and curvature. On a polyline each segment is passed without acceleration. Example: 100 mm/s
     """
+    motion: dict[fields.CoordinateName, Course] | None = None
+    """What drives or other coordinates do over time, as many as the mobility, in place of poses and rates: moves by a
+    law and dwells, or a CSV file of times and values; a number alone is held. All end at the same time. Example:
+    {theta: [{to: 90, time: 0.3, law: cycloidal}, {dwell: 0.1}, {to: 0, time: 0.4}]} Example: {C.x: {file:
+    law.csv}, C.y: 120}
+    """
+    instants: Annotated[int, fields.whole(2, 10_000_000)] | None = None
+    """How many poses of a ``motion`` are evenly spread in time; the ends of its segments are added to them. Left out:
+    |INSTANTS|. Example: 361
+    """
+
+    @property
+    def rated(self) -> bool:
+        """Whether velocities and accelerations are asked for."""
+        return bool(self.rates or self.accelerations or self.speed or self.motion)
+
+    @model_validator(mode="after")
+    def _timed(self) -> MotionSection:
+        if self.motion is not None and not self.motion:
+            raise failure("an empty motion; give coordinates, {theta: [{from: 0, to: 90, time: 0.3}]}")
+        if self.motion is None and self.instants is not None:
+            raise failure("'instants' are those of a 'motion', and the section has none")
+        return self
 
     def checked(self, checker: Checker) -> Self:
         """Check rates, accelerations and the speed as well."""
         checker.coordinates(self.rates, (self.command, "rates"), 1)
         checker.coordinates(self.accelerations, (self.command, "accelerations"), 2)
-        if self.speed is not None:
+        if _motion(source_of(checker, self)):
+            _check_motion(checker, self)
+        elif self.speed is not None:
             _check_speed(checker, self)
         else:
             _check_rates(checker, self)
         return super().checked(checker)
+
+    def of_given(self, drives: Collection[str]) -> bool:
+        """Whether its rates are those of the coordinates that the poses give rather than of the drives."""
+        return self.speed is not None or not {*self.rates, *self.accelerations, *(self.motion or ())} <= {*drives}
+
+
+def _check_motion(checker: Checker, section: MotionSection) -> None:
+    """Check what moves over time, and that nothing else gives rates."""
+    for name, course in (section.motion or {}).items():
+        course.checked(checker, name, (section.command, "motion", name))
+    if section.motion and "time" in checker.mechanism.coordinates:
+        message = "a coordinate is named 'time', as the column of times is: name it otherwise"
+        checker.report((section.command, "motion"), message, at_key=True)
+    for key in ("rates", "accelerations", "speed"):
+        if not getattr(section, key):
+            continue
+        message = f"'motion' and {key!r} are both given; a motion over time has rates of its own"
+        if section.motion is None:
+            message = (
+                f"the poses are those of the motion of kinematics, which has rates of its own: leave out {key!r}, and "
+                "give 'motion' here too where velocities are asked for"
+            )
+        checker.report((section.command, key), message, at_key=True)
 
 
 def _check_rates(checker: Checker, section: MotionSection) -> None:
@@ -183,7 +238,7 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
     Along a motion that other coordinates give, drives have no rates of their own: they follow from the motion.
     """
     drives = checker.mechanism.driven_kinds
-    source = _source(checker, section)
+    source = source_of(checker, section)
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
     parts = (("rates", section.rates), ("accelerations", section.accelerations))
@@ -218,7 +273,7 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         if getattr(section, key):
             message = f"'speed' and {key!r} are both given; a path is passed at one of them"
             checker.report((section.command, key), message, at_key=True)
-    path = _source(checker, section).path
+    path = source_of(checker, section).path
     if path is None:
         message = "a speed is that of a point along its 'path', and the poses are none; give 'rates' of coordinates"
         checker.report((section.command, "speed"), message, at_key=True)
@@ -231,9 +286,14 @@ def _check_speed(checker: Checker, section: MotionSection) -> None:
         checker.report((section.command, "speed"), message, at_key=True)
 
 
-def _source(checker: Checker, section: PoseSection) -> PoseSection:
+def source_of(checker: Checker, section: PoseSection) -> PoseSection:
     """The section that gives the poses of another: itself, or kinematics."""
     return section if section.source is not None else checker.parts.get("kinematics") or section
+
+
+def _motion(section: PoseSection) -> dict[str, Course]:
+    """What a section prescribes over time."""
+    return (section.motion or {}) if isinstance(section, MotionSection) else {}
 
 
 def _moves(section: PoseSection) -> bool:

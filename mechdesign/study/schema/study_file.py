@@ -13,6 +13,7 @@ from mechdesign.cautions import ALL, KINDS
 from mechdesign.errors import StudyError, cut, suggestion
 from mechdesign.experiments.schema.matrix import MatrixSection
 from mechdesign.experiments.schema.sensitivities import SensitivitiesSection
+from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.optimize.schema import OptimizeSection, Requirement
 from mechdesign.questions.reliability.schema.section import ReliabilitySection
@@ -41,6 +42,7 @@ class StudyFile(fields.Model):
     optimize: OptimizeSection | None = None
     reliability: ReliabilitySection | None = None
     stiffness: StiffnessSection | None = None
+    dynamics: DynamicsSection | None = None
     matrix: MatrixSection | None = None
     sensitivities: SensitivitiesSection | None = None
     requirements: tuple[Requirement, ...] = ()

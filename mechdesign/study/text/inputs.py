@@ -72,7 +72,7 @@ def file_of(raw: Any) -> str | None:
 
 def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[KeyPath, str]]:
     """Every file that a valid study names, by the keys at which its name stands."""
-    owners: list[tuple[str, str]] = [("mechanism", "targets"), *((command, "path") for command in commands)]
+    owners = [("mechanism", "targets"), *((command, key) for command in commands for key in ("path", "motion"))]
     for section, key in owners:
         for name, raw in ((data.get(section) or {}).get(key) or {}).items():
             if (file := file_of(raw)) is not None:

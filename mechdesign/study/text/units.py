@@ -38,6 +38,10 @@ KINDS: dict[str, Powers] = {
     "moment": (1, 0, 0, 1),
     "area": (2, 0, 0, 0),
     "inertia": (4, 0, 0, 0),
+    "mass": (-1, 0, 2, 1),
+    "moment_of_inertia": (1, 0, 2, 1),
+    "density": (-4, 0, 2, 1),
+    "power": (1, 0, -1, 1),
     "stress": (-2, 0, 0, 1),
     "stiffness": (-1, 0, 0, 1),
     "rotational_stiffness": (1, -1, 0, 1),
@@ -45,12 +49,17 @@ KINDS: dict[str, Powers] = {
     "compliance": (1, 0, 0, -1),
     "rotational_compliance": (-1, 1, 0, -1),
     "coupling_compliance": (0, 1, 0, -1),
+    "damping": (-1, 0, 1, 1),
+    "rotational_damping": (1, -1, 1, 1),
 }
-"""Kinds of quantity by name; stiffness and compliance are per radian whatever the study's angle unit."""
+"""Kinds of quantity by name; stiffness, compliance and damping are per radian whatever the study's angle unit.
 
-_PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance")))
+A mass is a force over an acceleration; what has mass in it is told in the study's unit of mass.
+"""
 
-_FACTOR = r"\(?[A-Za-zµμ°]+(?:\s*(?:\^|\*\*)\s*-?\d)?\)?"
+_PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance", "damping")))
+
+_FACTOR = r"\(?[A-Za-zµμ°]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
     rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
@@ -76,6 +85,7 @@ nano- = 1e-9 = n-
 meter = [length] = m = metre
 second = [time] = s = sec
 gram = [mass] = g
+tonne = 1e6 * gram = t
 radian = [angle] = rad
 degree = 0.017453292519943295 * radian = deg = ° = degrees
 arcminute = degree / 60 = arcmin
@@ -99,6 +109,7 @@ bar = 1e5 * pascal
 psi = pound_force / inch ** 2
 ksi = 1000 * psi
 joule = newton * meter = J
+watt = joule / second = W
 """
 
 
@@ -186,18 +197,37 @@ class Units:
     angle: str = "deg"
     time: str = "s"
     force: str = "N"
+    mass: str = "kg"
 
     @cached_property
     def angle_factor(self) -> float:
         """Radians in one unit of angle."""
         return _scale(self.angle)
 
+    @cached_property
+    def inertia_factor(self) -> float:
+        """Force that gives a unit of mass a unit of acceleration, in the study's unit of force."""
+        return _scale(self.mass) * _scale(self.length) / _scale(self.time) ** 2 / _scale(self.force)
+
+    @cached_property
+    def time_factor(self) -> float:
+        """Seconds in one unit of time."""
+        return _scale(self.time)
+
     def label(self, kind: str) -> str:
         """Unit of a kind of quantity as tables show it (``mm/s``, ``N*mm/rad``); empty for pure numbers."""
         length, angle, time, force = KINDS[kind]
+        masses = _masses(KINDS[kind])
+        length, time, force = length + masses, time - 2 * masses, force - masses
         angle_name = "rad" if kind in _PER_RADIAN else self.angle
         length_name = "" if self.length == "dimensionless" else self.length
-        factors = [(self.force, force), (length_name, length), (angle_name, angle), (self.time, time)]
+        factors = [
+            (self.mass, masses),
+            (self.force, force),
+            (length_name, length),
+            (angle_name, angle),
+            (self.time, time),
+        ]
         above = "*".join(_power(name, power) for name, power in factors if name and power > 0)
         below = [_power(name, -power) for name, power in factors if name and power < 0]
         if not below:
@@ -231,6 +261,7 @@ class Units:
         if powers[0] and self.length == "dimensionless":
             raise QuantityError(f"{text.strip()!r} has a length in it, and this study's lengths are dimensionless")
         scale = _scale(self.length) ** powers[0] * _scale(self.time) ** powers[2] * _scale(self.force) ** powers[3]
+        scale *= self.inertia_factor ** _masses(powers)
         # Stiffness is per radian by the format, so an angle below the line is never in the study's unit.
         scale *= self.angle_factor ** max(powers[1], 0)
         return number * factor / scale
@@ -274,11 +305,13 @@ _COMMON = {
     "N": ("force", 1.0),
     "kN": ("force", 1e3),
     "lbf": ("force", 4.4482216152605),
+    "kg": ("mass", 1.0),
+    "g": ("mass", 1e-3),
 }
 
 
 def check_unit(kind: str, name: str) -> None:
-    """Check a unit of length, angle, time or force; a length may be ``dimensionless``.
+    """Check a unit of length, angle, time, force or mass; a length may be ``dimensionless``.
 
     Raises
     ------
@@ -290,6 +323,11 @@ def check_unit(kind: str, name: str) -> None:
             return
     known = ", ".join(unit for unit, (what, _) in _COMMON.items() if what == kind)
     raise QuantityError(f"{name!r} is not a unit of {kind}; for example {known}")
+
+
+def _masses(powers: Powers) -> int:
+    """Power of mass in a quantity, which is a force times the square of a time; 0 of one without mass."""
+    return powers[3] if powers[2] == 2 * powers[3] else 0
 
 
 def _scale(name: str) -> float:
@@ -344,7 +382,8 @@ def _common(unit: str) -> tuple[Powers, float] | None:
 def _unit(unit: str) -> tuple[Powers, float]:
     registry = _registry()
     try:
-        parsed = registry.parse_units(unit.replace("^", "**").replace("·", "*"))
+        power = re.sub(r"([^\W\d_])(\d)", r"\1**\2", unit)  # m/s2
+        parsed = registry.parse_units(power.replace("^", "**").replace("·", "*"))
         base = registry.Quantity(1.0, parsed).to_base_units()
     except Exception:  # pint raises errors of many classes
         known = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))

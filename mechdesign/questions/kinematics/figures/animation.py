@@ -26,12 +26,14 @@ _WIDTH = 480  # pixels
 _CYCLE = 3600  # of the whole
 _MIN_FRAME = 50
 _MAX_FRAME = 160
+_SHORTEST, _LONGEST = 500, 12_000  # a motion over time that is seen in its own time
 
 
 def animation(shown: Shown) -> bytes:
     """The valid poses of a sweep or path as an endless GIF; back again where it does not end where it began.
 
-    At most `FRAMES` frames. Poses that are not valid have none; the title says how many. Lists and grids of poses are
+    A motion over time runs forward in its own time, where that is neither too short nor too long to be watched. At most
+    `FRAMES` frames. Poses that are not valid have none; the title says how many. Lists and grids of poses are
     no motion, and give no bytes.
 
     Matplotlib draws what stands still once and what moves in every frame; Pillow gives all frames one small palette, so
@@ -40,21 +42,40 @@ def animation(shown: Shown) -> bytes:
     sweep = Sweep.of(shown)
     if not sweep.poses.motion or not len(sweep.valid):
         return b""
-    valid, closed = in_order(sweep), sweep.closed
-    # A closed motion begins again with its last pose; another shows its inner poses twice.
-    most = FRAMES + 1 if closed else FRAMES // 2 + 1
-    some = valid[evenly(len(valid), most)]
+    timed = sweep.poses.times is not None
+    some, pause = _in_time(sweep) if timed else _in_steps(sweep)
     figure, axes = framed(sweep.extent, sweep.study.units.label("length"), height=HEIGHT, above=TITLE)
     figure.set_dpi(_WIDTH / style.width())
     draw_paths(axes, sweep)
-    pictures = _frames(figure, axes, sweep, some[:-1] if closed and len(some) > 1 else some)
-    pictures = pictures if closed else pictures + pictures[-2:0:-1]
+    pictures = _frames(figure, axes, sweep, some)
+    if not timed and not sweep.closed:
+        pictures += pictures[-2:0:-1]
     palette = _palette(pictures)
     frames = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    pause = min(max(_CYCLE // len(frames), _MIN_FRAME), _MAX_FRAME) // 10 * 10
     stream = io.BytesIO()
-    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=pause, loop=0)
+    frames[0].save(stream, format="GIF", save_all=True, append_images=frames[1:], duration=pause // 10 * 10, loop=0)
     return stream.getvalue()
+
+
+def _in_steps(sweep: Sweep) -> tuple[Ints, int]:
+    """Poses evenly spread, and how long each is seen (ms); a motion that does not return goes back through them."""
+    valid, closed = in_order(sweep), sweep.closed
+    # A closed motion begins again with its last pose; another shows its inner poses twice.
+    some = valid[evenly(len(valid), FRAMES + 1 if closed else FRAMES // 2 + 1)]
+    some = some[:-1] if closed and len(some) > 1 else some
+    count = len(some) if closed else max(2 * len(some) - 2, 1)
+    return some, min(max(_CYCLE // count, _MIN_FRAME), _MAX_FRAME)
+
+
+def _in_time(sweep: Sweep) -> tuple[Ints, int]:
+    """Poses at even times, and how long each is seen (ms)."""
+    assert sweep.poses.times is not None
+    times = sweep.poses.times[sweep.rows[sweep.valid]]
+    own = 1000 * float(times[-1] - times[0]) * sweep.study.units.time_factor
+    whole = own if _SHORTEST <= own <= _LONGEST else _CYCLE
+    count = int(min(max(whole // _MIN_FRAME, 1), FRAMES, len(times)))
+    frames = times[0] + (times[-1] - times[0]) * np.arange(count) / count
+    return sweep.valid[np.abs(times - frames[:, None]).argmin(axis=1)], int(whole / count)
 
 
 def in_order(sweep: Sweep) -> Ints:

@@ -16,6 +16,8 @@ from pydantic import BeforeValidator, Field
 from mechdesign.commands import COMMANDS
 from mechdesign.expressions import Number
 from mechdesign.mechanism.graph import GROUND, OF_LINKS, Graph
+from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
+from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.reliability.schema.allocation import Allocate, check_allocation
 from mechdesign.questions.reliability.schema.clearances import Clearance, check_clearance
 from mechdesign.questions.reliability.schema.limits import ErrorLimit, split_order
@@ -24,12 +26,15 @@ from mechdesign.questions.reliability.schema.variation import LOADS, Dimension, 
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.study.building.section import MechanismSection
 from mechdesign.study.schema.checker import NO_MOMENT, ORDERS, Checker
-from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.schema.poses import MotionSection, source_of
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 
 HELP_PAGE = "theory/reliability"
+
+# Names as those of columns of dynamics.
+_LIKE_A_COLUMN = re.compile(r"_(effort|power|energy|force(_on_\w+)?)$|^shaking")
 
 DEFAULT_METHODS = ("analytic", "monte_carlo")
 
@@ -86,8 +91,9 @@ class ReliabilitySection(MotionSection):
 
     command: ClassVar[str] = "reliability"
     dimensions: dict[str, Dimension] = Field(default_factory=dict)
-    """What varies, by the name of a parameter, of one place (rod.length, ground.G.y, guide.direction, slider.B.x;
-    ``*.length`` for all such), of a drive (its positioning error) or of the load (load.fx, load.fy, load.mz).
+    """What varies, by the name of a parameter, of one place (rod.length, ground.G.y, guide.direction, slider.B.x,
+    crank.mass, return.stiffness; ``*.length`` for all such), of a drive (its positioning error) or of the load
+    (load.fx, load.fy, load.mz).
     Example: {r1: {tolerance: 0.03, distribution: uniform}, '*.length': 0.02,
     theta: 0.01}
     """
@@ -101,8 +107,8 @@ class ReliabilitySection(MotionSection):
     """
     limits: dict[fields.CoordinateName, ErrorLimit] = Field(default_factory=dict)
     """What errors may be in each pose, by coordinate, measure or point; of velocities and accelerations C.x_velocity
-    and so on. The reliability is the chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]}
-    Example: {P: {radius: 0.05}}
+    and so on; of efforts and forces by the column of dynamics (theta_effort, shaking, A_force). The reliability is the
+    chance that all are kept. Example: {P.x: 0.05, rocker.angle: [-0.2, 0.1]} Example: {P: {radius: 0.05}}
     """
     load: tuple[fields.Number, ...] | None = None
     """Mean load [fx, fy, mz] on the stiffness section's point, whose deflection is part of the errors; it varies by
@@ -129,6 +135,7 @@ class ReliabilitySection(MotionSection):
 
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
+        columns = _columns_of_dynamics(checker, self)
         meant = _links_of_points(checker, self)
         dimensions = check_dimensions(checker, self.dimensions)
         clearances = {
@@ -137,7 +144,7 @@ class ReliabilitySection(MotionSection):
             if (right := check_clearance(checker, point, clearance, meant.get(point))) is not None
         }
         for name, limit in self.limits.items():
-            _limit(checker, self, name, limit)
+            _limit(checker, self, name, limit, columns)
         for index, correlated in enumerate(self.correlation):
             for place, name in enumerate((correlated.one, correlated.other)):
                 checker.known(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
@@ -173,7 +180,7 @@ class ReliabilitySection(MotionSection):
         names = {name: plain if point in self.clearances else name for name, (_, plain, point) in parts.items()}
         limits = {names[name]: limit for name, limit in self.limits.items()}
         outputs = None if self.outputs is None else tuple(names[name] for name in self.outputs)
-        checker.outputs(outputs, ("reliability", "outputs"))
+        checker.outputs(outputs, ("reliability", "outputs"), columns)
         filled = {"dimensions": dimensions, "clearances": clearances, "load": load}
         return super().checked(checker).model_copy(update=filled | {"outputs": outputs, "limits": limits})
 
@@ -245,14 +252,71 @@ def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, D
     return None if section.load is None else checker.load(section.load, path, on_pin=on_pin)
 
 
-def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit) -> None:
+def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
+    """Kinds of the columns of dynamics that outputs and limits may name; coordinates of the same name go before them.
+
+    Reports what a study that names one lacks: the section dynamics, or rates. A kind that is not known is empty.
+    """
+    mechanism, compiled = checker.mechanism, checker.compiled
+    if compiled is None:
+        # The joints are not known where the mechanism itself has mistakes: what looks like such a column may be one.
+        return {name: "" for name in (*(section.outputs or ()), *section.limits) if _LIKE_A_COLUMN.search(name)}
+    places: dict[str, KeyPath] = {name: ("reliability", "outputs", k) for k, name in enumerate(section.outputs or ())}
+    places |= {name: ("reliability", "limits", name) for name in section.limits}
+    dynamics: DynamicsSection | None = checker.parts.get("dynamics")
+    joints = (dynamics or DynamicsSection()).joints(compiled)
+    pace = pace_of(section, dynamics, checker.parts.get("kinematics"))
+    own = pace.motion is not None or pace.of_given(compiled.drives)
+    elsewhere = own and source_of(checker, pace) is not source_of(checker, section)
+    still = column_kinds(compiled, joints, moving=False)
+    kinds = {
+        name: kind for name, kind in column_kinds(compiled, joints, moving=True).items()
+        if not (name in mechanism.coordinates or name in mechanism.owners or split_link(mechanism, name)[0])
+    }  # fmt: skip
+    for name, path in places.items():
+        message = ""
+        if name not in kinds:
+            continue
+        if dynamics is None and checker.reporter.raw(("dynamics",)) is None:
+            example = "dynamics: {gravity: [0, -9.81 m/s^2]}"
+            message = f"{name!r} is a column of dynamics, and the study has no such section; add one, such as {example}"
+        elif name not in still and not pace.rated:
+            message = f"{name!r} needs velocities: give 'rates' of the drives"
+        elif elsewhere:
+            message = (
+                f"{name!r} follows the rates of {pace.command}, and these are of its own poses; give reliability "
+                "'rates' of the drives"
+            )
+        if message:
+            checker.report(path, message, at_key=path[1] == "limits")
+    return kinds if dynamics is not None else {name: kinds[name] for name in places if name in kinds}
+
+
+def pace_of(
+    section: ReliabilitySection, dynamics: DynamicsSection | None, kinematics: KinematicsSection | None
+) -> MotionSection:
+    """The section whose rates the mechanism has: its own, else those that dynamics has or takes from kinematics."""
+    if section.rated or dynamics is None:
+        return section
+    return dynamics if dynamics.moves or kinematics is None else kinematics
+
+
+def _limit(
+    checker: Checker, section: ReliabilitySection, name: str, limit: ErrorLimit, columns: Mapping[str, str]
+) -> None:
     path: KeyPath = ("reliability", "limits", name)
     mechanism, report = checker.mechanism, checker.report
+    if name in columns:
+        if limit.radius is not None:
+            report(path, f"a radius is that of a point; limit {name!r} by two numbers, or by 'usl'", at_key=True)
+        if columns[name]:
+            checker.kind(path, columns[name])
+        return
     known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
     name = split_link(mechanism, name)[1]
     base, order = split_order(name, known.__contains__)
-    if order and not (section.rates or section.accelerations or section.speed):
-        report(path, "a limit of a velocity or an acceleration needs 'rates' or a 'speed'", at_key=True)
+    if order and not section.rated:
+        report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
     if limit.radius is not None:
         if checker.known(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])
@@ -266,7 +330,7 @@ def _limit(checker: Checker, section: ReliabilitySection, name: str, limit: Erro
         )
         report(path, message, at_key=True)
     else:
-        checker.coordinate(base, path, at_key=True, order=order)
+        checker.coordinate(base, path, at_key=True, others=columns, also="column of dynamics", order=order)
 
 
 def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:

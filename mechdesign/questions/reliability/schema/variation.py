@@ -251,7 +251,7 @@ def _check_class(checker: Checker, name: str, given: object, leg: float | None) 
     if not isinstance(given, ToleranceClass):
         return
     kinds = quantities(name, checker.parameters, checker.places)
-    if len(kinds) != 1 or "none" in kinds:
+    if len(kinds) != 1 or not kinds <= {"length", "angle"}:
         raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
     if kinds == {"length"} and leg is not None:
         raise ToleranceClassError("the leg is that of an angle; a length has its own size")

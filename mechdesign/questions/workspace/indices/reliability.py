@@ -24,6 +24,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.kinematics.rates import constant_rates, of_given
     from mechdesign.questions.reliability.deflection import elasticity
     from mechdesign.questions.reliability.first_order import linear_errors, linear_margins, nominal_values
+    from mechdesign.questions.reliability.forces import force_model, pace
     from mechdesign.questions.reliability.probability import made_failure
     from mechdesign.questions.reliability.question import ask
     from mechdesign.questions.reliability.study_sources import find_sources
@@ -34,16 +35,18 @@ def prepare(study: Study) -> Evaluate:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     # Nothing else needs to be computed.
-    question, rates = question.narrowed, constant_rates(study, study.reliability, mechanism.drives)
-    if of_given(study, study.reliability) and any(channel.order for channel in question.channels):
-        message = "the index 'reliability' of velocities needs rates of the drives: those of a path are not known here"
+    question, section = question.narrowed, pace(study)
+    rates = constant_rates(study, section, mechanism.drives)
+    forces = force_model(study) if question.columns else None
+    if (of_given(study, section) or section.motion is not None) and question.moving:
+        message = "the index 'reliability' of velocities needs 'rates' of the drives: a path or a motion has none here"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     bent = elasticity(study)[0]
 
     def evaluate(configuration: Configuration) -> Floats:
         elastic = None if bent is None else bent.at(configuration, question.channels)
-        linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic)
-        bands = question.at(nominal_values(mechanism, configuration, question.channels, rates)).bands
+        linear = linear_errors(mechanism, configuration, question.channels, sources, rates, elastic, forces)
+        bands = question.at(nominal_values(mechanism, configuration, question.channels, rates, forces)).bands
         return 1.0 - made_failure(linear, linear_margins(mechanism, configuration, sources), bands, question.discs)
 
     return of_configurations(evaluate)

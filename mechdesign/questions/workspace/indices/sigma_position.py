@@ -19,12 +19,12 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.kinematics.rates import DriveRates
     from mechdesign.questions.reliability.deflection import elasticity
     from mechdesign.questions.reliability.first_order import linear_errors
-    from mechdesign.questions.reliability.question import Channel
+    from mechdesign.questions.reliability.question import CoordinateChannel
     from mechdesign.questions.reliability.study_sources import find_sources
 
     assert study.workspace is not None
     mechanism, point = study.mechanism, study.workspace.point
-    channels = tuple(Channel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
+    channels = tuple(CoordinateChannel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
     sources, bent = find_sources(study)[0], elasticity(study)[0]
 
     def evaluate(configuration: Configuration) -> Floats:

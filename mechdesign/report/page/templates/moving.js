@@ -82,9 +82,9 @@
       const {at, turn: link, offset} = group.dataset;
       return [group, x[at], y[at], link === undefined ? null : turn[link], offset && offset.split(" ").map(Number)];
     });
-    const legs = [...drawing.querySelectorAll("[data-from]")].map(line => {
-      const {from, to, part} = line.dataset;
-      return [line, x[from], y[from], x[to], y[to], ...part.split(" ").map(Number)];
+    const struts = [...drawing.querySelectorAll("[data-from]")].map(path => {
+      const {from, to, way} = path.dataset;
+      return [path, x[from], y[from], x[to], y[to], way.split(",").map(line => line.match(/\S+ \S+/g).map(corner => corner.split(" ").map(Number)))];
     });
     return {
       x, y,
@@ -102,15 +102,14 @@
           const place = `translate(${px.toFixed(2)} ${py.toFixed(2)})`;
           group.setAttribute("transform", turn && !offset ? `${place} rotate(${angle.toFixed(3)})` : place);
         }
-        for (const [line, x1, y1, x2, y2, first, last] of legs) {
-          const from = [between(x1, at), between(y1, at)], to = [between(x2, at), between(y2, at)];
-          const known = isFinite(from[0]) && isFinite(to[0]);
-          line.classList.toggle("moving-gone", !known);
+        for (const [path, x1, y1, x2, y2, lines] of struts) {
+          const [px, py] = [between(x1, at), between(y1, at)], [wx, wy] = [between(x2, at) - px, between(y2, at) - py];
+          const known = isFinite(px + wx), length = Math.hypot(wx, wy) || 1;
+          path.classList.toggle("moving-gone", !known);
           if (!known) continue;
-          [[1, first], [2, last]].forEach(([end, share]) => {
-            line.setAttribute(`x${end}`, (from[0] + share * (to[0] - from[0])).toFixed(2));
-            line.setAttribute(`y${end}`, (from[1] + share * (to[1] - from[1])).toFixed(2));
-          });
+          const corner = ([share, left]) =>
+            `${(px + share * wx + left * wy / length).toFixed(2)} ${(py + share * wy - left * wx / length).toFixed(2)}`;
+          path.setAttribute("d", lines.map(line => `M${line.map(corner).join("L")}`).join(""));
         }
       },
     };

@@ -1,0 +1,203 @@
+"""What acts on a mechanism in motion: inertia and weight of its bodies, springs and dampers, and given loads.
+
+Forces of masses m with their centre at X + r U, X the base of their body (its first point), are m (g - a) there, and
+-J alpha about it [d'Alembert]; a = a_X + (i alpha - omega^2) r U.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import Graph, rod_of
+from mechdesign.mechanism.model import Mass, Spring
+from mechdesign.mechanism.outputs import Rates
+
+
+def bases(graph: Graph) -> dict[str, int]:
+    """By body, its base: the node of its first point, from which its edges run."""
+    nodes: dict[str, int] = {}
+    for body, point in graph.points:
+        nodes.setdefault(body, graph.nodes.index(point))
+    return nodes
+
+
+@dataclass(eq=False)
+class Forces:
+    """Forces and moments that act on a mechanism from outside of its joints, in a batch of poses.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        The poses.
+    nodes : list of Vector
+        Force on the pin at each node.
+    bodies : dict
+        By body, the force on it at its base, and the moment about that.
+    """
+
+    configuration: Configuration
+    nodes: list[Vector] = field(default_factory=list)
+    bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.nodes = [0.0] * len(self.configuration.nodes)
+        self.bases = bases(self.configuration.graph)
+
+    def on_pin(self, node: int, force: Vector) -> None:
+        """Add a force on the pin at a node."""
+        self.nodes[node] = plus(self.nodes[node], 1, force)
+
+    def on_body(self, body: str, force: Vector, moment: Value = 0.0, arm: Vector = 0.0) -> None:
+        """Add a force on a body at an arm from its base, and a moment."""
+        before = self.bodies.get(body, (0.0, 0.0))
+        self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
+
+    def at(self, point: str, force: Vector) -> None:
+        """Add a force at a point: on the pin there, or as ``rod.B`` on the link alone."""
+        graph = self.configuration.graph
+        node, link = graph.node(point), point.rpartition(".")[0]
+        if not link:
+            self.on_pin(node, force)
+            return
+        body = link if (link, graph.nodes[node]) in graph.points else rod_of(link)
+        nodes = self.configuration.nodes
+        self.on_body(body, force, arm=nodes[node] - nodes[self.bases[body]])
+
+    @property
+    def total(self) -> tuple[Vector, Value]:
+        """Sum of all forces, and of their moments about the origin."""
+        whole: Vector = 0.0
+        moment: Value = 0.0
+        nodes = self.configuration.nodes
+        for node, force in enumerate(self.nodes):
+            whole, moment = plus(whole, 1, force), moment + cross(nodes[node], force)
+        for body, (force, own) in self.bodies.items():
+            whole, moment = plus(whole, 1, force), moment + own + cross(nodes[self.bases[body]], force)
+        return whole, moment
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """Velocities and accelerations of a mechanism; None where it stands still."""
+
+    velocity: Rates | None = None
+    acceleration: Rates | None = None
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies, and the power that dampers take."""
+
+    kinetic: Value = 0.0
+    potential: Value = 0.0
+    lost: Value = 0.0
+
+    def __add__(self, other: Energy) -> Energy:
+        return Energy(self.kinetic + other.kinetic, self.potential + other.potential, self.lost + other.lost)
+
+
+@quiet
+def inertia(
+    forces: Forces, geometry: Geometry, masses: Mapping[str, Mass], moving: Moving, gravity: complex, factor: float
+) -> Energy:
+    """Add weights and inertia forces of bodies.
+
+    Parameters
+    ----------
+    masses : mapping of str to Mass
+        By body.
+    gravity : complex
+        Acceleration of free fall.
+    factor : float
+        Force that gives a unit of mass a unit of acceleration.
+    """
+    configuration, places = forces.configuration, forces.configuration.places
+    kinetic: Value = 0.0
+    potential: Value = 0.0
+    for body, given in masses.items():
+        mass = factor * geometry.term(given.mass, places)
+        moment = factor * geometry.term(given.inertia, places)
+        base = forces.bases[body]
+        arm = _arm(forces, geometry, body, given) * configuration.body_rotation(body)
+        frame = configuration.graph.bodies[body][0]
+        force: Vector = mass * gravity
+        turning: Value = 0.0
+        if moving.velocity is not None:
+            omega = moving.velocity.angles[frame]
+            speed = moving.velocity.nodes[base] + 1j * omega * arm
+            kinetic = kinetic + 0.5 * (mass * norm2(speed) + moment * omega * omega)
+            if moving.acceleration is not None:
+                alpha = moving.acceleration.angles[frame]
+                force = force - mass * (moving.acceleration.nodes[base] + (1j * alpha - omega * omega) * arm)
+                turning = -1.0 * moment * alpha
+        forces.on_body(body, force, turning, arm)
+        potential = potential - mass * dot(gravity, configuration.nodes[base] + arm)
+    return Energy(kinetic, potential)
+
+
+def center(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
+    """Place of a body's centre of mass."""
+    arm = _arm(forces, geometry, body, given) * forces.configuration.body_rotation(body)
+    return forces.configuration.nodes[forces.bases[body]] + arm
+
+
+def _arm(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:
+    """From the base of a body to its centre of mass, in its frame."""
+    places = forces.configuration.places
+    own = [point for owner, point in geometry.graph.points if owner == body and ":" not in point]
+    base = geometry.local(body, own[0], places)
+    if given.center is None:
+        center: Vector = sum(geometry.place(body, point, places) for point in own) / len(own)
+    else:
+        x, y = (geometry.term(term, places) for term in given.center)
+        center = x + 1j * y
+    return center - base
+
+
+@quiet
+def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], moving: Moving) -> Energy:
+    """Add the forces of springs and dampers; those of no length pull in no direction.
+
+    The angle between two links counts within half a turn of the spring's free angle.
+    """
+    configuration, places = forces.configuration, forces.configuration.places
+    potential: Value = 0.0
+    lost: Value = 0.0
+    for spring in elements:
+        stiffness, free, preload, push, damping = (
+            geometry.term(term, places)
+            for term in (spring.stiffness, spring.free, spring.preload, spring.push, spring.damping)
+        )
+        constant = preload - push
+        rate: Value = 0.0
+        if spring.turning:
+            one, other = spring.between
+            turn = configuration.body_rotation(other) * np.conj(configuration.body_rotation(one))
+            stretch = wrap(np.angle(turn) - free)
+            if moving.velocity is not None:
+                frames = [moving.velocity.angles[configuration.graph.bodies[link][0]] for link in (other, one)]
+                rate = frames[0] - frames[1]
+            moment = constant + stiffness * stretch + damping * rate
+            forces.on_body(other, 0.0, -1.0 * moment)
+            forces.on_body(one, 0.0, moment)
+        else:
+            ends = [configuration.graph.node(point) for point in spring.between]
+            span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
+            length = np.sqrt(norm2(span))
+            stretch = length - free
+            along = np.where(length > 0, span / np.where(length > 0, length, 1.0), 0.0)
+            if moving.velocity is not None:
+                rate = dot(along, moving.velocity.nodes[ends[1]] - moving.velocity.nodes[ends[0]])
+            # Of a free length 0 the pull is the span itself, also where it has no direction.
+            pull = stiffness * span + (constant - stiffness * free + damping * rate) * along
+            forces.at(spring.between[0], pull)
+            forces.at(spring.between[1], -1.0 * pull)
+        potential = potential + constant * stretch + 0.5 * stiffness * stretch * stretch
+        lost = lost + damping * rate * rate
+    return Energy(0.0, potential, lost)

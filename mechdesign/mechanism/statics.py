@@ -1,0 +1,343 @@
+"""Equilibrium of a mechanism: efforts of its drives and what its joints bear under any forces and moments.
+
+The principle of virtual work for the loop equations of `mechdesign.mechanism.loops`: with a multiplier f of each edge,
+the force that it transmits from its head to its tail,
+
+    sum F dX + sum M dtheta + sum S ds + sum f (de - (dX_head - dX_tail)) = 0
+
+for all virtual displacements dX of nodes, dtheta of angle classes and ds of slides. So at each node F is what the edges
+take, about each class M + sum(e x f) = 0, and along each slide S + d f = 0. These equations have the transposed matrix
+of the positions' derivatives: group by group, backwards through the order in which positions are solved, dyads in
+closed form. What is left at the given coordinates are the efforts of the drives. Inertia forces are forces
+[d'Alembert].
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.derivatives import Linearization
+from mechdesign.mechanism.forces import Forces, bases
+from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
+from mechdesign.mechanism.loops import nothing
+from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
+
+# Prefixes of what a force acts on that is no link: the pin of several links, and of a slot.
+PIN = "pin:"
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail."""
+
+    linear: Linearization
+    forces: Forces
+    efforts: list[Value]
+    edges: list[Vector]
+
+
+@quiet
+def balance(linear: Linearization, forces: Forces) -> Balance:
+    """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
+
+    Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
+    not finite.
+    """
+    structure, bodies = linear.structure, linear.graph.bodies
+    nodes = list(forces.nodes)
+    frames: list[Value] = [0.0] * linear.graph.classes
+    slides: list[Value] = [0.0] * len(linear.slides)
+    edges: list[Vector] = [0.0] * len(structure.edges)
+    for body, (force, moment) in forces.bodies.items():
+        base = bases(linear.graph)[body]
+        nodes[base] = plus(nodes[base], 1, force)
+        frames[bodies[body][0]] = frames[bodies[body][0]] + moment
+
+    def transmit(k: int, force: Vector) -> None:
+        if nothing(force):
+            return
+        edge = structure.edges[k]
+        edges[k] = plus(edges[k], 1, force)
+        frames[edge.frame] = frames[edge.frame] + cross(linear.edge(k), force)
+        if edge.slide is not None:
+            slides[edge.slide] = slides[edge.slide] + dot(linear.direction(k), force)
+
+    for index in reversed(range(len(structure.groups))):
+        group = structure.groups[index]
+        for k, sign in reversed(group.tree):
+            edge = structure.edges[k]
+            begin, end = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
+            nodes[begin] = plus(nodes[begin], 1, nodes[end])
+            transmit(k, sign * nodes[end])
+        if group.form == "place":
+            continue
+        turning: list[Value] = [0.0] * len(group.angles)
+        for frame, tie in enumerate(structure.ties):
+            if tie.root in group.angles:
+                place = group.angles.index(tie.root)
+                turning[place] = turning[place] + frames[frame]
+        held = linear.hold_group(index, group, [*turning, *(slides[slide] for slide in group.slides)])
+        for loop, force in zip(group.loops, held, strict=True):
+            nodes[loop.start] = plus(nodes[loop.start], 1, force)
+            nodes[loop.end] = plus(nodes[loop.end], -1, force)
+            for k, sign in loop.edges:
+                transmit(k, sign * force)
+    efforts: list[Value] = [0.0] * len(structure.given)
+    for frame, tie in enumerate(structure.ties):
+        for sign, k in tie.given:
+            efforts[k] = plus(efforts[k], -sign, frames[frame])
+    for slide, k in structure.known_slides:
+        efforts[k] = plus(efforts[k], -1, slides[slide])
+    return Balance(linear, forces, efforts, edges)
+
+
+class Contact(NamedTuple):
+    """A joint between two bodies, or between a body and a pin that several share.
+
+    The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
+    the node. It also transmits a moment unless it `turns`; `slide` is
+    the number of the slide whose line it lies across.
+    """
+
+    joint: str
+    on: str
+    by: str
+    node: int
+    edges: tuple[tuple[int, int], ...]
+    bodies: tuple[str, ...] = ()
+    turns: bool = True
+    slide: int | None = None
+
+
+class _Member(NamedTuple):
+    """What meets at a pin: a body, or the guide of a slot; its force on the pin by edges, and by the load on a body."""
+
+    name: str
+    edges: tuple[tuple[int, int], ...]
+    bodies: tuple[str, ...] = ()
+    slot: str = ""
+
+
+class Joints:
+    """The joints of a mechanism, compiled once: between which bodies each acts, and how its force follows from edges.
+
+    At `loaded` nodes a force acts on the pin itself: what the bodies there bear are no opposite forces.
+    """
+
+    def __init__(self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset()) -> None:
+        self.description, self.graph, self.bases = description, graph, bases(graph)
+        self.loaded = loaded
+        #: By node at which one body alone has a point, this body: it bears what acts on the pin.
+        self.sole: dict[int, str] = {}
+        #: By leg, prismatic or fixed joint, the two bodies that it keeps from turning against each other.
+        self.ties = {name: (name, rod_of(name)) for name, link in description.links.items() if link.telescopic}
+        for slide, (guide, slider) in self.guides.items():
+            if slider is not None:
+                self.ties[graph.slides[slide]] = guide, slider
+        for name, joint in description.joints.items():
+            if isinstance(joint, Fixed):
+                one, other = joint.links
+                self.ties[name] = self.holder(one, joint.point), self.holder(other, joint.point)
+        self.contacts = tuple(self._slides()) + tuple(self._pins())
+        self.order, self.open = self._tie_order()
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Names of the contacts' forces: of their joint, and what it acts on where it has several."""
+        counts = Counter(contact.joint for contact in self.contacts)
+        return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
+
+    def holder(self, link: str, point: str) -> str:
+        """The body of a link that has a point; of a telescopic one perhaps its rod."""
+        return link if (link, point) in self.graph.points else rod_of(link)
+
+    @cached_property
+    def guides(self) -> dict[int, tuple[str, str | None]]:
+        """By slide, the body that carries its line, and its slider; None for the pin of a slot."""
+        found: dict[int, tuple[str, str | None]] = {}
+        for slide, name in enumerate(self.graph.slides):
+            if slide in self.graph.telescopic:
+                found[slide] = name, rod_of(name)
+                continue
+            joint = self.description.joints[name]
+            assert isinstance(joint, Prismatic | Slot)
+            line = joint.line
+            guide = self.holder(line.link, line.through or origin_of(line.link))
+            found[slide] = guide, self.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
+        return found
+
+    def _slides(self) -> list[Contact]:
+        contacts = []
+        for k, edge in enumerate(self.graph.edges):
+            if edge.slide is not None and (slider := self.guides[edge.slide][1]) is not None:
+                name, guide = self.graph.slides[edge.slide], self.guides[edge.slide][0]
+                contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), (), False, edge.slide))
+        return contacts
+
+    def _members(self) -> dict[int, list[_Member]]:
+        """By node, what meets there."""
+        forces: dict[tuple[int, str], list[tuple[int, int]]] = {
+            (self.graph.nodes.index(point), body): [] for body, point in self.graph.points
+        }
+        slots: dict[int, list[_Member]] = {}
+        for k, edge in enumerate(self.graph.edges):
+            if edge.slide is None:
+                tail = head = edge.locals[0][1]
+            else:
+                tail, slider = self.guides[edge.slide]
+                head = slider or ""
+                if slider is None:
+                    name = self.graph.slides[edge.slide]
+                    slots.setdefault(edge.head, []).append(_Member(tail, ((k, -1),), (), name))
+            forces[edge.tail, tail].append((k, 1))
+            if head:
+                forces[edge.head, head].append((k, -1))
+        members: dict[int, list[_Member]] = {}
+        for (node, body), edges in forces.items():
+            own = (body,) if self.bases[body] == node else ()
+            members.setdefault(node, []).append(_Member(body, tuple(edges), own))
+        for node, listed in slots.items():
+            members[node] += listed
+        return members
+
+    def _pins(self) -> list[Contact]:
+        contacts = []
+        for node, members in self._members().items():
+            point = self.graph.nodes[node]
+            clamped, free = self._clamped(node, members)
+            contacts += clamped
+            if len(free) == 1:
+                self.sole[node] = free[0].name
+            # The pin that a ground's origin would be bears nothing.
+            if len(free) < 2 or ":" in point:
+                continue
+            ground = next((member for member in free if member.name == GROUND and not member.slot), None)
+            if ground is not None:
+                # The pin is fixed in the ground, and so is what acts on it.
+                for member in free:
+                    if member is not ground:
+                        contacts.append(
+                            Contact(member.slot, GROUND, member.name, node, member.edges)
+                            if member.slot else _borne(point, member, GROUND, node)
+                        )  # fmt: skip
+            elif len(free) == 2 and node not in self.loaded:
+                by, on = sorted(free, key=lambda member: not member.slot)
+                contacts.append(_borne(by.slot or point, on, by.name, node))
+            else:
+                pin = f"{PIN}{point}"
+                contacts += [_borne(point, member, pin, node) for member in free if not member.slot]
+                contacts += [
+                    Contact(member.slot, pin, member.name, node, member.edges) for member in free if member.slot
+                ]
+        return contacts
+
+    def _clamped(self, node: int, members: Sequence[_Member]) -> tuple[list[Contact], list[_Member]]:
+        """The clamps at a node, and its members: of links clamped together one, the ground or a first, with all edges.
+
+        Each clamp holds what hangs on it, seen from this one.
+        """
+        apart = {member.name: member for member in members if not member.slot}
+        clamps = {
+            name: self.ties[name] for name, joint in self.description.joints.items()
+            if isinstance(joint, Fixed) and joint.point == self.graph.nodes[node]
+        }  # fmt: skip
+        contacts = []
+
+        def hold(member: _Member) -> _Member:
+            for name, pair in clamps.items():
+                other = pair[1 - pair.index(member.name)] if member.name in pair else ""
+                if other in apart:
+                    hanging = hold(apart.pop(other))
+                    contacts.append(_borne(name, hanging, member.name, node, turns=False))
+                    edges, bodies = member.edges + hanging.edges, member.bodies + hanging.bodies
+                    member = _Member(member.name, edges, bodies)
+            return member
+
+        second = {pair[1] for pair in clamps.values()}
+        order = sorted(apart, key=lambda name: (name != GROUND, name in second))
+        held = [hold(apart.pop(name)) for name in order if name in apart]
+        return contacts, held + [member for member in members if member.slot]
+
+    def _tie_order(self) -> tuple[list[tuple[str, str]], frozenset[str]]:
+        """Joints of `ties` from the outside in, each with the body that it holds; and those of closed chains."""
+        left = dict(self.ties)
+        order: list[tuple[str, str]] = []
+        while True:
+            held: dict[str, list[str]] = {}
+            for name, pair in left.items():
+                for body in pair:
+                    held.setdefault(body, []).append(name)
+            ends = [(names[0], body) for body, names in held.items() if len(names) == 1 and body != GROUND]
+            if not ends:
+                return order, frozenset(left)
+            order.append(ends[0])
+            del left[ends[0][0]]
+
+
+def _borne(joint: str, member: _Member, by: str, node: int, *, turns: bool = True) -> Contact:
+    """The contact through which a pin bears a member: the force on it is against that on the pin."""
+    edges = tuple((k, -sign) for k, sign in member.edges)
+    return Contact(joint, member.name, by, node, edges, member.bodies, turns)
+
+
+class Reaction(NamedTuple):
+    """What a contact bears: the force on `on` by `by`, the moment about its node, and the force across its slide."""
+
+    force: Vector
+    moment: Value
+    normal: Value
+
+
+@quiet
+def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
+    """What each contact bears; nan for moments of chains of slides and clamps that equilibrium leaves open."""
+    linear, outside = balance.linear, balance.forces.bodies
+    forces: list[Vector] = []
+    turning: dict[str, Value] = {body: moment for body, (_, moment) in outside.items()}
+
+    def turn(body: str, moment: Value) -> None:
+        turning[body] = turning.get(body, 0.0) + moment
+
+    for drive, effort in zip(linear.structure.given, balance.efforts, strict=True):
+        if drive.kind == "angle":
+            turn(drive.body, effort)
+            turn(drive.reference, -1.0 * effort)
+    for node, body in joints.sole.items():
+        if not nothing(force := balance.forces.nodes[node]):
+            turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))
+    for contact in joints.contacts:
+        force = 0.0
+        for k, sign in contact.edges:
+            force = plus(force, sign, balance.edges[k])
+        for body in contact.bodies:
+            force = plus(force, -1, outside[body][0] if body in outside else 0.0)
+        forces.append(force)
+        for body, sign in ((contact.on, 1), (contact.by, -1)):
+            if body in joints.bases and not nothing(force):
+                arm = linear.nodes[contact.node] - linear.nodes[joints.bases[body]]
+                turn(body, sign * cross(arm, force))
+    # Moments on the second body of each tie.
+    moments: dict[str, Value] = dict.fromkeys(joints.open, np.nan)
+    for name, body in joints.order:
+        one, other = joints.ties[name]
+        moment = turning.get(body, 0.0)
+        moments[name] = -1.0 * moment if body == other else moment
+        turn(one if body == other else other, moment)
+    found = []
+    for contact, force in zip(joints.contacts, forces, strict=True):
+        normal: Value = np.nan
+        if contact.slide is not None:
+            k = next(k for k, edge in enumerate(linear.graph.edges) if edge.slide == contact.slide)
+            normal = cross(linear.direction(k), force)
+        moment = 0.0 if contact.turns else moments[contact.joint]
+        if contact.joint in joints.ties and contact.on == joints.ties[contact.joint][0]:
+            moment = -1.0 * moment
+        found.append(Reaction(force, moment, normal))
+    return found

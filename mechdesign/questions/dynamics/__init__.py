@@ -1,0 +1,3 @@
+"""What drives it, what does it bear? Efforts of the drives, forces in the joints, shaking forces and energies."""
+
+HELP_PAGE = "theory/dynamics"

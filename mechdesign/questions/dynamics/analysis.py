@@ -1,0 +1,143 @@
+"""What drives it, what does it bear? Efforts of the drives, joint forces, shaking forces and energies of a motion.
+
+The motion is that of `mechdesign.questions.kinematics`, whose passage over the poses, and whose functions between them,
+carry the forces along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, partial
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.errors import AssemblyError
+from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.numerics.arrays import Flags
+from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.question import force_question
+from mechdesign.questions.dynamics.tables import asked_of, dynamics_table, extremes_table, joint_table
+from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.courses import Followed, course_of
+from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.passage import Passage, pass_over
+from mechdesign.questions.kinematics.question import MotionQuestion
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.together import Answers, End, Group
+from mechdesign.results import Drawn, Result, Scope, Table
+from mechdesign.statistics import Asked
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.work.threads import one_thread
+
+# Tables with a row a pose, or several.
+A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
+TABLES = (*A_ROW_A_POSE, "extremes")
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnForces(Drawn):
+    """The solved poses of a motion, and its columns at each pose."""
+
+    shown: Shown
+    motion: Motion
+
+
+@one_thread()
+def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
+    """Efforts and forces at every pose of the study's dynamics; see `mechdesign.dynamics`."""
+    poses = study_poses(study, "dynamics")
+    progress.start(poses.count, "poses")
+    passage = pass_over(force_question(study, poses), _marks, progress, jobs)
+    result = _group(passage).of(0)
+    if isinstance(result, Exception):
+        raise result
+    if not passage.long:
+        return result
+    long = {name: passage.table(make, jobs, result.tables[name].scope) for name, make in A_ROW_A_POSE.items()}
+    return replace(result, tables={**result.tables, **long})
+
+
+@one_thread()
+def answers(study: Study, poses: Poses) -> Answers:
+    """Answer `dynamics` for the poses of several designs, each as if it were asked alone, without pictures."""
+    return Answers([_group(pass_over(force_question(study, poses), _marks, NULL, 1))])
+
+
+def _marks(motion: Motion) -> Mapping[str, Flags]:
+    """Poses of which something is to be said: where the drives hold the mechanism no longer, or a load is nan."""
+    (effort, *_) = (static.name for static in asked_of(motion).statics)
+    unknown = ~np.isfinite(sum(motion.arrays[name] for name in (effort, "shaking", "shaking_moment")))
+    regular = motion.arrays["conditioning"] >= STALLED
+    return {"singular": motion.valid & unknown & ~regular, "undefined": motion.valid & unknown & regular}
+
+
+def tables(
+    motion: Motion, question: MotionQuestion, wanted: Collection[str], outputs: Collection[str] | None = None,
+    asked: Collection[Asked] = (),
+) -> tuple[dict[str, Table], Along | None]:  # fmt: skip
+    """Some tables of a motion, and the motion between its poses, which is that of the question.
+
+    Of the extremes those of some `outputs`, or all; columns that are `asked` are followed besides.
+    """
+    names = [static.name for static in asked_of(motion).statics if outputs is None or static.name in outputs]
+    integrals = [Asked(name, integral=True) for name in names] if "extremes" in wanted else []
+    along = along_of(question, names, asked=[*asked, *integrals])
+    found = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in wanted}
+    if "extremes" in wanted:
+        found["extremes"] = extremes_table(motion, along, names)
+    return found, along
+
+
+def _group(passage: Passage) -> Group:
+    """The answers of all designs."""
+    question, poses = passage.question, passage.question.poses
+    found, along = tables(passage.motion, question, TABLES)
+    closely = along is not None and not along.functions.unresolved.any()
+    ends = [_end(passage, along, k) for k in range(poses.designs)]
+    whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
+    a_pose = replace(whole, course=cache(partial(_follow, question)))
+    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in found.items()}
+    result = Result("dynamics", scoped)
+    if poses.designs == 1:
+        (end,) = ends
+        drawn = DrawnForces(passage.shown, passage.motion)
+        result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
+    return Group(np.arange(poses.designs), result, ends)
+
+
+def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
+    """A column along the motions of all designs."""
+    along = along_of(question, (), asked=[asked])
+    return None if along is None else course_of(along, asked)
+
+
+def _end(passage: Passage, along: Along | None, k: int) -> End:
+    """How design `k` was answered."""
+    poses, study = passage.question.poses, passage.question.study
+    count = poses.count // poses.designs
+    reason = passage.reason.reshape(poses.designs, -1)[k]
+    counts = {"poses": count, "invalid": int(np.count_nonzero(reason))}
+    try:
+        warnings, failed = judge_failures(study, poses, reason, k * count, "dynamics")
+    except AssemblyError as error:
+        return End(counts=counts, error=error)
+    mark = passage.marks[k]["singular"]
+    if mark.number:
+        warnings.append(Caution(
+            "singular", f"{mark.number} of {count} poses are singular: the drives hold the mechanism no longer, and "
+            "efforts and joint forces are nan there", "dynamics", mark.first,
+        ))  # fmt: skip
+    mark = passage.marks[k]["undefined"]
+    if mark.number:
+        message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
+        warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    missing = [invalid_in_words(reason)]
+    if along is not None and not along.whole[k]:
+        missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
+    if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
+        message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
+        warnings.append(Caution("undefined", message, "joint_forces"))
+    return End(warnings, failed, " and ".join(filter(None, missing)), counts)

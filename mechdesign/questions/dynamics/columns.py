@@ -1,0 +1,43 @@
+"""Tables of dynamics and their columns: names, meanings, units and formulas."""
+
+from __future__ import annotations
+
+from mechdesign.questions.columns import DRIVE, GIVEN, TIMED, VALID
+from mechdesign.questions.kinematics.columns import OVER
+from mechdesign.results import KeyNumber, TableKind
+
+DYNAMICS = TableKind.of("dynamics", "drive efforts, shaking forces and energies per pose",
+    TIMED, DRIVE, GIVEN,
+    ("<drive>_effort", "torque or force of the drive, positive where it drives <drive> up", "force or moment",
+     "virtual work of all forces, those of inertia among them"),
+    ("<drive>_power", "power that the drive puts in", "power", "effort times velocity"),
+    ("shaking.x, shaking.y", "force of the mechanism on its frame, from joints, springs and drives", "force",
+     "sum of weights, inertia forces and loads"),
+    ("shaking_moment", "moment of the mechanism on its frame about the origin", "moment"),
+    ("kinetic_energy", "energy of the motion", "moment", "sum of m v^2/2 + J omega^2/2"),
+    ("potential_energy", "energy of weights, 0 at the origin, and of springs, 0 at their free lengths", "moment",
+     "-sum of m g x + sum of k s^2/2 + preload s"), VALID)  # fmt: skip
+JOINT_FORCES = TableKind.of("joint_forces", "what the joints bear, a row a pose and joint",
+    TIMED, DRIVE, GIVEN, ("joint", "point or joint"),
+    ("on", "what the force acts on: a link, or the pin of several links ('pin:')"),
+    ("by", "what exerts it; of a telescopic leg its rod ('leg:rod') and the part at its first end are two bodies"),
+    ("fx, fy", "force on the one by the other, axes of the world", "force"),
+    ("moment", "moment likewise, about the joint's point; nan where equilibrium leaves it open", "moment"),
+    ("magnitude", "size of the force", "force"), ("angle", "its direction from the world's x axis", "angle"),
+    ("normal", "of a slide the force across its line, to the left positive", "force"), VALID)  # fmt: skip
+EXTREMES = TableKind.of("extremes", f"extremes and means of efforts, forces and energies <{OVER}>",
+    ("output", "column of dynamics.csv, 'shaking' for the size of that force, or a joint's force by the joint and, "
+     "where it has several, what it acts on, in its own unit"),
+    ("min", "smallest value over the motion, in `unit`"),
+    ("min_at", "<swept> at the smallest value", "as what is swept"),
+    ("max", "largest value over the motion, in `unit`"), ("max_at", "<swept> at the largest value", "as what is swept"),
+    ("peak", "largest absolute value, in `unit`"), ("peak_at", "<swept> at the peak", "as what is swept"),
+    ("mean", "mean over the way of the motion, in `unit`"),
+    ("rms", "root of the mean square over the way of the motion, in `unit`"),
+    ("unit", "unit of its numbers"))  # fmt: skip
+KEY_NUMBERS = (
+    KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
+    KeyNumber(DYNAMICS, "<drive>_power", "peak power of {name}", "size"),
+    KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
+    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest", by=("joint",)),
+)  # fmt: skip

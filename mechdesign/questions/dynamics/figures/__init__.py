@@ -1,0 +1,1 @@
+"""Pictures of dynamics: efforts, joint forces, bearings, free bodies, shaking force, energies."""

@@ -1,0 +1,75 @@
+"""What pictures of dynamics show."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from mechdesign.numerics.arrays import Complexes, Floats
+from mechdesign.questions.dynamics.analysis import DrawnForces
+from mechdesign.questions.dynamics.question import ForceQuestion
+from mechdesign.questions.dynamics.tables import STILL, asked_of
+from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
+from mechdesign.report.figures.panels import Along, along
+from mechdesign.report.figures.pictures import View
+from mechdesign.study.poses import Poses
+
+
+class DynamicsView(View):
+    """The forces of a motion, or of poses one by one."""
+
+    @cached_property
+    def drawn(self) -> DrawnForces:
+        """The solved poses and the columns of the motion."""
+        return DrawnForces.of(self.result)
+
+    @property
+    def asked(self) -> ForceQuestion:
+        """What was asked of the forces."""
+        return asked_of(self.drawn.motion)
+
+    @property
+    def poses(self) -> Poses:
+        """The poses of the columns."""
+        return self.drawn.motion.question.poses
+
+    @cached_property
+    def swept(self) -> Along | None:
+        """The abscissa of a sweep or path."""
+        return along(self.study, self.poses)
+
+    @cached_property
+    def singular(self) -> bool:
+        """Whether forces grow without bound somewhere along the motion."""
+        extremes = self.result.tables["extremes"]
+        return not np.isfinite(extremes["peak"]).all()
+
+    def column(self, name: str) -> Floats:
+        """A column at every pose, nan where it has no value."""
+        values = self.drawn.motion.arrays[name]
+        return np.where(self.drawn.motion.valid & np.isfinite(values), values, np.nan)
+
+    def moves(self, name: str) -> bool:
+        """Whether a column is more than rounding, and not the same everywhere."""
+        values = self.column(name)
+        known = values[np.isfinite(values)]
+        return len(known) > 0 and float(np.ptp(known)) > STILL * float(np.abs(known).max())
+
+    def force(self, name: str) -> Complexes:
+        """A joint's force at every pose, by its name, or the shaking force."""
+        return np.asarray(self.column(f"{name}x") + 1j * self.column(f"{name}y"))
+
+    @cached_property
+    def joints(self) -> tuple[list[Joint], list[Joint]]:
+        """Joints that bear a force, and joints that bear a moment, the most loaded first."""
+        forces, moments = [], []
+        for name, contact in zip(self.asked.forces, self.asked.joints.contacts, strict=True):
+            words = f"on {contact.on} by {contact.by}"
+            called = name.replace("_force", "", 1).replace("_on_", " on ")
+            forces.append(Joint(called, words, self.force(f"{name}.f")[:, None]))
+            if not contact.turns:
+                moments.append(Joint(called, words, self.column(f"{name}.moment")[:, None]))
+        largest = peak(forces)
+        least = NOTHING * max(largest * self.study.mechanism.size, peak(moments))
+        return loaded(forces, NOTHING * largest), loaded(moments, least)

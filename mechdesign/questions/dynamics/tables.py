@@ -1,0 +1,113 @@
+"""Tables of dynamics: a row a pose, a row a pose and joint, and what the motion comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mechdesign.mechanism.algebra import quiet
+from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.columns import VALID
+from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORCES
+from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
+from mechdesign.questions.kinematics.along import Along, of_swept, over
+from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.results import Table
+
+# A range below this part of a function's size is rounding.
+STILL = 1e-12
+
+
+def asked_of(motion: Motion) -> ForceQuestion:
+    """What was asked of the forces of a motion."""
+    asked = motion.question.borne
+    assert isinstance(asked, ForceQuestion)
+    return asked
+
+
+def dynamics_table(motion: Motion) -> Table:
+    """``dynamics.csv``: efforts, powers, shaking forces and energies of every pose."""
+    asked = asked_of(motion)
+    hidden, labels = {"shaking", *asked.forces}, motion.question.study.units.labels
+    columns = []
+    for static in asked.statics:
+        if static.name not in hidden:
+            values = {static.kind: motion.arrays[static.name]}
+            columns += DYNAMICS.columns({**labels, **static.words, "force or moment": static.unit}, **values)
+    return DYNAMICS.table([*motion.pose_columns(), *columns, VALID.column(motion.valid)])
+
+
+def joint_table(motion: Motion) -> Table:
+    """``joint_forces.csv``: what every joint bears, a row a pose and joint."""
+    asked, contacts = asked_of(motion), asked_of(motion).joints.contacts
+    count, joints = len(motion.reason), len(contacts)
+
+    def each(values: NDArray[Any]) -> NDArray[Any]:
+        return np.repeat(values, joints)
+
+    words = {part: np.array([[motion.arrays[f"{name}.{part}"]] for name in asked.forces]) for part in PARTS}
+    table = {part: values.reshape(joints, count).T.ravel() for part, values in words.items()}
+    names = {
+        key: np.tile(np.array([getattr(c, key) for c in contacts], dtype=str), count) for key in ("joint", "on", "by")
+    }
+    given = [replace(column, values=each(column.values)) for column in motion.pose_columns()]
+    columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)
+    return JOINT_FORCES.table([*given, *columns, VALID.column(each(motion.valid))])
+
+
+@quiet
+def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) -> Table:
+    """``extremes.csv``: smallest and largest values, peaks and means of some columns over the motion.
+
+    Along a motion they are those of all of it, between its poses too; elsewhere those of the valid poses.
+    """
+    question, poses = motion.question, motion.question.poses
+    statics, swept = [static for static in asked_of(motion).statics if static.name in names], poses.swept
+    at = poses.abscissa.reshape(poses.designs, -1)
+    valid = motion.valid.reshape(poses.designs, -1)
+    numbers = np.full((len(statics), poses.designs, 8), np.nan)
+    for k, static in enumerate(statics):
+        values = motion.arrays[static.name].reshape(poses.designs, -1)
+        numbers[k] = _of_poses(np.where(valid, values, np.nan), at)
+        if along is not None:
+            numbers[k] = np.where(along.curve.spent[:, None], numbers[k], _between(along, static.name, numbers[k]))
+    low, low_at, high, high_at, peak, peak_at, mean, rms = numbers.transpose(2, 1, 0).reshape(8, -1)
+    names, units = ([getattr(static, key) for static in statics] * poses.designs for key in ("name", "unit"))
+    columns = EXTREMES.columns(
+        of_swept(question.study, swept, "place in rows (from 0)"), output=np.array(names), min=low, min_at=low_at,
+        max=high, max_at=high_at, peak=peak, peak_at=peak_at, mean=mean, rms=rms, unit=np.array(units, dtype=str),
+    )  # fmt: skip
+    return EXTREMES.table(columns, **over(along, [static.name for static in statics]))
+
+
+def _of_poses(values: Floats, at: Floats) -> Floats:
+    """Numbers of each design's valid poses, shape (designs, 8)."""
+    lanes, known = np.arange(len(values)), np.isfinite(values)
+    low, high, peak = (np.where(known, judged, -np.inf).argmax(axis=1) for judged in (-values, values, np.abs(values)))
+    count, safe = np.maximum(known.sum(axis=1), 1), np.where(known, values, 0.0)
+    numbers = [
+        values[lanes, low], at[lanes, low], values[lanes, high], at[lanes, high], np.abs(values[lanes, peak]),
+        at[lanes, peak], safe.sum(axis=1) / count, np.sqrt((safe**2).sum(axis=1) / count),
+    ]  # fmt: skip
+    some = np.asarray(known.any(axis=1))
+    return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
+
+
+def _between(along: Along, name: str, poses: Floats) -> Floats:
+    """The same over the motion between its poses."""
+    lines = np.arange(along.curve.lines)
+    still = STILL * np.nan_to_num(poses[:, 4])
+    peaks = along.functions.extremes([name], still[None])
+    (low, high), (low_at, high_at) = peaks.value[:, 0], peaks.place[:, 0]
+    constant = np.logical_not(high - low > still)
+    size, size_at = np.where(high >= -low, high, -low), np.where(high >= -low, high_at, low_at)
+    ends = [low, along.shown(lines, low_at), high, along.shown(lines, high_at), size, along.shown(lines, size_at)]
+    square = along.mean(name, 2)
+    whole = np.stack([*ends, along.mean(name), np.sqrt(np.maximum(square, 0.0))], axis=1)
+    # What stands still keeps the place of the first pose.
+    whole[constant, 1:6:2] = poses[constant, 1:6:2]
+    return np.where(np.isnan(whole), poses, whole)

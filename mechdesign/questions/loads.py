@@ -1,0 +1,75 @@
+"""The loads of a question at solved poses, as forces on its mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism.algebra import norm2, quiet
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.poses import in_study_units
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.loads import TIME, VELOCITY, Load, Quantity
+from mechdesign.study.text.fields import MAX_NUMBER
+from mechdesign.study.text.units import Amount
+
+
+def coordinates_in(study: Study, loads: Sequence[Load]) -> list[Coordinate]:
+    """Coordinates in the expressions of loads, also those whose velocities stand there."""
+    names = {name.removesuffix(VELOCITY): name for load in loads for _, quantity, _ in load.numbers
+             if isinstance(quantity, Expression) for name in quantity.names}  # fmt: skip
+    return [study.mechanism.coordinate(name) for name in names if name != TIME and name not in study.parameters.nominal]
+
+
+class Loading:
+    """Loads at some rows of poses."""
+
+    def __init__(self, study: Study, loads: Sequence[Load], poses: Poses, rows: Ints | slice) -> None:
+        self.study, self.loads, self.poses, self.rows = study, loads, poses, rows
+
+    @quiet
+    def add(self, forces: Forces, moving: Moving) -> None:
+        """Add the loads to forces."""
+        configuration = forces.configuration
+        for load in self.loads:
+            given = [self._value(part, forces, moving) for _, part, _ in load.numbers]
+            if load.at is not None:
+                force = given[0] + 1j * given[1]
+                if load.in_ is not None:
+                    force = force * configuration.body_rotation(load.in_)
+                forces.at(load.at, force)
+            elif load.between is not None:
+                ends = [configuration.graph.node(point) for point in load.between]
+                span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
+                pull = given[0] * span / np.sqrt(norm2(span))
+                forces.at(load.between[0], pull)
+                forces.at(load.between[1], -1.0 * pull)
+            if load.link is not None:
+                forces.on_body(load.link, 0.0, given[-1])
+
+    def _value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
+        if isinstance(quantity, Expression):
+            value = quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
+            # Beyond what a study takes as a number it has no value.
+            return np.where(np.abs(value) <= MAX_NUMBER, value, np.nan)
+        return quantity
+
+    def _variable(self, name: str, forces: Forces, moving: Moving) -> Number:
+        study, configuration = self.study, forces.configuration
+        if name in study.parameters.nominal:
+            return self.poses.of(Amount(study.parameters.nominal[name], "", Expression.parse(name)), self.rows)
+        if name == TIME:
+            assert self.poses.times is not None
+            return self.poses.times[self.rows]
+        coordinate = study.mechanism.coordinate(name.removesuffix(VELOCITY))
+        if coordinate.name == name:
+            return np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=np.float64)
+        assert moving.velocity is not None
+        rate = first(configuration, coordinate, moving.velocity)
+        return np.asarray(in_study_units(study, coordinate, rate), dtype=np.float64)

@@ -1,0 +1,201 @@
+"""Efforts and forces among the outputs: columns of dynamics at poses, of the nominal mechanism and of made ones.
+
+Made mechanisms have the nominal rates of the drives. Their own masses, springs and dimensions count, and parameters
+that the loads, gravity or the sections of beams follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mechdesign.expressions import Expression, Number
+from mechdesign.mechanism import Configuration, Mechanism
+from mechdesign.mechanism.algebra import Value, Vector, quiet
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.derivatives import STALLED, Linearization, regularity
+from mechdesign.mechanism.forces import Moving
+from mechdesign.mechanism.outputs import Rates
+from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.dynamics.question import ForceQuestion
+from mechdesign.questions.dynamics.schema import column_kinds
+from mechdesign.questions.kinematics.rates import DriveRates
+from mechdesign.questions.loads import coordinates_in
+from mechdesign.questions.reliability.laws import at_rows
+from mechdesign.questions.reliability.schema.section import pace_of
+from mechdesign.study import Study
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import MotionSection
+from mechdesign.study.text.units import Amount
+
+# Prefix of the names of parameters that the numbers of dynamics follow; no name in a study has a colon.
+FOLLOWED = "dynamics:"
+# Step of the difference quotients by places and drives, in radians, sizes of the mechanism, or largest numbers of the
+# same kind. Their error is about 1e-10 of the force, over the cube of the distance from a singularity (at most 1).
+STEP = 6e-6
+
+
+def kinds_of_forces(study: Study) -> dict[str, str]:
+    """Kinds of quantity of the columns of dynamics among the outputs and limits; coordinates go before them."""
+    section, mechanism = study.reliability, study.mechanism
+    if study.dynamics is None or section is None:
+        return {}
+    kinds = column_kinds(mechanism, study.dynamics.joints(mechanism), moving=True)
+    names = dict.fromkeys([*(section.outputs or ()), *section.limits])
+    known = {*mechanism.coordinates, *mechanism.points}
+    return {name: kinds[name] for name in names if name in kinds and name not in known}
+
+
+def pace(study: Study) -> MotionSection:
+    """The section whose rates the mechanism has."""
+    assert study.reliability is not None
+    if not kinds_of_forces(study):
+        return study.reliability
+    return pace_of(study.reliability, study.dynamics, study.kinematics)
+
+
+def followed(study: Study) -> set[str]:
+    """Parameters that the numbers of dynamics follow, where forces are among the outputs."""
+    if study.dynamics is None or not kinds_of_forces(study):
+        return set()
+    names: set[str] = set()
+
+    def note(number: Amount) -> Amount:
+        names.update(number.expression.names if number.expression is not None else ())
+        return number
+
+    study.dynamics.with_numbers(note)
+    for load in study.dynamics.loads:
+        names.update(*(part.names for _, part, _ in load.numbers if isinstance(part, Expression)))
+    if study.stiffness is not None:
+        for section in study.stiffness.sections.values():
+            if section.density is not None:
+                section.with_numbers(note)
+    return {name for name in study.parameters.nominal if study.parameters.moved([name]) & names}
+
+
+@dataclass(frozen=True, eq=False)
+class ForceModel:
+    """The forces of a mechanism in motion, of designs or made mechanisms with `parameters` of their own.
+
+    Those that are `changed` themselves follow nothing. `times` are those of poses over time.
+    """
+
+    question: ForceQuestion
+    parameters: Mapping[str, Floats] = field(default_factory=dict)
+    changed: frozenset[str] = frozenset()
+    times: Floats | None = None
+
+    @property
+    def coordinates(self) -> list[Coordinate]:
+        """Coordinates that the loads follow."""
+        return coordinates_in(self.question.study, self.question.section.loads)
+
+    def take(self, rows: Sequence[int] | Ints) -> ForceModel:
+        """The model at some of many poses."""
+        parameters = {name: np.asarray(at_rows(value, rows)) for name, value in self.parameters.items()}
+        return replace(self, parameters=parameters, times=None if self.times is None else self.times[rows])
+
+    def made(self, deviations: Mapping[str, Number]) -> ForceModel:
+        """The model of made mechanisms, from deviations of parameters by their `FOLLOWED` names."""
+        if not deviations:
+            return self
+        known, parameters = self.question.study.parameters.nominal, self.question.study.parameters
+        given: dict[str, Number] = {name: self.parameters[name] for name in self.changed if name in self.parameters}
+        for key, deviation in deviations.items():
+            name = key.removeprefix(FOLLOWED)
+            given[name] = self.parameters.get(name, known[name]) + deviation
+        values = parameters.values(given)
+        moved = {name: np.asarray(values[name]) for name in parameters.moved(given)}
+        return replace(self, parameters={**self.parameters, **moved})
+
+    def values(self, names: Sequence[str], linear: Linearization, rates: DriveRates) -> list[Value]:
+        """Columns of dynamics at poses, in the study's units; nan where the drives do not hold the mechanism."""
+        moving = Moving()
+        if self.question.moves:
+            velocity = linear.velocity(rates.velocities)
+            moving = Moving(velocity, linear.acceleration(velocity, rates.accelerations))
+        nominal = self.question.study.parameters.nominal
+        poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
+        held = regularity(linear) >= STALLED
+        found = self.question.values(names, poses, linear, slice(None), moving)
+        return [np.where(held, value, np.nan) for value in found]
+
+    @quiet
+    def slopes(
+        self, names: Sequence[str], mechanism: Mechanism, configuration: Configuration, position: Rates,
+        by: Sequence[str], rates: DriveRates,
+    ) -> Floats:  # fmt: skip
+        """Derivatives of columns by places, drives and followed parameters, shape (names, by, n), at a flat batch.
+
+        They are central differences of the columns along the derivatives of the positions, `position`.
+        """
+        steps = np.array([STEP * self._scale(mechanism, name) for name in by])
+        shifts = np.stack([steps, -steps])[:, :, None]
+        moved = self.made({
+            name: shifts * _one_of(by, name) for name in by if name.startswith(FOLLOWED)
+        })  # fmt: skip
+        shifted = _shifted(mechanism, configuration, position, by, shifts)
+        values = moved.values(names, mechanism.linearize(shifted), rates)
+        whole = np.stack([np.broadcast_to(value, (2, len(by), *configuration.shape)) for value in values])
+        return np.asarray((whole[:, 0] - whole[:, 1]) / (2 * steps[:, None]))
+
+    def _scale(self, mechanism: Mechanism, name: str) -> float:
+        """What a number is measured by: a radian, the size of the mechanism, or the largest number of its kind."""
+        places, nominal = mechanism.description.places, self.question.study.parameters.nominal
+        if name.startswith(FOLLOWED):
+            return abs(nominal[name.removeprefix(FOLLOWED)]) or 1.0
+        if name in mechanism.drives:
+            kind: str = mechanism.quantity(name)
+        else:
+            kind = places[name].quantity if name in places else "length"
+        if kind == "angle":
+            return 1.0
+        if kind == "length":
+            return mechanism.size or 1.0
+        return max(abs(place.nominal) for place in places.values() if place.quantity == kind) or 1.0
+
+
+def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
+    """The model of a study, or of designs at their poses; None where no force is asked."""
+    if study.dynamics is None or not kinds_of_forces(study):
+        return None
+    question = ForceQuestion(study, study.dynamics, pace(study).rated)
+    if poses is None:
+        return ForceModel(question)
+    return ForceModel(question, poses.parameters, poses.changed, poses.times)
+
+
+def _one_of(names: Sequence[str], name: str) -> Floats:
+    """1 at one of the names, else 0, shape (names, 1)."""
+    return np.array([[float(other == name)] for other in names])
+
+
+def _shifted(
+    mechanism: Mechanism, configuration: Configuration, position: Rates, by: Collection[str], shifts: Floats
+) -> Configuration:
+    """Configurations a step along each derivative of the positions, and one back, shape (2, by, n).
+
+    Their loops are open by the square of the step, which drops out of the central difference.
+    """
+
+    def along(value: Any, slope: Vector) -> Any:
+        return value + shifts * slope if np.ndim(slope) or slope else value
+
+    nominal, own = mechanism.nominal, configuration.places
+    names = [name for name in by if name not in mechanism.drives and not name.startswith(FOLLOWED)]
+    places = {**own} | {
+        name: own.get(name, nominal.get(name, 0.0)) + shifts * _one_of([*by], name) for name in names
+    }  # fmt: skip
+    turns = [np.exp(1j * shifts * slope) if np.ndim(slope) or slope else 1.0 for slope in position.angles]
+    shape = (2, len(by), *configuration.shape)
+    return replace(
+        configuration, vectors=mechanism.geometry.vectors(places), shape=shape,
+        nodes=[along(x, slope) for x, slope in zip(configuration.nodes, position.nodes, strict=True)],
+        rotations=[u * turn for u, turn in zip(configuration.rotations, turns, strict=True)],
+        slides=[along(s, slope) for s, slope in zip(configuration.slides, position.slides, strict=True)],
+        reason=np.broadcast_to(configuration.reason, shape), places=places,
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+"""Motions over time as the study file gives them: moves by a law and dwells, or a file of times and values."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.motion_laws import LAWS
+from mechdesign.study.text import fields
+from mechdesign.study.text.document import KeyPath
+from mechdesign.study.text.fields import failure
+from mechdesign.study.text.inputs import file_of
+
+HELP_PAGE = "howto/motion_laws"
+
+# More are no study that a person reads: a file holds them.
+MAX_SEGMENTS = 10_000
+_RIGHT = "[{from: 0, to: 90, time: 0.3}, {dwell: 0.1}]"
+
+Time = Annotated[float, fields.number("time", 0.0, exclusive=True)]
+
+
+class Segment(fields.Model):
+    """Part of a motion over time: a move ``to`` a value in a ``time``, or a ``dwell``."""
+
+    one_of = ("a segment is a move, {to: 90, time: 0.3}, or a {dwell: 0.1}", "to", "dwell")
+    from_: fields.Number | None = Field(None, alias="from")
+    """Value at which the motion begins, in its first segment only. Left out: the motion is a cycle, and begins where it
+    ends. Example: 0
+    """
+    to: fields.Number | None = None
+    """Value at the end of the move, in the coordinate's unit. Example: 90"""
+    time: Time | None = None
+    """How long the move takes. Example: 0.3"""
+    law: Annotated[str, fields.choice(LAWS, "motion law")] = "polynomial345"
+    """Law of the move. Example: cycloidal"""
+    dwell: Time | None = None
+    """How long the coordinate stands still. Example: 0.1"""
+
+    @model_validator(mode="after")
+    def _whole(self) -> Segment:
+        if self.to is not None and self.time is None:
+            raise failure(f"the move to {self.to:g} needs a time: {{to: {self.to:g}, time: 0.3}}")
+        beside = [key for key in ("time", "law") if key in self.model_fields_set]
+        if self.dwell is not None and beside:
+            raise failure(f"a dwell has no {beside[0]!r}: write {{dwell: {self.dwell:g}}}")
+        return self
+
+    @property
+    def duration(self) -> float:
+        """How long it takes."""
+        duration = self.dwell if self.time is None else self.time
+        assert duration is not None
+        return duration
+
+
+def _segments(raw: Any) -> Any:
+    if isinstance(raw, list) and not raw:
+        raise failure(f"an empty motion; give its segments, {_RIGHT}")
+    if isinstance(raw, list) and len(raw) > MAX_SEGMENTS:
+        raise failure(f"{len(raw)} segments; at most {MAX_SEGMENTS} are possible, and a CSV file holds more")
+    return raw
+
+
+class Course(fields.Model):
+    """What one coordinate does over time; a list of segments, a CSV file's name or a number alone are short forms."""
+
+    short = ({"type": ["string", "number"], "title": "file or number"},)
+    one_of = ("a motion is one of segments, file, held", "segments", "file", "held")
+    segments: Annotated[tuple[Segment, ...], BeforeValidator(_segments)] | None = None
+    """Moves and dwells one after another; a list alone means this. Example: [{to: 90, time: 0.3, law: cycloidal},
+    {dwell: 0.1}, {to: 0, time: 0.4}]
+    """
+    file: str | None = None
+    """CSV file beside the study with a time and a value a line, through which a cubic spline is laid, periodic where
+    the last value is the first; time counts from the first line. Its name alone means this. Example: law.csv
+    """
+    held: fields.Number | None = None
+    """Value that it keeps; a number alone means this. Example: 30"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _long_form(cls, raw: Any) -> Any:
+        if isinstance(raw, dict) and not raw.keys().isdisjoint(("to", "dwell")):
+            raise failure(f"segments of a motion stand in a list, {_RIGHT}")
+        if isinstance(raw, dict | Course):
+            return raw
+        return {"segments" if isinstance(raw, list) else "file" if file_of(raw) is not None else "held": raw}
+
+    @model_validator(mode="after")
+    def _begins(self) -> Course:
+        if self.segments is None:
+            return self
+        for number, segment in enumerate(self.segments[1:], start=2):
+            if segment.from_ is not None:
+                raise failure(f"segment {number} begins where the one before it ends: 'from' is for the first one")
+        moves = [segment.to for segment in self.segments if segment.to is not None]
+        if self.segments[0].from_ is None and len(moves) < 2:
+            raise failure(
+                "without 'from' a motion is a cycle that begins where it ends, and so needs two moves or more, "
+                f"[{{to: 90, time: 0.3}}, {{to: 0, time: 0.4}}]; else say where it begins, {_RIGHT}"
+            )
+        return self
+
+    def checked(self, checker: Checker, name: str, path: KeyPath) -> None:
+        """Check the name of the coordinate, and the units of its values."""
+        quantity = checker.coordinate(name, path, at_key=True)
+        if quantity not in ("length", "angle"):
+            return
+        if self.held is not None:
+            checker.kind((*path, "held"), quantity)
+        for index in range(len(self.segments or ())):
+            for key in ("from", "to"):
+                checker.kind((*path, "segments", index, key), quantity)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        forms = super().__get_pydantic_json_schema__(schema, handler)["anyOf"]
+        segments = forms[0]["properties"]["segments"]["anyOf"][0]
+        return {"anyOf": [forms[0], segments, *forms[1:]]}

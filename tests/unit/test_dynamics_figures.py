@@ -1,0 +1,99 @@
+"""Pictures of dynamics: what is drawn of a motion's forces, and what acts on each link."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.gallery import study_named
+from helpers.pages import faults
+
+import mechdesign
+from mechdesign.questions.dynamics.analysis import DrawnForces
+from mechdesign.questions.dynamics.free_bodies import actions
+from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
+
+SPRUNG = """
+units: {length: mm}
+mechanism:
+  links:
+    ground: {O: [0, 0], D: [100, 0], S: [60, 90], T: [-30, 60], U: [150, 60]}
+    crank: {from: O, to: A, length: 40, mass: 1, inertia: 10}
+    rod: {from: A, to: B, length: 90, points: {P: [45, 30]}, mass: 1.5, inertia: 100}
+    rocker: [D, B, 60]
+  drives: {theta: {angle: crank}}
+  sketch: {A: [0, 40], B: [85, 55]}
+  springs:
+    coil: {between: [S, B], stiffness: 2, free_length: 60}
+    gas: {between: [T, A], force: 40}
+    strut: {between: [U, rod.P], damping: 0.1, stiffness: 1, free_length: 50}
+    spiral: {between: [ground, rocker], stiffness: 3 N*m/rad, free_angle: 20 deg}
+dynamics:
+  sweep: {theta: {from: 0, to: 360, step: 10}}
+  rates: {theta: 60 rpm}
+  gravity: [0, -9.81 m/s^2]
+  loads: [{at: P, force: [0, -100]}, {link: rocker, moment: 500}, {between: [A, D], force: 7}]
+"""
+
+
+def drawn(study: mechdesign.Study) -> dict[str, object]:
+    """Pictures of a study's dynamics by their names."""
+    with style.context():
+        gallery = figures(study, mechdesign.dynamics(study))
+        assert not gallery.failed
+        for figure in gallery.values():
+            style.encoded(figure)
+            assert not list(faults(figure))
+    return dict(gallery)
+
+
+@pytest.mark.parametrize("text", [SPRUNG, "flywheel_press", "excavator_lift", "twin_cylinder"])
+def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
+    study = mechdesign.load(text=text) if ":" in text else study_named(text)
+    record = DrawnForces.of(mechdesign.dynamics(study))
+    for index in (0, 7, 19):
+        acting = actions(record.motion, record.shown, index)
+        links = {action.link for action in acting} - {"ground", ""}
+        assert links == set(study.mechanism.description.links) - {"ground"}
+        largest = max(action.size for action in acting)
+        for link in links:
+            own = [action for action in acting if action.link == link]
+            assert abs(sum(action.force for action in own)) < 1e-11 * largest
+            moments = [action.moment + (action.place.conjugate() * action.force).imag for action in own]
+            assert abs(sum(moments)) < 1e-11 * largest * study.mechanism.size
+
+
+def test_every_picture_of_a_motion_is_drawn_and_laid_out() -> None:
+    names = set(drawn(mechdesign.load(text=SPRUNG)))
+    assert names == {"free_bodies", "efforts", "joint_forces", "bearings", "shaking", "energies"}
+
+
+def test_what_is_nothing_is_not_drawn() -> None:
+    assert set(drawn(study_named("balanced_arm"))) == {"free_bodies", "joint_forces", "bearings"}
+
+
+def test_listed_poses_have_free_bodies_alone() -> None:
+    study = mechdesign.load(
+        text=SPRUNG.replace("sweep: {theta: {from: 0, to: 360, step: 10}}", "poses: [{theta: 30}, {theta: 80}]")
+    )
+    assert set(drawn(study)) == {"free_bodies"}
+
+
+def test_efforts_mark_the_peak_between_the_rows() -> None:
+    figure = drawn(study_named("flywheel_press"))["efforts"]
+    effort = figure.axes[0]
+    place, value = np.array(effort.lines[2].get_xydata())[0]
+    assert (place, value) == pytest.approx((244.423, 7570.88), rel=1e-5)
+    assert "peak 7571" in effort.get_title("left")
+    assert "mean 119" in effort.get_title("left")
+
+
+def test_bearing_forces_in_the_frame_turn_with_the_link() -> None:
+    study = study_named("twin_cylinder")
+    frame, link = drawn(study)["bearings"].axes[:2]
+    # The crank's pin: the force turns with the crank in the frame, and hardly in the crank.
+    way, own = (np.array(axes.lines[2].get_xydata()) @ [1, 1j] for axes in (frame, link))
+    crank = np.exp(1j * np.radians(np.arange(0, 361, 3)))
+    assert own == pytest.approx(way / crank, abs=1e-9 * np.abs(way).max())
+    assert np.ptp(np.unwrap(np.angle(way))) > 6
+    assert np.ptp(np.angle(own)) < 0.5
