@@ -17,6 +17,8 @@ SHARED = 2.0
 LOOSE = 0.15
 # Letters of a number along an axis.
 MOST_DIGITS = 8
+# Of an axis: a curve that varies, but over less than this, is read as constant.
+FLAT = 0.02
 
 
 def texts(figure: Figure) -> Iterator[tuple[str, Bbox, float]]:
@@ -59,6 +61,22 @@ def faults(figure: Figure) -> Iterator[str]:
         labels = axes.get_xlabel(), axes.get_ylabel()
         if _place(labels) and axes.get_aspect() != 1.0 and not any("times larger" in words for words, _, _ in found):
             yield f"unequal axes of a place: {' and '.join(labels)}"
+
+
+def lost_curves(figure: Figure) -> Iterator[str]:
+    """Curves of a legend that vary over too little of their axis to be read, and those that a later one covers."""
+    for axes in figure.axes:
+        curves = [line for line in axes.get_lines() if not line.get_label().startswith("_")]  # type: ignore[attr-defined]
+        low, high = axes.get_ybound()
+        for k, curve in enumerate(curves):
+            y = np.asarray(curve.get_ydata(), dtype=float)
+            reach = float(np.nanmax(y) - np.nanmin(y))
+            if axes.get_yscale() == "linear" and 1e-9 * (high - low) < reach < FLAT * (high - low):
+                yield f"{curve.get_label()!r} is flat along {axes.get_ylabel()!r}"
+            for other in curves[k + 1 :]:
+                alike = np.array_equal(curve.get_xydata(), other.get_xydata(), equal_nan=True)
+                if alike and other.get_linestyle() == "-" and other.get_linewidth() >= curve.get_linewidth():
+                    yield f"{other.get_label()!r} covers {curve.get_label()!r}"
 
 
 def _lost_digits(axes: Axes) -> Iterator[str]:

@@ -72,3 +72,17 @@ def test_the_pose_that_fails_most_is_drawn_beside_the_sketch():
     with style.context():
         titles = [axes.get_title(loc="left") for axes in mechanism_figure(study, result).axes]
     assert any("the pose that fails most" in title and f"{worst:g}" in title for title in titles)
+
+
+def test_slides_alone_have_no_dimensions_and_are_drawn_all_the_same():
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, carriage: {A: [0, 0]}, tool: {T: [0, 0]}}
+  joints: {feed: {prismatic: [ground, carriage]}, cross: {prismatic: [carriage, tool], direction: 90}}
+  drives: {x: {slide: feed}, y: {slide: cross}}
+""")
+    with style.context():
+        figure = dimensions_figure(study)
+        style.encoded(figure)
+        assert not list(faults(figure))
+        assert not figure.texts

@@ -68,7 +68,7 @@ def test_the_best_design_is_marked_and_drawn_with_its_own_dimensions() -> None:
     marks = [line.get_xydata()[0].tolist() for line in found["CPI"].axes[0].lines]
     assert [a, b] in marks
     title = found["optimum"].texts[0].get_text()
-    assert f"a = {a:.4g}, b = {b:.4g}" in title
+    assert f"a = {a:.4g} mm, b = {b:.4g} mm" in title
     outline = np.concatenate(
         [line.get_xydata() for line in found["optimum"].axes[0].lines if len(line.get_xydata()) > 9]
     )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
-from helpers.pages import faults
+from helpers.pages import faults, lost_curves
 from helpers.studies import study_of
 
 import mechdesign
@@ -93,6 +94,30 @@ matrix:
     mechanism.parameters.c: [59, 61]
 """
 )
+TIPS = [f"P{k}" for k in range(22)]
+PLACES = ", ".join(f"{tip}: [{3 * k}, {2 * k - 21}]" for k, tip in enumerate(TIPS))
+CURVES = f"""
+units: {{length: mm}}
+mechanism:
+  links:
+    ground: {{O: [0, 0]}}
+    crank: {{from: O, to: A, length: 30, points: {{{PLACES}}}}}
+  drives: [crank]
+  sketch: {{A: [0, 30]}}
+kinematics: {{sweep: {{crank: {{from: 0, to: 360, step: 15}}}}, outputs: [crank.angle, A, {", ".join(TIPS)}]}}
+"""
+LOADS = (
+    FOUR_BAR
+    + """
+stiffness:
+  at: B
+  loads: [[100, 0], [1, 0], [0, -20]]
+  sections: {bar: {E: 70 GPa, diameter: 8}}
+  elastic: {rod: bar, rocker: bar}
+  actuators: {crank: 1e6 N*mm/rad}
+  poses: [{crank: 60}]
+"""
+)
 
 
 @cache
@@ -127,3 +152,28 @@ def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expec
             wrong[name] = [*faults(figure)]
             assert figure.get_figheight() <= style.tallest() + 0.05, name
     assert not any(wrong.values()), wrong
+
+
+@pytest.mark.slow
+def test_every_one_of_45_motion_curves_can_be_read() -> None:
+    given, result = answered("kinematics", CURVES)
+    with style.context():
+        figure = figures(given, result)["motion"]
+        style.encoded(figure)
+        curves = {line.get_label() for axes in figure.axes for line in axes.get_lines()}
+        assert len({f"{tip}.{axis}" for tip in TIPS for axis in "xy"} & curves) == 44
+        assert not [*faults(figure), *lost_curves(figure)]
+
+
+@pytest.mark.slow
+def test_deflections_under_all_loads_have_one_magnification() -> None:
+    given, result = answered("stiffness", LOADS)
+    moves = result.tables["deflections"]
+    with style.context():
+        figure = figures(given, result)["deflections"]
+        style.encoded(figure)
+    ways = [next(line.get_xydata() for line in axes.get_lines() if line.get_linestyle() == ":") for axes in figure.axes]
+    drawn = [float(np.hypot(*(way[1] - way[0]))) for way in ways]
+    real = np.hypot(moves["dx"], moves["dy"])
+    assert np.allclose(drawn / real, drawn[0] / real[0], rtol=1e-9)
+    assert not [*faults(figure)]

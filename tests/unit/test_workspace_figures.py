@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 from matplotlib.collections import LineCollection
+from matplotlib.text import Text
 
 import mechdesign
 from mechdesign.questions.workspace.figures.boundary import inscribed_figure
@@ -212,3 +213,19 @@ def test_ellipses_of_a_boom_are_radial_and_tangential() -> None:
             across = (abs(place) / 100) ** (1 - 2 * kind)
             assert np.abs(around.real).max() == pytest.approx(of_one, rel=2e-3)
             assert np.abs(around.imag).max() == pytest.approx(of_one * across, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_an_index_that_is_the_same_everywhere_is_a_number_and_no_bar_of_colours() -> None:
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0]}, carriage: {A: [0, 0]}, tool: {T: [0, 0]}}
+  joints: {feed: {prismatic: [ground, carriage]}, cross: {prismatic: [carriage, tool], direction: 90}}
+  drives: {x: {slide: feed}, y: {slide: cross}}
+  limits: [{drive: x, min: 0, max: 200}, {drive: y, min: 0, max: 100}]
+workspace: {point: T, scan: {about: [100, 50], rays: 31}, indices: inverse_condition}
+""")
+    with style.context():
+        page = figures(study, mechdesign.workspace(study))["inverse_condition"]
+    assert len(page.axes) == 1
+    assert "1 everywhere" in " ".join(text.get_text() for text in page.findobj(Text)).replace("\n", " ")

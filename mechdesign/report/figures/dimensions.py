@@ -54,7 +54,7 @@ def dimensions_figure(study: Study) -> Figure:
     assert scene is not None
     figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=_TITLE, pad=0.75)
     axes.grid(visible=False)
-    axes.set_title(f"dimensions{f' in {unit}' if unit else ''}, in the sketch pose", loc="left")
+    axes.set_title(f"Dimensions{f' in {unit}' if unit else ''}, in the sketch pose", loc="left")
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False)
     net = covered(axes)
     boxes: list[Floats] = []
@@ -197,7 +197,10 @@ def _over(box: Floats, other: Floats) -> bool:
 
 
 def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
-    """Link, its points, length, tolerance and section; then what else varies. Without columns that hold nothing."""
+    """Link, its points, length, tolerance and section; then what else varies. Without columns that hold nothing.
+
+    No rows at all of a mechanism without dimensions.
+    """
     tolerances = dict(study.reliability.dimensions) if study.reliability is not None else {}
     rows: list[tuple[str, ...]] = [("link", "between", "length", "tolerance", "section")]
     described: set[str] = set()
@@ -216,7 +219,7 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
     rows += [(name, "", _nominal(study, name), _tolerance(given, study.sizes.get(name, 0.0), _unit(study, name)), "")
              for name, given in tolerances.items()]  # fmt: skip
     kept = [k for k in range(5) if any(row[k] for row in rows[1:])]
-    return [tuple(row[k] for k in kept) for row in rows]
+    return [tuple(row[k] for k in kept) for row in rows] if kept else []
 
 
 def _guides(scene: Scene) -> Iterator[tuple[str, ...]]:
@@ -268,6 +271,8 @@ def _size(profile: Profile) -> str:
 def _table(figure: Figure, study: Study, scene: Scene) -> None:
     """The rows below the drawing, for which the page is made higher."""
     rows = table_rows(study, scene)
+    if not rows:
+        return
     height = _ROW * len(rows) + _ABOVE
     style.grow(figure, below=height)
     widths = [max(2 * float(_half(row[k])[0]) / 72 for row in rows) for k in range(len(rows[0]))]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -31,7 +30,6 @@ SKETCH_POSE = "sketch pose"
 _POSES = 100  # poses from which the range of the motion is taken
 _TITLE = 0.42  # inches
 _TITLE_LINE = 0.18  # inches, a further line of a title
-_LETTERS_AN_INCH = 11.5
 _MAX_HEIGHT = 4.2  # inches, of a panel
 _MAX_STACKED_HEIGHT = 3.0  # inches, of a panel below another
 _ALIKE = 0.02  # part of the mechanism's size by which the points of two poses differ that need not both be drawn
@@ -97,9 +95,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     if not np.isfinite(failure).any():
         return None
     row = int(np.nanargmax(failure)) if drawn.samples is None else drawn.samples.pose
-    # A line may be broken between coordinates only.
-    words = followed_in_words(study, poses, row).replace(" = ", "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}")
-    return words, solve_rows(study, poses, np.array([row]))
+    return followed_in_words(study, poses, row), solve_rows(study, poses, np.array([row]))
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -141,7 +137,7 @@ def _compose(study: Study, panels: list[Panel], travel: Travel, masses: bool = F
     count = len(panels)
     beside, stacked = fit(places, *_room(count, 1)), fit(places, *_room(1, count))
     columns, window = (count, beside) if beside.scale >= 0.55 * stacked.scale else (1, stacked)
-    titles = [textwrap.fill(title, int(window.width * _LETTERS_AN_INCH)) for title, _, _ in panels]
+    titles = [style.folded(title, 11.0, window.width) for title, _, _ in panels]
     above = _TITLE + _TITLE_LINE * max(title.count("\n") for title in titles)
     figure, grid = windows(window, study.units.label("length"), count, columns, above=above)
     for axes, title, (_, configuration, index) in zip(grid, titles, panels, strict=True):

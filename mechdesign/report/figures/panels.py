@@ -62,6 +62,11 @@ class Along(NamedTuple):
     values: Floats
     label: str
     name: str = ""
+    unit: str = ""
+
+    def value(self, at: float) -> str:
+        """One of its values with four digits and its unit."""
+        return f"{at:.4g} {style.printed(self.unit)}".rstrip()
 
 
 def along(study: Study, poses: Poses) -> Along | None:
@@ -79,7 +84,8 @@ def abscissa(study: Study, poses: Poses, speed: float | None = None) -> Along:
     moving = moving_names(poses)
     if len(moving) != 1 or np.ptp(np.sign(np.diff(poses.values[moving[0]]))):
         return Along(poses.numbers + 1, "pose along the path")
-    return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0])
+    unit = study.units.label(study.mechanism.quantity(moving[0]))
+    return Along(poses.values[moving[0]], coordinate_label(study, moving[0]), moving[0], unit)
 
 
 def times(poses: Poses, rows: Floats, speed: float) -> Floats:
@@ -275,9 +281,14 @@ def map_sheet(
     title(figure, heading, note, left=_MAP_LEFT)
     patches = [patch.rays for _, sectors in maps for patch in sectors.patches]
     scales = [_levels(over, values, patches, logarithmic) for _, values in parts]
+    ends = [(float(np.nanmin(values)), float(np.nanmax(values))) for _, values in parts]
     for axes, (words, sectors, part) in zip(grid, panels, strict=True):
         bar = axes.inset_axes((1 + 0.12 / wide, 0, 0.14 / wide, 1))
         _map(figure, axes, bar, over, sectors, parts[part][1], scales[part], logarithmic)
+        low, high = ends[part]
+        if style.constant(low, high):
+            words += f": {number(low)} everywhere"
+            bar.set_visible(False)
         axes.set_title(words, loc="left", fontsize=9.5)
         axes.set_xlabel(coordinate_label(study, over.names[0]))
         axes.set_ylabel(coordinate_label(study, over.names[1]))

@@ -144,7 +144,7 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         slider = None if isinstance(joint, Slot) else joint.slider
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
     drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])
-    span = max(float(np.ptp(drawn.real)), float(np.ptp(drawn.imag)), 1e-12)
+    span = max(float(np.ptp(drawn.real)), float(np.ptp(drawn.imag))) or 1.0  # of slides alone one unit of length
     return Scene(description, points, rotations, tuple(guides), span)
 
 

@@ -244,9 +244,14 @@ def color_bar(figure: Figure, drawn: ScalarMappable, label: str = "", **options:
     return bar
 
 
+def constant(low: float, high: float) -> bool:
+    """Whether a range is a single value but for rounding: a map of it would be one colour."""
+    return math.isfinite(high - low) and high - low <= 1e-9 * max(abs(low), abs(high))
+
+
 def levels(low: float, high: float, number: int) -> Floats:
     """About `number` levels at round numbers over a range; around the value where the range is a single one."""
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
+    if constant(low, high):
         low, high = low - 0.5 * max(abs(low), 1e-12), high + 0.5 * max(abs(high), 1e-12)
     return np.asarray(MaxNLocator(nbins=number, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
 

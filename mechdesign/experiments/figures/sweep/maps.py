@@ -38,6 +38,7 @@ LEVELS = 9
 _AROUND = 0.5  # part of the range where requirements are met that has levels beyond it
 # Inches of a row of maps, of one by itself, and of title and legend.
 _TALL, _ALONE, _HEAD = 2.9, 4.4, 0.9
+_BETWEEN = 0.05  # of the page, between a bar of colours and the next map's axis
 _BESIDE = 1.6  # inches beside a map: its axis and the bar of colours
 # Over what is not met; the lines are darker than every colour below the veil.
 _VEIL, _HATCH = [(1.0, 1.0, 1.0, 0.6)], "#555555"
@@ -78,10 +79,14 @@ def response(view: CasesView) -> Figure | None:
         norm = _norm(fields, number.values[met])
         for axes, plane, field in zip(panels[k :: len(taken)], planes, fields, strict=True):
             _map(axes, plane, field, norm)
-            style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), ax=axes, pad=0.02)
+            bar = style.color_bar(figure, ScalarMappable(norm, style.COLORMAP), ax=axes, pad=0.02)
             rest = [entry.name for entry in entries if entry not in (plane.x, plane.y)]
             over = f", {word} over {', '.join(rest) if len(rest) <= _MOST_OTHERS else f'{len(rest)} entries'}"
             name = style.axis_label(number.name, number.unit) + (over if rest else "")
+            low, high = (float(end(fields)) for end in (np.nanmin, np.nanmax))
+            if style.constant(low, high):
+                name += f": {number_text(low)} everywhere"
+                bar.ax.set_visible(False)
             axes.set_title(style.folded(name, NAME, _room(panels)), loc="left", fontsize=NAME)
     for k, axes in enumerate(panels):
         plane = planes[k // len(taken)]
@@ -106,6 +111,7 @@ def response(view: CasesView) -> Figure | None:
     columns = 1 if style.narrow() else 2
     labels = [style.folded(str(key.get_label()), NAME, style.width() / columns - 0.4) for key in keys]
     figure.legend(keys, labels, loc="outside lower left", ncols=columns)
+    figure.set_layout_engine("constrained", wspace=_BETWEEN)
     return figure
 
 
@@ -139,10 +145,8 @@ def _norm(fields: Sequence[Floats], met: Floats) -> BoundaryNorm:
 def _map(axes: Axes, plane: Plane, field: Floats, norm: BoundaryNorm) -> None:
     axes.grid(visible=False)
     levels = np.asarray(norm.boundaries)
-    axes.contourf(*plane.fine, field, levels=levels, cmap=style.COLORMAP, norm=norm, extend=norm.extend)
     between = levels[(levels > np.nanmin(field)) & (levels < np.nanmax(field))]
-    if len(between):
-        axes.contour(*plane.fine, field, levels=between, colors="white", linewidths=0.5, linestyles="solid", alpha=0.7)
+    style.filled(axes, [(*np.meshgrid(*plane.fine), np.ma.masked_invalid(field))], norm, between)
 
 
 def _draw_gates(axes: Axes, plane: Plane, gates: Gates) -> None:

@@ -171,7 +171,7 @@ def _title(each: SpecialPose, rates: bool, letters: int) -> str:
 
 
 def _heading(chosen: SpecialPoses, *, listed: bool) -> str:
-    heading = "poses asked for" if listed else "poses spread evenly over the motion"
+    heading = "Poses asked for" if listed else "Poses spread evenly over the motion"
     if chosen.special:
         ends = [each.what.startswith(LIMIT) for each in chosen.shown if each.what]
         singular = [each.what.startswith(SINGULAR) for each in chosen.shown if each.what]

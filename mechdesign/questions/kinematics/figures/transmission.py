@@ -78,7 +78,7 @@ def transmission_figure(view: MotionView) -> Figure | None:
         notes.append(f"the {MOST_LOOPS} of {len(loops)} loops that come nearest to a straight line")
     if len(asked) > len(names):
         notes.append(f"{len(names)} of {len(asked)} mechanical advantages")
-    heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names))
+    heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names)).capitalize()
     loops = sorted(loops, key=lambda each: _off(each.worst))[:MOST_LOOPS]
     labels = [GOOD_WORDS, *map(_label, loops)] if loops else []
     rows = -(-(len(labels) + 1) // fitting(labels)) if labels else 0  # with the worst of them
@@ -146,7 +146,7 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
     for loop, (color, dashes) in zip(loops, _LOOKS, strict=False):
         axis.plot(x, loop.angle, color=color, linestyle=dashes, linewidth=1.8, label=_label(loop))
     worst = loops[0]
-    words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {worst.at:.4g}" if over.name else "")
+    words = f"worst: {worst.worst:.4g} deg" + (f" at {over.name} = {over.value(worst.at)}" if over.name else "")
     color = style.INK if GOOD[0] <= worst.worst <= GOOD[1] else style.VERMILION
     axis.plot([worst.at], [worst.worst], "o", color=color, markersize=7, zorder=5, clip_on=False, label=words)
     axis.set_ylim(0, 180)
@@ -175,7 +175,7 @@ def _draw_advantage(axis: Axes, over: Along, values: Floats, toggles: Floats) ->
     for place in places:
         axis.axvline(place, color=style.VERMILION, linestyle=(0, (6, 3)), linewidth=1.2)
         right = place > float(np.mean([x.min(), x.max()]))
-        axis.annotate(f"beyond bounds at {place:.4g}", (place, 0.96), xycoords=axis.get_xaxis_transform(),
+        axis.annotate(f"beyond bounds at {over.value(place)}", (place, 0.96), xycoords=axis.get_xaxis_transform(),
                       xytext=(-5 if right else 5, 0), textcoords="offset points", ha="right" if right else "left",
                       va="top", fontsize=9, color=style.VERMILION,
                       path_effects=[withStroke(linewidth=2.5, foreground="white")])  # fmt: skip

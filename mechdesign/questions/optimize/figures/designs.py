@@ -32,9 +32,10 @@ def label(designs: Designs, name: str) -> str:
     return style.axis_label(name, designs.unit_of(name))
 
 
-def listed(design: Design) -> str:
-    """``l_a = 1, section = tube``."""
-    return ", ".join(f"{name} = {value_text(value)}" for name, value in design.items())
+def listed(designs: Designs, design: Design) -> list[str]:
+    """``l_a = 1 mm`` for each variable of a design."""
+    return [f"{name} = {value_text(value)} {style.printed(designs.unit_of(name))}".rstrip()
+            for name, value in design.items()]  # fmt: skip
 
 
 def value_text(value: float | str) -> str:

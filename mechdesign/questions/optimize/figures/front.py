@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mechdesign.questions.optimize.figures.designs import FEW, legend, sheet, value_text
+from mechdesign.questions.optimize.figures.designs import FEW, legend, listed, sheet
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.goals import Goal
 from mechdesign.questions.optimize.judge import Designs
@@ -70,7 +70,7 @@ def _front(axes: Axes, designs: Designs, front: Table, pair: tuple[int, int]) ->
               label="front: no other is better in every goal")  # fmt: skip
     for (name, row), marker in zip(marked(designs, front), _FRONT_MARKS, strict=False):
         knee = name == "knee"
-        words = ", ".join(_values(designs, front, row))
+        words = ", ".join(listed(designs, chosen(designs, front, row)))
         axes.plot(along[row], up[row], "*" if knee else marker, color=style.VERMILION, markeredgecolor="white",
                   markersize=15 if knee else 9, linestyle="none", label=f"{name}, {words}", zorder=5,
                   clip_on=False)  # fmt: skip
@@ -128,13 +128,7 @@ def chosen(designs: Designs, front: Table, row: int) -> dict[str, float | str]:
 
 def described(designs: Designs, front: Table, name: str, row: int) -> str:
     """Lines that name a design of a front, its variables and its goals; none is broken at a space."""
-    lines = _values(designs, front, row)
+    lines = listed(designs, chosen(designs, front, row))
     lines += [f"{goal.column} = {front[goal.name][row]:.3g} {style.printed(designs.unit_of(goal.name))}"
               for goal in designs.goals]  # fmt: skip
     return "\n".join([name, *(line.strip().replace(" ", "\N{NO-BREAK SPACE}") for line in lines)])
-
-
-def _values(designs: Designs, front: Table, row: int) -> list[str]:
-    """``l_a = 1 mm`` for each variable of a design of a front."""
-    return [f"{name} = {value_text(value)} {style.printed(designs.unit_of(name))}".rstrip()
-            for name, value in chosen(designs, front, row).items()]  # fmt: skip

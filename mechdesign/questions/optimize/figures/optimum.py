@@ -34,7 +34,6 @@ from mechdesign.study import Study
 
 # Angles at which the outline of a contained shape is drawn.
 _OUTLINE = np.linspace(0.0, 2 * np.pi, 1441)
-_UNBROKEN_EQUALS = "\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}"
 # Inches.
 _HEIGHT = 5.0
 _TITLE = 0.42
@@ -88,14 +87,14 @@ def design_figure(study: Study, motion: Result, words: str) -> Figure:
     """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
     sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
     shown = reached(table)
-    title = textwrap.fill(words, int((style.width() - LEFT) * _LETTERS_AN_INCH))
+    title = style.folded(words, 11.0, style.width() - LEFT)
     above = _TITLE + _TITLE_LINE * title.count("\n")
     if sweep.poses.motion:
         figure = paths_figure(sweep, above=above)
     else:
         worst = _worst(shown, sweep.valid)
         title += f", drawn at {'the worst pose, ' if shown else ''}{sweep.words(worst)}"
-        title = textwrap.fill(title.replace("\n", " "), int((style.width() - LEFT) * _LETTERS_AN_INCH))
+        title = style.folded(title.replace("\n", " "), 11.0, style.width() - LEFT)
         above = _TITLE + _TITLE_LINE * title.count("\n")
         figure = _posed(sweep, worst, _wanted(table, shown), above)
     axes = figure.axes[0]
@@ -266,7 +265,7 @@ def optimum_figure(view: DesignsView) -> Figure:
             for axes, (_, own) in zip(figure.axes, parts, strict=True):
                 _draw_contained(axes, own)
             return figure
-    best, words = drawn.best, listed(designs.design(designs.best))
+    best, words = drawn.best, ", ".join(listed(designs, designs.design(designs.best)))
     if best.region is not None:
         region = regions(best.study, best.region)[0]
         there = f", at {region.title}" if region.title else ""
@@ -275,8 +274,7 @@ def optimum_figure(view: DesignsView) -> Figure:
         figure = workspace_figure(best.study, DrawnRegion.of(best.region), region, title)
         _draw_contained(figure.axes[0], best)
         return figure
-    # A title may be broken between variables only.
-    words = f"The best design, {words}".replace(" = ", _UNBROKEN_EQUALS)
+    words = f"The best design, {words}"
     if best.motion is not None:
         return design_figure(best.study, best.motion, words)
     return sketch_and_first_pose(best.study, best.shown, words)

@@ -114,7 +114,7 @@ def score_curves(designs: Designs, front: Table | None = None) -> Figure:
             axes.plot(column[best], designs.share(k)[best], color=color, linestyle=dashes,
                       label=f"{designs.goals[k].name}, normalised")  # fmt: skip
         axes.plot(column[winner], score[winner], "o", color=style.VERMILION, markersize=6.5, label="best", zorder=4)
-        words = f"best: {listed({name: designs.design(winner)[name]})}"
+        words = f"best: {listed(designs, {name: designs.design(winner)[name]})[0]}"
         axes.set_title(words, loc="right", fontsize=9, color=style.VERMILION)
         axes.set_xlabel(label(designs, name))
         axes.set_ylabel("" if number % across else "index" if many and count == 1 else folded(score_label))

@@ -76,7 +76,7 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
     figure, panels = _panels(
         study, places, len(loads), f"deflections, drawn {scale:g} times as large, at {where}", lines=2
     )
-    length = style.printed(study.units.label("length"))
+    name, length = asked.section.at, study.units.label("length")
     for k, (axes, lines, load) in enumerate(zip(panels, bent, loads.tolist(), strict=True)):
         axes.locator_params(axis="x", nbins=_MAX_TICKS)
         draw_mechanism(axes, study.mechanism, drawn.configuration, faint=True, size=_symbol_size(len(panels)))
@@ -91,12 +91,13 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
         if load[2:] and load[2]:
             sweep = np.copysign(1.5 * np.pi, load[2])
             draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
-        size, name = abs(shapes[0][1][0, k]), asked.section.at
-        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {size:.3g} {length}",
+        size = abs(shapes[0][1][0, k])
+        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {quantity(float(size), length)}",
                        loc="left", fontsize=9)  # fmt: skip
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
                                            (style.VERMILION, 1.8, "load"))]  # fmt: skip
+    handles.append(Line2D([], [], color=style.BLUE, linestyle=":", marker="o", label=f"{name} and its way"))
     legend_at_left(figure, handles, len(handles))
     return figure
 

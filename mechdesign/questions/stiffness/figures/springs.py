@@ -43,7 +43,7 @@ def springs_figure(view: StiffnessView) -> Figure | None:
     if scene is None or not coils:
         return None
     places = np.concatenate([[*scene.points.values()], *([coil.place, coil.anchor] for coil in coils)])
-    figure, axes = posed(study, poses, drawn, places, "equivalent springs", labels=False, drives=False)
+    figure, axes = posed(study, poses, drawn, places, "Equivalent springs", labels=False, drives=False)
     draw_coils(axes, coils)
     place_labels(axes, [coil.label for coil in coils] + point_labels(scene), covered(axes), order=8)
     return figure

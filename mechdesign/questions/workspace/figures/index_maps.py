@@ -14,7 +14,7 @@ from matplotlib.patheffects import withStroke
 
 from mechdesign.indices import INDEX_NAMES
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.workspace.figures.regions import Region, grids, left_out, sheet, some
+from mechdesign.questions.workspace.figures.regions import Region, fill, grids, left_out, sheet, some
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import paper
@@ -70,7 +70,15 @@ def _index_map(study: Study, regions: Sequence[Region], column: str, cut: str) -
         titles = [f"{words}\nin parts of {quantity(part, index.unit)}".strip()
                   for words, part in zip(titles, parts, strict=True)]  # fmt: skip
         shown = [[(x, y, z / part) for x, y, z in patches] for patches, part in zip(shown, parts, strict=True)]
-    norm = _norm([patch for patches in shown for patch in patches])
+    every = [patch for patches in shown for patch in patches]
+    low, _, top = _ends(every)
+    if parts is None and style.constant(low, top):
+        page = sheet(study, places, titles, f"{title}; {quantity(low, index.unit).strip()} everywhere", bar=False)
+        for axes, region in zip(page.axes, regions, strict=True):
+            fill(axes, region.local)
+        page.ends(regions)
+        return page.figure
+    norm = _norm(every)
     page = sheet(study, places, titles, title, bar=True)
     for axes, patches in zip(page.axes, shown, strict=True):
         contours(axes, patches, norm, labels=len(regions) == 1)
