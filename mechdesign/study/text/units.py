@@ -59,7 +59,7 @@ A mass is a force over an acceleration; what has mass in it is told in the study
 
 _PER_RADIAN = frozenset(name for name in KINDS if name.endswith(("stiffness", "compliance", "damping")))
 
-_FACTOR = r"\(?[A-Za-zµμ°]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
+_FACTOR = r"\(?(?![eE]\d)[A-Za-zµμ°]+(?:\d|\s*(?:\^|\*\*)\s*-?\d)?\)?"
 QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*"
     rf"(?P<unit>(?:1\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)\s*"
