@@ -329,3 +329,11 @@ for word; do case $word in --print-to-pdf=*) printf '%%PDF-1.4 (D:20261127101010
     done = invoke("run", "slider.yaml", "--report", "pdf", "--no-plots")
     assert done.exit_code == 4
     assert "did not print it: no display" in done.stderr
+
+
+def test_a_study_whose_tables_are_all_wide_has_a_report(folder, invoke):
+    weighed = "mechanism.links.slider={points: {B: [0, 0]}, mass: 2}"
+    moving = "dynamics={rates: {theta: 60 rpm}}"
+    done = invoke("dynamics", "slider.yaml", "--no-plots", "--report", "--set", weighed, "--set", moving)
+    assert done.exit_code == 0, done.output
+    assert "largest joint force" in next(folder.rglob("report.html")).read_text(encoding="utf-8")

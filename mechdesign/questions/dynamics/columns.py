@@ -37,7 +37,7 @@ EXTREMES = TableKind.of("extremes", f"extremes and means of efforts, forces and 
     ("unit", "unit of its numbers"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
-    KeyNumber(DYNAMICS, "<drive>_power", "peak power of {name}", "size"),
+    KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),
     KeyNumber(DYNAMICS, "shaking_moment", "largest shaking moment", "size"),
-    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest", by=("joint",)),
+    KeyNumber(JOINT_FORCES, "magnitude", "largest joint force, at {joint}", "largest"),
 )  # fmt: skip
