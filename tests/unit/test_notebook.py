@@ -229,7 +229,7 @@ def test_one_picture_by_its_name_whatever_the_settings() -> None:
     assert figure is not usual
     assert shown == usual._repr_png_()
     assert shown.startswith(PNG)
-    assert result._repr_png_() == result.figure("motion")._repr_png_()
+    assert result._repr_png_() == result.figure("paths")._repr_png_()
     with pytest.raises(mechdesign.StudyError, match=r"'path'; did you mean 'paths'\?; there are paths, motion, poses"):
         result.figure("path")
 
