@@ -18,6 +18,7 @@ from mechdesign.errors import Problem, StudyError, printable
 from mechdesign.experiments import sensitivities, sweep
 from mechdesign.mechanism.describe import describe, sketch_doubts
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.questions.dynamics.question import weighed_beams
 from mechdesign.questions.reliability.schema.section import in_words
 from mechdesign.report.names import MECHANISM
 from mechdesign.report.requirements import foresee, on_warnings
@@ -68,12 +69,9 @@ def _massless(study: Study) -> list[str]:
     """Links of a study of dynamics that have neither a mass nor beams with a density, as a line."""
     if study.dynamics is None:
         return []
-    description, stiffness = study.mechanism.description, study.stiffness
-    beams = {} if stiffness is None else {
-        link: stiffness.sections[section].density for link, section in stiffness.elastic.items()
-    }  # fmt: skip
-    links = [link for link in description.links if link != GROUND
-             and link not in description.masses and beams.get(link) is None]  # fmt: skip
+    description = study.mechanism.description
+    weighed = {GROUND, *description.masses, *weighed_beams(study)}
+    links = [link for link in description.links if link not in weighed]
     return [f"massless: {', '.join(links)}"] if links else []
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, norm2, plus, quiet, wrap
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.graph import Graph, rod_of
+from mechdesign.mechanism.graph import Graph
 from mechdesign.mechanism.model import Mass, Spring
 from mechdesign.mechanism.outputs import Rates
 
@@ -65,9 +65,20 @@ class Forces:
         if not link:
             self.on_pin(node, force)
             return
-        body = link if (link, graph.nodes[node]) in graph.points else rod_of(link)
+        body = graph.holder(link, graph.nodes[node])
         nodes = self.configuration.nodes
         self.on_body(body, force, arm=nodes[node] - nodes[self.bases[body]])
+
+    def pull(self, ends: tuple[str, str], force: Vector) -> None:
+        """Add forces that pull two points together: this one at the first, the opposite at the second."""
+        self.at(ends[0], force)
+        self.at(ends[1], -1.0 * force)
+
+    def span(self, ends: tuple[str, str]) -> Vector:
+        """Vector from one point to another."""
+        one, other = (self.configuration.nodes[self.configuration.graph.node(end)] for end in ends)
+        between: Vector = other - one
+        return between
 
     @property
     def total(self) -> tuple[Vector, Value]:
@@ -187,17 +198,16 @@ def springs(forces: Forces, geometry: Geometry, elements: Sequence[Spring], movi
             forces.on_body(other, 0.0, -1.0 * moment)
             forces.on_body(one, 0.0, moment)
         else:
-            ends = [configuration.graph.node(point) for point in spring.between]
-            span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
+            span = forces.span(spring.between)
             length = np.sqrt(norm2(span))
             stretch = length - free
             along = np.where(length > 0, span / np.where(length > 0, length, 1.0), 0.0)
             if moving.velocity is not None:
+                ends = [configuration.graph.node(point) for point in spring.between]
                 rate = dot(along, moving.velocity.nodes[ends[1]] - moving.velocity.nodes[ends[0]])
             # Of a free length 0 the pull is the span itself, also where it has no direction.
             pull = stiffness * span + (constant - stiffness * free + damping * rate) * along
-            forces.at(spring.between[0], pull)
-            forces.at(spring.between[1], -1.0 * pull)
+            forces.pull(spring.between, pull)
         potential = potential + constant * stretch + 0.5 * stiffness * stretch * stretch
         lost = lost + damping * rate * rate
     return Energy(0.0, potential, lost)

@@ -80,6 +80,10 @@ class Graph:
         on_link = point not in OF_LINKS and any((body, point) in self.points for body in (link, rod_of(link)))
         return name in self.nodes or on_link
 
+    def holder(self, link: str, point: str) -> str:
+        """The body of a link that has a point; of a telescopic one perhaps its rod."""
+        return link if (link, point) in self.points else rod_of(link)
+
     def links_at(self, point: str) -> list[str]:
         """Names of the links that meet at a point."""
         return list(dict.fromkeys(body.removesuffix(":rod") for body, name in self.points if name == point))

@@ -29,7 +29,7 @@ from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
 from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
 
-# Prefixes of what a force acts on that is no link: the pin of several links, and of a slot.
+# Prefix of the pin of several links; its point follows.
 PIN = "pin:"
 
 
@@ -56,7 +56,7 @@ def balance(linear: Linearization, forces: Forces) -> Balance:
     slides: list[Value] = [0.0] * len(linear.slides)
     edges: list[Vector] = [0.0] * len(structure.edges)
     for body, (force, moment) in forces.bodies.items():
-        base = bases(linear.graph)[body]
+        base = forces.bases[body]
         nodes[base] = plus(nodes[base], 1, force)
         frames[bodies[body][0]] = frames[bodies[body][0]] + moment
 
@@ -102,8 +102,7 @@ class Contact(NamedTuple):
     """A joint between two bodies, or between a body and a pin that several share.
 
     The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
-    the node. It also transmits a moment unless it `turns`; `slide` is
-    the number of the slide whose line it lies across.
+    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge.
     """
 
     joint: str
@@ -113,7 +112,7 @@ class Contact(NamedTuple):
     edges: tuple[tuple[int, int], ...]
     bodies: tuple[str, ...] = ()
     turns: bool = True
-    slide: int | None = None
+    slides: bool = False
 
 
 class _Member(NamedTuple):
@@ -144,7 +143,7 @@ class Joints:
         for name, joint in description.joints.items():
             if isinstance(joint, Fixed):
                 one, other = joint.links
-                self.ties[name] = self.holder(one, joint.point), self.holder(other, joint.point)
+                self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
         self.contacts = tuple(self._slides()) + tuple(self._pins())
         self.order, self.open = self._tie_order()
 
@@ -153,10 +152,6 @@ class Joints:
         """Names of the contacts' forces: of their joint, and what it acts on where it has several."""
         counts = Counter(contact.joint for contact in self.contacts)
         return [f"{c.joint}_force" + f"_on_{c.on}" * (counts[c.joint] > 1) for c in self.contacts]
-
-    def holder(self, link: str, point: str) -> str:
-        """The body of a link that has a point; of a telescopic one perhaps its rod."""
-        return link if (link, point) in self.graph.points else rod_of(link)
 
     @cached_property
     def guides(self) -> dict[int, tuple[str, str | None]]:
@@ -169,8 +164,8 @@ class Joints:
             joint = self.description.joints[name]
             assert isinstance(joint, Prismatic | Slot)
             line = joint.line
-            guide = self.holder(line.link, line.through or origin_of(line.link))
-            found[slide] = guide, self.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
+            guide = self.graph.holder(line.link, line.through or origin_of(line.link))
+            found[slide] = guide, self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
         return found
 
     def _slides(self) -> list[Contact]:
@@ -178,7 +173,7 @@ class Joints:
         for k, edge in enumerate(self.graph.edges):
             if edge.slide is not None and (slider := self.guides[edge.slide][1]) is not None:
                 name, guide = self.graph.slides[edge.slide], self.guides[edge.slide][0]
-                contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), (), False, edge.slide))
+                contacts.append(Contact(name, slider, guide, edge.head, ((k, -1),), turns=False, slides=True))
         return contacts
 
     def _members(self) -> dict[int, list[_Member]]:
@@ -333,9 +328,8 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
     found = []
     for contact, force in zip(joints.contacts, forces, strict=True):
         normal: Value = np.nan
-        if contact.slide is not None:
-            k = next(k for k, edge in enumerate(linear.graph.edges) if edge.slide == contact.slide)
-            normal = cross(linear.direction(k), force)
+        if contact.slides:
+            normal = cross(linear.direction(contact.edges[0][0]), force)
         moment = 0.0 if contact.turns else moments[contact.joint]
         if contact.joint in joints.ties and contact.on == joints.ties[contact.joint][0]:
             moment = -1.0 * moment

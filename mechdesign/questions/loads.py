@@ -14,8 +14,8 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.poses import in_study_units
 from mechdesign.study import Study
-from mechdesign.study.poses import Poses
-from mechdesign.study.schema.loads import TIME, VELOCITY, Load, Quantity
+from mechdesign.study.poses import TIME, Poses
+from mechdesign.study.schema.loads import VELOCITY, Load, Quantity
 from mechdesign.study.text.fields import MAX_NUMBER
 from mechdesign.study.text.units import Amount
 
@@ -45,11 +45,8 @@ class Loading:
                     force = force * configuration.body_rotation(load.in_)
                 forces.at(load.at, force)
             elif load.between is not None:
-                ends = [configuration.graph.node(point) for point in load.between]
-                span = configuration.nodes[ends[1]] - configuration.nodes[ends[0]]
-                pull = given[0] * span / np.sqrt(norm2(span))
-                forces.at(load.between[0], pull)
-                forces.at(load.between[1], -1.0 * pull)
+                span = forces.span(load.between)
+                forces.pull(load.between, given[0] * span / np.sqrt(norm2(span)))
             if load.link is not None:
                 forces.on_body(load.link, 0.0, given[-1])
 

@@ -20,7 +20,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import asked_of, dynamics_table, extremes_table, joint_table
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import Followed, course_of
+from mechdesign.questions.kinematics.courses import follow
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -98,7 +98,7 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(_follow, question)))
+    a_pose = replace(whole, course=cache(partial(follow, question)))
     scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in found.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
@@ -106,12 +106,6 @@ def _group(passage: Passage) -> Group:
         drawn = DrawnForces(passage.shown, passage.motion)
         result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
-
-
-def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
-    """A column along the motions of all designs."""
-    along = along_of(question, (), asked=[asked])
-    return None if along is None else course_of(along, asked)
 
 
 def _end(passage: Passage, along: Along | None, k: int) -> End:
@@ -134,9 +128,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if mark.number:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
-    missing = [invalid_in_words(reason)]
-    if along is not None and not along.whole[k]:
-        missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
+    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
     if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
         message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
         warnings.append(Caution("undefined", message, "joint_forces"))

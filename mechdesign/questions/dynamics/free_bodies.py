@@ -11,7 +11,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
-from mechdesign.mechanism.statics import Contact
+from mechdesign.mechanism.statics import PIN, Contact
 from mechdesign.questions.dynamics.tables import asked_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.rates import drive_rates
@@ -161,5 +161,5 @@ def _link(body: str) -> str:
 
 def _sides(contact: Contact) -> tuple[str, str]:
     """The links on both sides of a joint; '' is the pin of several."""
-    one, other = ("" if body.startswith("pin:") else _link(body) for body in (contact.on, contact.by))
+    one, other = ("" if body.startswith(PIN) else _link(body) for body in (contact.on, contact.by))
     return one, other

@@ -132,10 +132,9 @@ class ForceQuestion:
         if stiffness is None:
             return {}
         sections, masses = poses.section(stiffness, rows).sections, dict[str, Mass]()
-        for name, profile in stiffness.elastic.items():
-            link, section = mechanism.description.links[name], sections[profile]
-            if section.density is None or link.telescopic:
-                continue
+        for name in weighed_beams(self.study):
+            link, section = mechanism.description.links[name], sections[stiffness.elastic[name]]
+            assert section.density is not None
             corners = [mechanism.geometry.place(name, point, places) for point in corners_of(link)]
             spans = [(b - a, (a + b) / 2) for a, b in pairwise(corners)]
             bars = [section.density * section.extent[0] * np.abs(along) for along, _ in spans]
@@ -151,6 +150,16 @@ class ForceQuestion:
         values = (force.real, force.imag, reaction.moment, np.abs(force),
                   angle_of(force) / self.study.units.angle_factor, reaction.normal)  # fmt: skip
         return {f"{name}.{part}": value for part, value in zip(PARTS, values, strict=True)} | {name: np.abs(force)}
+
+
+def weighed_beams(study: Study) -> list[str]:
+    """Links that have the mass of their beams where they are given none; a telescopic link has no beam of its own."""
+    links, stiffness = study.mechanism.description.links, study.stiffness
+    elastic = stiffness.elastic.items() if stiffness is not None else ()
+    return [
+        name for name, profile in elastic
+        if stiffness is not None and stiffness.sections[profile].density is not None and not links[name].telescopic
+    ]  # fmt: skip
 
 
 def force_question(study: Study, poses: Poses) -> MotionQuestion:

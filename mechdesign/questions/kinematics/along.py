@@ -205,6 +205,10 @@ class Along:
         part = np.minimum(lengths / end, np.nextafter(1.0, 0.0))
         return np.where(self.curve.spent, np.nan, np.where((gaps == 0) & (lengths > 0), 1.0, part))
 
+    def missing(self, design: int) -> str:
+        """How much of the motion of a design is missing, in words; empty of a motion without gaps."""
+        return "" if self.whole[design] else f"{100 * (1 - self.present[design]):.3g} % of the motion is missing"
+
     @property
     def whole(self) -> Flags:
         """Motions without gaps, shape (lines,)."""

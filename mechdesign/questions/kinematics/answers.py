@@ -16,7 +16,7 @@ from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import Followed, course_of
+from mechdesign.questions.kinematics.courses import follow
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
@@ -28,7 +28,6 @@ from mechdesign.questions.kinematics.tables import A_ROW_A_POSE, pose_tables
 from mechdesign.questions.poses import invalid_in_words, judge_failures
 from mechdesign.questions.together import End, Group
 from mechdesign.results import Result, Scope
-from mechdesign.statistics import Asked
 
 # Tables in the order in which they are shown.
 ORDER = ("motion", "extremes", "limits", "loops", "toggles", "targets", "jacobian", "instant_centres")
@@ -81,7 +80,7 @@ def answers_of(passage: Passage) -> list[Group]:
     ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(_follow, question)))
+    a_pose = replace(whole, course=cache(partial(follow, question)))
     scoped = {
         name: replace(tables[name], scope=a_pose if name in A_ROW_A_POSE else whole) for name in ORDER if name in tables
     }
@@ -104,16 +103,8 @@ def _end(passage: Passage, events: _Events, k: int) -> End:
         warnings, failed = _warnings(own, passage, events, k, reason == 0)
     except AssemblyError as error:
         return End(counts=counts, error=error)
-    missing = [invalid_in_words(reason)]
-    if along is not None and not along.whole[k]:
-        missing.append(f"{100 * (1 - along.present[k]):.3g} % of the motion is missing")
+    missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
-
-
-def _follow(question: MotionQuestion, asked: Asked) -> Followed | None:
-    """A column along the motions of all designs; it is followed once for all of them."""
-    along = along_of(question, (), asked=[asked])
-    return None if along is None else course_of(along, asked)
 
 
 def _warnings(

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats
-from mechdesign.questions.kinematics.along import Along
+from mechdesign.questions.kinematics.along import Along, along_of
+from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.statistics import Asked
 
 
@@ -17,6 +18,12 @@ def course_of(along: Along, asked: Asked) -> Followed | None:
         return None
     along = along.part(asked.part) if asked.part else along
     return Followed(along, asked.column) if asked.column in along.columns else None
+
+
+def follow(question: MotionQuestion, asked: Asked) -> Followed | None:
+    """A column along the motions of all designs; it is followed once for all of them."""
+    along = along_of(question, (), asked=[asked])
+    return None if along is None else course_of(along, asked)
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,14 +21,13 @@ import numpy as np
 from mechdesign.mechanism.graph import GROUND, origin_of, rod_of
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
+from mechdesign.mechanism.statics import PIN
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift, corners_of
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
 ASKED = ":asked"
-# Prefix of the massless body of a pin; its point follows.
-_PIN = "pin:"
 # Edges along a path, each with its direction: 1 from `a` to `b`, -1 from `b` to `a`.
 EdgePath = tuple[tuple[int, int], ...]
 
@@ -79,12 +78,12 @@ class Bodies:
 
 def link_of(body: str) -> str:
     """The link to which a body belongs; empty for a massless body."""
-    return "" if body.startswith((_PIN, "slot:", ASKED)) else body.removesuffix(":rod")
+    return "" if body.startswith((PIN, "slot:", ASKED)) else body.removesuffix(":rod")
 
 
 def is_pin(body: str) -> bool:
     """Whether a body is the massless pin of several links."""
-    return body.startswith(_PIN)
+    return body.startswith(PIN)
 
 
 def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Bodies:
@@ -94,9 +93,7 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
     """
     graph, description = mechanism.graph, mechanism.description
 
-    def holder(name: str, point: str) -> str:
-        return name if (name, point) in graph.points else rod_of(name)
-
+    holder = graph.holder
     asked = ASKED if link is None or link in section.elastic else holder(link, at)
     builder = _Builder(mechanism, section, asked)
     holders: dict[str, list[str]] = {}
@@ -177,7 +174,7 @@ class _Builder:
         hub = fixed or next((cluster for cluster in clusters if self.asked in cluster), None)
         # The ground and the asked body hold each cluster directly; an asked pin lies midway between two links.
         if hub is None or not (fixed or hub == [ASKED] or len(clusters) == 2 or point not in self.section.bearings):
-            hub = clusters[0] if len(clusters) == 2 else [_PIN + point]
+            hub = clusters[0] if len(clusters) == 2 else [PIN + point]
         give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0) if hub == [ASKED] else 1.0
         for cluster in clusters:
             if cluster is not hub:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Generic, TypeVar
@@ -12,9 +13,11 @@ from matplotlib.figure import Figure
 
 from mechdesign.commands import QUESTIONS
 from mechdesign.report.figures.before import Before
+from mechdesign.report.figures.panels import Along, Plane, along, plane
 from mechdesign.report.figures.rendering import Gallery
 from mechdesign.results import Result
 from mechdesign.study import Study
+from mechdesign.study.poses import Poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,25 @@ class View:
     study: Study
     result: Result
     before: Before | None = None
+
+
+class PosesView(View):
+    """A result whose tables have a row a pose, or several."""
+
+    @property
+    def poses(self) -> Poses:
+        """The poses of the tables."""
+        raise NotImplementedError
+
+    @cached_property
+    def swept(self) -> Along | None:
+        """The coordinate along a sweep or path."""
+        return along(self.study, self.poses)
+
+    @cached_property
+    def over(self) -> Plane | None:
+        """The two coordinates of a grid."""
+        return plane(self.study, self.poses)
 
 
 V = TypeVar("V", bound=View)

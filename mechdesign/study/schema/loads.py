@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.graph import GROUND
+from mechdesign.study.poses import TIME
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
@@ -17,8 +18,8 @@ from mechdesign.study.text.units import Amount
 
 HELP_PAGE = "reference/study/kinematics"
 
-# Ending of a coordinate's name that stands for its velocity in an expression, and the name of the time.
-VELOCITY, TIME = "_velocity", "time"
+# Ending of a coordinate's name that stands for its velocity in an expression.
+VELOCITY = "_velocity"
 
 Quantity = Amount | Expression
 

@@ -11,12 +11,11 @@ from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import STILL, asked_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
-from mechdesign.report.figures.panels import Along, along
-from mechdesign.report.figures.pictures import View
+from mechdesign.report.figures.pictures import PosesView
 from mechdesign.study.poses import Poses
 
 
-class DynamicsView(View):
+class DynamicsView(PosesView):
     """The forces of a motion, or of poses one by one."""
 
     @cached_property
@@ -33,11 +32,6 @@ class DynamicsView(View):
     def poses(self) -> Poses:
         """The poses of the columns."""
         return self.drawn.motion.question.poses
-
-    @cached_property
-    def swept(self) -> Along | None:
-        """The abscissa of a sweep or path."""
-        return along(self.study, self.poses)
 
     @cached_property
     def singular(self) -> bool:

@@ -6,12 +6,11 @@ from functools import cached_property
 
 from mechdesign.questions.reliability.tables import DrawnErrors
 from mechdesign.report.figures.looks import Sampled, look
-from mechdesign.report.figures.panels import Along, Plane, along, plane
-from mechdesign.report.figures.pictures import View
+from mechdesign.report.figures.pictures import PosesView
 from mechdesign.study.poses import Poses
 
 
-class ErrorsView(View):
+class ErrorsView(PosesView):
     """Errors and failures at poses one by one, along a motion or over a grid of poses."""
 
     @cached_property
@@ -23,16 +22,6 @@ class ErrorsView(View):
     def poses(self) -> Poses:
         """The poses of the tables."""
         return self.drawn.poses
-
-    @cached_property
-    def swept(self) -> Along | None:
-        """The coordinate along a sweep or path."""
-        return along(self.study, self.poses)
-
-    @cached_property
-    def over(self) -> Plane | None:
-        """The two coordinates of a grid."""
-        return plane(self.study, self.poses)
 
     def sampled(self, table: str) -> Sampled | None:
         """The samples with the tables of the first sampling method; None without samples or a table of this name."""
