@@ -373,7 +373,7 @@ def load_document(
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
         folder=source.folder,
-        warnings=tuple(reporter.warnings),
+        warnings=reporter.warnings,
     )
 
 
