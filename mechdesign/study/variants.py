@@ -48,14 +48,12 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
-    document = Document.of(data)
-    override(document, overrides(changes))
+    document, texts = Document.of(data), overrides(changes)
+    override(document, texts)
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
-    return load_document(
-        document, study.source, (*study.overrides, *overrides(changes)),
-        original=study.mechanism if same_sketch(data, study.resolved) else None,
-    )  # fmt: skip
+    original = study.mechanism if same_sketch(data, study.resolved) else None
+    return load_document(document, study.source, (*study.overrides, *texts), original=original)
 
 
 def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:

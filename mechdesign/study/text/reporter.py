@@ -15,8 +15,6 @@ from mechdesign.study.text.document import Document, KeyPath, dotted, has, leave
 from mechdesign.study.text.fields import LOST, MAX_NAMED, Model, shown
 from mechdesign.study.text.units import QuantityError, measure, text_of
 
-# A link written as a list has its keys at these places.
-LIST_FORM = {"from": 0, "to": 1, "length": 2}
 # Expected values by the types of pydantic's errors.
 _EXPECTED = defaultdict(
     lambda: "something else",
@@ -88,9 +86,9 @@ class Reporter:
     def kind(self, path: KeyPath, kind: str) -> None:
         """Report quantities at or below a path of the data whose unit is of another kind."""
         self.kinds[path] = kind
-        for keys, raw in leaves(self.raw(path)):
+        for keys, raw in leaves(self.document.raw(path)):
             # The unit of a parameter is checked with the parameter.
-            parameter = self.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
+            parameter = self.document.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
             if text := text_of(raw) or text_of(parameter):
                 try:
                     measure(text, kind)
@@ -112,7 +110,7 @@ class Reporter:
 
     def _placed(self, remark: Remark) -> Iterator[Problem]:
         """A remark at its place in the text; nothing where it only follows from a mistake of the text itself."""
-        written = self.written(remark.path)
+        written = self.document.written(remark.path)
         above = [written[:length] for length in range(len(written) + 1)]
         if not self.document.spoiled.isdisjoint(above):
             return
@@ -140,40 +138,6 @@ class Reporter:
         """Whether a problem lies in one of these top-level sections, or in the text as a whole."""
         return any(problem.key.partition(".")[0] in ("", *sections) for problem in self.problems)
 
-    def raw(self, path: Sequence[str | int]) -> Any:
-        """The data as written at a path, None if there are none."""
-        data = self.document.data
-        for segment in self.written(path):
-            if not has(data, segment):
-                return None
-            data = data[segment]
-        return data
-
-    def written(self, path: Sequence[str | int]) -> KeyPath:
-        """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
-        data: Any = self.document.data
-        found: list[str | int] = []
-        remaining = list(path)
-        while remaining:
-            segment = remaining.pop(0)
-            if has(data, segment):
-                found.append(segment)
-                data = data[segment]
-            elif data is None or not found:
-                # An empty or missing section has no short forms.
-                return (*found, segment, *remaining)
-            elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
-                found.append(LIST_FORM[str(segment)])
-                data = data[LIST_FORM[str(segment)]]
-            elif isinstance(data, list) and segment in data:
-                found.append(data.index(segment))
-                data = segment
-            elif remaining or not isinstance(data, dict):
-                continue
-            else:
-                found.append(segment)
-        return tuple(found)
-
     def report_validation(self, error: ValidationError, root: type[Model], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
         for item in error.errors(include_url=False):
@@ -191,9 +155,9 @@ class Reporter:
                 message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
                 if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
                     message += "; a ':' needs a space after it"
-                *holder, last = self.written(location)
+                *holder, last = self.document.written(location)
                 # For a whole mapping pydantic's path ends with the name of the form.
-                location = location if has(self.raw(holder), last) else tuple(holder)
+                location = location if has(self.document.raw(holder), last) else tuple(holder)
                 self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[Model], key: str, raw: Any) -> Any:
@@ -204,7 +168,7 @@ class Reporter:
         part = plain(raw)
         for item in error.errors(include_url=False):
             location = (key, *item["loc"])
-            *inner, last = self.written(location)[1:] or (None,)
+            *inner, last = self.document.written(location)[1:] or (None,)
             holder: Any = part
             for segment in inner:
                 holder = holder[segment] if has(holder, segment) else None
