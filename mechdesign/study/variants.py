@@ -48,7 +48,8 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
-    document, texts = Document.of(data), overrides(changes)
+    texts = overrides(changes)
+    document = Document.of(data)
     override(document, texts)
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
