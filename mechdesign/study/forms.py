@@ -55,8 +55,8 @@ def compiled(study: Study, changes: Changes, first: Changes) -> Form | None:
         while len(_FORMS) >= _MOST_FORMS:
             _FORMS.pop(next(iter(_FORMS)))
         words = [(name, value) for name, value in changes if not is_number(value)]
-        values = dict(first)
-        _FORMS[key] = form(study, words, {name: values[name] for name, value in changes if is_number(value)})
+        numbers = {name: value for name, value in changes if is_number(value)}
+        _FORMS[key] = form(study, words, numbers | {name: value for name, value in first if name in numbers})
     return _FORMS[key]
 
 
