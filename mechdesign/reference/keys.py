@@ -67,9 +67,9 @@ def entries() -> Iterator[Entry]:
         # Local indices have entries of their own: `mechdesign.reference.sources.indices`.
         for read in reads:
             for word, each in (read.words or {}).items() if read.words is not INDEX_NAMES else ():
-                before = chosen[read.what, word].where if (read.what, word) in chosen else ()
+                before = chosen[read.title, word].where if (read.title, word) in chosen else ()
                 text = getattr(each, "detail", "") or meaning(each)
-                chosen[read.what, word] = Entry(word, read.what, text, where=(*before, key.path.replace(".*", "")))
+                chosen[read.title, word] = Entry(word, read.title, text, where=(*before, key.path.replace(".*", "")))
         yield Entry(
             word=key.path,
             kind=KIND,
@@ -86,7 +86,7 @@ def entries() -> Iterator[Entry]:
 
 def _words(reads: Iterable[Read]) -> list[tuple[str, str, str]]:
     """The choices of values: what they are, the word and its meaning."""
-    return [(read.what, word, meaning(each)) for read in reads for word, each in (read.words or {}).items()]
+    return [(read.title, word, meaning(each)) for read in reads for word, each in (read.words or {}).items()]
 
 
 def _within(models: Iterable[tuple[type[Model], str]]) -> Iterator[tuple[str, str, str]]:

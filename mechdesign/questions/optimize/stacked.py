@@ -132,7 +132,7 @@ def tables(
         question, absent = motion.question, motion.question.absent
         loops = four_bars(study.mechanism) if "loops" in wanted else ()
         errors = question.errors if "targets" in wanted else ()
-        along = along_of(question, outputs, loops, also=errors, asked=asked)
+        along = along_of(question, outputs, loops, also=errors, requests=asked)
         scope = Scope(course=partial(course_of, along)) if along is not None else None
         found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}
         if "extremes" in wanted:

@@ -128,7 +128,7 @@ def _spread(drawn: Designs, table: Table, first: Sequence[int]) -> Ints:
 
 def _sweeps(drawn: Designs, table: Table, rows: Ints) -> Iterator[tuple[int, Sweep]]:
     """Designs of a front in their motions, those of one mechanism solved in one batch; not those that have none."""
-    known = drawn.study.parameters.known()
+    known = drawn.study.parameters.names()
     numbers = {name: np.asarray(table[name], dtype=float) for name in drawn.variables if name in known}
     words = {name: table[name] for name in drawn.variables if name not in known}
     kinds: dict[tuple[Any, ...], list[int]] = {}

@@ -127,7 +127,7 @@ def check_allocation(
         path: KeyPath = (*root, "cost", name)
         if name in dimensions and dimensions[name].measured is not None:
             checker.report(path, "what is measured is held as it is: its tolerance is not allocated", at_key=True)
-        checker.known(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
+        checker.check_name(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
         if name in clearances and given.grades:
             checker.report(path, "a clearance has no grade; leave it out, and it is held", at_key=True)
         elif name in clearances and clearances[name].fit is not None:

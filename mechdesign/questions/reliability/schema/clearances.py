@@ -151,7 +151,7 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: s
     _check_radius(checker, clearance, path)
     if point in mechanism.slides:
         return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
-    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
+    if not checker.check_name(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
         return None
     if clearance.length is not None:
         report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
@@ -162,7 +162,7 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: s
     # By default the pin moves in the last link that no output or limit names.
     link = clearance.link or ([link for link in links if link != meant] or links)[-1]
     if link not in links:
-        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
+        checker.check_name(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":
         binary = mechanism.links[link]
         if point not in (binary.from_, binary.to) or binary.telescopic:

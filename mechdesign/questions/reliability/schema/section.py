@@ -147,7 +147,7 @@ class ReliabilitySection(MotionSection):
             _limit(checker, self, name, limit, columns)
         for index, correlated in enumerate(self.correlation):
             for place, name in enumerate((correlated.one, correlated.other)):
-                checker.known(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
+                checker.check_name(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
         pairs = [frozenset(pair[:2]) for pair in self.correlation]
         for index, pair in enumerate(pairs):
             if pair in pairs[:index]:
@@ -266,7 +266,7 @@ def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[
     dynamics: DynamicsSection | None = checker.parts.get("dynamics")
     joints = (dynamics or DynamicsSection()).joints(compiled)
     pace = pace_of(section, dynamics, checker.parts.get("kinematics"))
-    own = pace.motion is not None or pace.of_given(compiled.drives)
+    own = pace.motion is not None or pace.inverse(compiled.drives)
     elsewhere = own and source_of(checker, pace) is not source_of(checker, section)
     still = column_kinds(compiled, joints, moving=False)
     kinds = {
@@ -318,7 +318,7 @@ def _limit(
     if order and not section.rated:
         report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
     if limit.radius is not None:
-        if checker.known(base, mechanism.owners, "point", path, at_key=True):
+        if checker.check_name(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])
     elif base in mechanism.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)

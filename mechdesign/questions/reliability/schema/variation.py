@@ -221,8 +221,8 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
         if name in parameters.formulas:
             message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
             report(path, message, at_key=True)
-        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
-        if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
+        known = [*parameters.names(), *checker.mechanism.driven_kinds, *LOADS]
+        if checker.check_name(name, known, "parameter, dimension or drive", path, at_key=True):
             found[name] = _check_dimension(checker, name, dimension, path)
     return found
 
