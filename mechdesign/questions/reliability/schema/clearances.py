@@ -144,8 +144,8 @@ class Clearance(fields.Model):
         return spread.flaw(self.radius)
 
 
-def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
-    """A clearance with the link that its pin moves in, which is not that `meant` by outputs; None without its joint."""
+def check_clearance(checker: Checker, point: str, clearance: Clearance, named: str | None) -> Clearance | None:
+    """A clearance with the link that its pin moves in, other than the one `named` by outputs; None without its joint."""
     path: KeyPath = ("reliability", "clearances", point)
     mechanism, report = checker.mechanism, checker.report
     _check_radius(checker, clearance, path)
@@ -160,7 +160,7 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: s
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
     # By default the pin moves in the last link that no output or limit names.
-    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
+    link = clearance.link or ([link for link in links if link != named] or links)[-1]
     if link not in links:
         checker.check_name(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":
