@@ -72,7 +72,7 @@ class Motion:
         study, rows, configuration = self.question.study, solved.rows, solved.configuration
         self.reason[rows] = configuration.reason
         for coordinate in self.question.watched:
-            if coordinate.name in solved.given:
+            if coordinate.name in solved.names:
                 # As the study gives it, not there and back through radians; also where the pose fails.
                 self.put(coordinate.name, rows, self.question.poses.values[coordinate.name][rows])
             else:

@@ -47,7 +47,7 @@ def drive_rates(
     """
     section = poses.section(section, solved.rows)
     inverse = section.inverse(study.mechanism.drives)
-    names = solved.given if inverse else study.mechanism.drives
+    names = solved.names if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]
     if section.speed is None and section.motion is None:
         rates = constant_rates(study, section, names)

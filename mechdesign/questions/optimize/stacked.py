@@ -177,7 +177,7 @@ def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
     """Margins of some poses, shape (poses, margins)."""
     configuration, size = solved.configuration, mechanism.size
     found: list[Value] = [closure / size**2 for closure in configuration.closures]
-    if mechanism.plan(solved.given).iterative:
+    if mechanism.plan(solved.names).iterative:
         assembled = (configuration.reason == Reason.OK) | (configuration.reason == Reason.LIMIT)
         found.append(np.where(assembled, 1.0, -1.0))
     found += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]

@@ -204,7 +204,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     followed, forces = _followed(task), force_model(task.study, task.poses)
     settings = []
     for solved, rates in groups:
-        by_drives = set(solved.given) == set(mechanism.drives)
+        by_drives = set(solved.names) == set(mechanism.drives)
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue

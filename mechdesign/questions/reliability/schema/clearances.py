@@ -145,7 +145,7 @@ class Clearance(fields.Model):
 
 
 def check_clearance(checker: Checker, point: str, clearance: Clearance, named: str | None) -> Clearance | None:
-    """A clearance with the link that its pin moves in, other than the one `named` by outputs; None without its joint."""
+    """A clearance with the link that its pin moves in, not the one `named` by outputs; None without its joint."""
     path: KeyPath = ("reliability", "clearances", point)
     mechanism, report = checker.mechanism, checker.report
     _check_radius(checker, clearance, path)
