@@ -20,10 +20,19 @@ def course_of(along: Along, asked: Asked) -> Followed | None:
     return Followed(along, asked.column) if asked.column in along.columns else None
 
 
-def follow(question: MotionQuestion, asked: Asked) -> Followed | None:
-    """A column along the motions of all designs; it is followed once for all of them."""
-    along = along_of(question, (), asked=[asked])
-    return None if along is None else course_of(along, asked)
+@dataclass(frozen=True, eq=False)
+class Courses:
+    """Columns along the motions of a question, each followed once for all designs; can be sent to another process."""
+
+    question: MotionQuestion
+    _followed: dict[Asked, Followed | None] = field(default_factory=dict)
+
+    def __call__(self, asked: Asked) -> Followed | None:
+        """A column along the motions; None where it is not known between the poses."""
+        if asked not in self._followed:
+            along = along_of(self.question, (), asked=[asked])
+            self._followed[asked] = None if along is None else course_of(along, asked)
+        return self._followed[asked]
 
 
 @dataclass(frozen=True, eq=False)
