@@ -383,7 +383,7 @@ def encoded(figure: Figure, kind: str = "png", creator: str | None = None) -> by
 
         return pdf(figure, creator, _reduction())
     figure.canvas.draw()
-    few = _in_few_colours(np.asarray(cast(FigureCanvasAgg, figure.canvas).buffer_rgba()))
+    few = _in_few_colours(np.asarray(cast(Any, figure.canvas).buffer_rgba()))
     words = PngInfo()
     if creator is not None:
         words.add_text("Software", creator)
