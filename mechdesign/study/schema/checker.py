@@ -110,5 +110,5 @@ class Checker:
 
     def needs(self, section: str | None, subject: str, path: KeyPath) -> None:
         """Check that the study has a section that `subject` needs."""
-        if section is not None and self.reporter.raw((section,)) is None:
+        if section is not None and self.reporter.document.raw((section,)) is None:
             self.report(path, f"{subject} needs the {section} section, and the study has none")
