@@ -164,8 +164,7 @@ def weighed_beams(study: Study) -> list[str]:
 
 def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
-    section, own = study.dynamics, study.kinematics or KinematicsSection()
-    assert section is not None
+    section, own = DynamicsSection.of(study), study.kinematics or KinematicsSection()
     pace = section if section.moves else own
     rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})

@@ -22,6 +22,7 @@ from mechdesign.questions.stiffness.figures.joint_forces import load_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
@@ -198,8 +199,7 @@ def _beam(
 def directions_figure(view: StiffnessView) -> Figure | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
     study, tables, shown = view.study, view.result.tables, view.drawn.shown
-    table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
-    assert section is not None
+    table, soft, section = tables["stiffness"], tables["compliance"], StiffnessSection.of(study)
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
     most = MAX_DIRECTIONS if not style.narrow() else MAX_NARROW_DIRECTIONS
     some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).astype(int))
@@ -254,6 +254,5 @@ def directions_figure(view: StiffnessView) -> Figure | None:
 
 def _force(study: Study) -> float:
     """The force of an ellipse: about the largest of the study's loads, or else one unit."""
-    assert study.stiffness is not None
-    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    loads = [abs(complex(*load[:2])) for load in StiffnessSection.of(study).loads]
     return round_down(max(loads)) if any(loads) else 1.0

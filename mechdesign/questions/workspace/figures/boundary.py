@@ -30,6 +30,7 @@ from mechdesign.questions.workspace.figures.regions import (
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -55,8 +56,7 @@ def workspace_figure(
     study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
 ) -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
-    section, mechanism = study.workspace, study.mechanism
-    assert section is not None
+    section, mechanism = WorkspaceSection.of(study), study.mechanism
     reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
     extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
                              places_before(before)])  # fmt: skip
@@ -93,12 +93,11 @@ def side_by_side(study: Study, regions: Sequence[Region], before: Before | None)
 def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
     """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
     study, shown = parts[0][1], [region for _, _, region in parts]
-    assert study.workspace is not None
     poses = [_pose_inside(own, region) for _, own, region in parts]
     reached = np.concatenate([np.ravel(pose.point(point)) for pose in poses for point in study.mechanism.points])
     everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
                                  places_before(before)])  # fmt: skip
-    title = f"workspace of point {study.workspace.point}, {title}"
+    title = f"workspace of point {WorkspaceSection.of(study).point}, {title}"
     page = sheet(study, everywhere, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
     for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
         fill(axes, region.local)
@@ -116,8 +115,7 @@ def _pose_inside(study: Study, region: Region) -> Configuration:
 
 def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = slice(None)) -> Configuration:
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
-    assert study.workspace is not None
-    point, local = study.workspace.point, region.local
+    point, local = WorkspaceSection.of(study).point, region.local
     coordinates: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
     plan = study.mechanism.plan(tuple(coordinates))
     values = [radians(study, study.mechanism.coordinate(name), value) for name, value in coordinates.items()]
