@@ -109,9 +109,10 @@ def bar(length: float) -> tuple[float, float]:
 
 def test_joint_force_of_a_quick_return_mechanism() -> None:
     # D. B. Marghitu, Mechanisms and Robots Analysis with MATLAB, Springer 2009, section 4.7 (R-RTR-RTR), p. 176:
-    # F03 = -431.027 i - 878.152 j N. We have read this page and the one before it, not those with the data. They are
-    # taken to be those of the book's other chapters, with the sections and the density of Example 6.1 below: AB = 0.15 m, AC = 0.10 m, CD = 0.15 m, DF = 0.40 m, AG = 0.30 m, sliders of 0.05 m by
-    # 0.02 m, crank at 30 deg and 50 rpm, 100 N m against the output, g = 9.807 m/s^2. Six digits of both numbers agree.
+    # F03 = -431.027 i - 878.152 j N. We have read this page and p. 173, not those with the data, which we took as those
+    # of the book's other chapters: AB = 0.15 m, AC = 0.10 m, CD = 0.15 m, DF = 0.40 m, AG = 0.30 m, crank at 30 deg and
+    # 50 rpm, 100 N m against the output; density, sections and g are those of Example 6.1 below. Six digits of both
+    # numbers agree.
     mass = 8000 * 0.05 * 0.02 * 0.001
     slider = f"mass: {mass}, inertia: {mass * (0.05**2 + 0.02**2) / 12}"
     crank, rod, output = (f"mass: {m}, inertia: {j}" for m, j in map(bar, (0.15, 0.40, 0.30)))
@@ -248,7 +249,8 @@ def test_weights_on_mechanisms_of_another_program(text: str, torque: float, forc
 
 def test_a_torque_between_two_links_of_a_square_four_bar() -> None:
     """A torque of 1 between two links of a square at rest turns them against each other with 0.125."""
-    # GTDynamics, python/tests/test_four_bar.py: sides 2, masses and moments of inertia 1, no weight, the left side held.
+    # GTDynamics, python/tests/test_four_bar.py: sides 2, masses and moments of inertia 1, no weight, the left side
+    # held.
     result = asked("""
 units: {length: m, angle: rad, force: N}
 mechanism:
