@@ -192,7 +192,7 @@ def load(twists: Twists, size: int) -> Loaded:
 
 
 def bear(twists: Twists, through: Floats) -> tuple[Floats, Floats]:
-    """Wrenches that all edges bear under a load in each pose, and those of which equilibrium and elasticity say nothing.
+    """Wrenches that all edges bear under the loads of each pose, and what rigid loops may bear besides.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def bear(twists: Twists, through: Floats) -> tuple[Floats, Floats]:
     wrenches : ndarray, shape (n, edges, 3)
         nan where free joints give way, and in poses that are not known.
     open_wrenches : ndarray, shape (n, edges, 3, 3 loops)
-        Wrenches that rigid loops may bear besides.
+        States of self-stress that store no energy.
     """
     scale = twists.scale[:, None]
     unknown = ~np.isfinite(twists.twist).all(axis=(1, 2)) | ~np.isfinite(through).all(axis=(1, 2))
@@ -220,7 +220,8 @@ def bear(twists: Twists, through: Floats) -> tuple[Floats, Floats]:
     around, _ = _ways(twists.network)
 
     def of_edges(wrenches: Floats) -> Floats:
-        return np.einsum("le,nlik->neik", around, wrenches.reshape(len(unit), len(around), 3, wrenches.shape[2]))
+        around_loops = wrenches.reshape(len(unit), len(around), 3, wrenches.shape[2])
+        return np.asarray(np.einsum("le,nlik->neik", around, around_loops))
 
     wrenches = unit - of_edges(stress)[..., 0]
     if statics.lost is not None:
