@@ -1,7 +1,7 @@
 """Moments of slides and clamps in a closed chain, which equilibrium leaves open, by the force method.
 
-Of all moments in equilibrium those of least elastic energy close the chain. What gives are the beams and bearings of the
-study's stiffness section.
+Of all moments in equilibrium those of least elastic energy close the chain. What gives are the beams and bearings of
+the study's stiffness section.
 """
 
 from __future__ import annotations
