@@ -237,14 +237,14 @@ def _equilibrium(twists: Twists, through: Floats) -> tuple[_Statics, tuple[Float
     (n, edges, loads, 3).
     """
     n, (around, _) = len(twists.twist), _ways(twists.network)
+    carried = through.transpose(0, 2, 3, 1).reshape(n, -1, through.shape[1])
 
     def matrices(chosen: Flags) -> tuple[Floats, Floats]:
         within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
         loops = (around @ within)[:, :, None] * twist[:, None]
-        on_path = (through.transpose(0, 2, 3, 1).reshape(n, -1, len(around.T)) @ within).reshape(
-            n, -1, *twist.shape[1:]
-        )
-        return loops.reshape(n, 3 * len(around), twist.shape[2]), (on_path * twist[:, None]).sum(axis=2)
+        on_path = carried @ within
+        path = (on_path.reshape(n, through.shape[2], 3, twist.shape[2]) * twist[:, None]).sum(axis=2)
+        return loops.reshape(n, 3 * len(around), twist.shape[2]), path
 
     return _Statics.of(*matrices(twists.free)), matrices(~twists.free), twists.compliance[:, ~twists.free]
 
