@@ -18,6 +18,7 @@ from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.dynamics.open_moments import with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
@@ -87,7 +88,11 @@ class ForceQuestion:
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
         """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
         columns, held = self._held(poses, linear, rows, moving)
-        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
+        borne, stiffness = reactions(self.joints, held), self.study.stiffness
+        if self.joints.open and stiffness is not None:
+            section = poses.section(stiffness, rows)
+            borne = with_open_moments(borne, self.joints, held.forces, self.study.mechanism, section)
+        for name, reaction in zip(self.forces, borne, strict=True):
             columns |= self._parts(name, reaction)
         return columns
 
