@@ -25,7 +25,6 @@ from mechdesign.questions.optimize.figures.designs import (
     sheet,
     tick,
     usual,
-    value_text,
 )
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import Designs
@@ -177,7 +176,7 @@ def score_surface(designs: Designs) -> Figure:
     shown = [*dict.fromkeys(designs.winners.tolist())]
     for k, row in enumerate(shown):
         merits = designs.merits(row) if many else "best"
-        words = f"{', '.join(map(value_text, designs.design(row).values()))}: {merits}"
+        words = f"{', '.join(listed(designs, designs.design(row)))}: {merits}"
         words = style.folded(words, 9.0, style.width() - 0.6)
         place = [column[row] for column in designs.variables.values()]
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
