@@ -68,12 +68,14 @@ def lost_curves(figure: Figure) -> Iterator[str]:
     # Of places nothing is read along one axis alone.
     for axes in (axes for axes in figure.axes if axes.get_aspect() == "auto"):
         curves = [line for line in axes.get_lines() if not line.get_label().startswith("_")]  # type: ignore[attr-defined]
+        # Flat beside dots or a band it tells that it varies less than these.
+        alone = not axes.collections and all(line.get_linestyle() != "None" for line in axes.get_lines())
         low, high = axes.get_ybound()
         for k, curve in enumerate(curves):
             y = np.asarray(curve.get_ydata(), dtype=float)
             y = y[np.isfinite(y)]
             reach = float(np.ptp(y)) if len(y) else 0.0
-            if axes.get_yscale() == "linear" and 1e-9 * (high - low) < reach < FLAT * (high - low):
+            if alone and axes.get_yscale() == "linear" and 1e-9 * (high - low) < reach < FLAT * (high - low):
                 yield f"{curve.get_label()!r} is flat along {axes.get_ylabel()!r}"
             for other in curves[k + 1 :]:
                 alike = np.array_equal(curve.get_xydata(), other.get_xydata(), equal_nan=True)

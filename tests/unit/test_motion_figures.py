@@ -270,7 +270,7 @@ kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10
     poses = mechdesign.kinematics(study).drawn.special
     singular = [each for each in poses.shown if each.what == "singular: det_J is 0"]
     assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
-    assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
+    assert drawn(study)["poses"].texts[0].get_text() == "Singular poses, poses between"
 
 
 def test_special_poses_of_one_configuration_are_shown_once():

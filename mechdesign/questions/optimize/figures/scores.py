@@ -16,6 +16,7 @@ from matplotlib.tri import Triangulation
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.figures.designs import (
     FEW,
+    enlarge_dots,
     folded,
     label,
     legend,
@@ -25,6 +26,7 @@ from mechdesign.questions.optimize.figures.designs import (
     sheet,
     tick,
     usual,
+    value_text,
 )
 from mechdesign.questions.optimize.figures.view import DesignsView
 from mechdesign.questions.optimize.judge import Designs
@@ -286,7 +288,7 @@ def parallel_axes(designs: Designs) -> Figure:
     size = 7.0 if upright else 8.5
     for place, (name, *ends) in enumerate(zip(names, low, high, strict=True)):
         words = variables_of(designs.study)[name].words if place < len(designs.variables) else ()
-        bottom, top = (words[int(end)] if words else f"{end:.4g}" for end in ends)
+        bottom, top = (words[int(end)] if words else value_text(float(end)) for end in ends)
         axes.axvline(place, color=style.INK, linewidth=0.8, zorder=3)
         axes.text(place, -0.03, bottom, ha="center", va="top", fontsize=size)
         axes.text(place, 1.03, top, ha="center", va="bottom", fontsize=size)
@@ -334,7 +336,7 @@ def convergence(designs: Designs) -> Figure:
         axes.plot(count[designs.feasible], values[designs.feasible], ".", color=style.FAINT, markersize=3,
                   markeredgewidth=0, label="designs")  # fmt: skip
         axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
-        axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
+        enlarge_dots(axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none"))
         best_values = so_far[known]
         if (best_values > 0).all() and best_values.max() > 20 * best_values.min():
             axes.set_yscale("log")

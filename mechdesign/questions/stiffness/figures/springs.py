@@ -163,7 +163,7 @@ def free_motion_figure(view: StiffnessView) -> Figure | None:
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = posed(study, poses, drawn, places, "free motion")
+    figure, axes = posed(study, poses, drawn, places, "Free motion")
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip

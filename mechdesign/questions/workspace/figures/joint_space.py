@@ -15,7 +15,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
-from mechdesign.questions.workspace.figures.regions import PALE, Region, Sheet, inner_loci, places
+from mechdesign.questions.workspace.figures.regions import PALE, Region, Sheet, inner_loci, places, stretch_of
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
@@ -78,17 +78,20 @@ def _page(study: Study, drawn: Complexes, *, cut: bool) -> tuple[Axes, Sheet]:
     wide, tall = (1 + 2 * _EDGE) * wide, (1 + 2 * _EDGE) * tall
     room = style.width() - LEFT - RIGHT
     height = min(_HEIGHT, room)
-    alike = len({study.mechanism.quantity(name) for name in names}) == 1
+    alike, stretch = len({study.mechanism.quantity(name) for name in names}) == 1, 1.0
     if alike:
-        scale = min(room / wide, height / tall)
-        room, height = scale * wide, scale * tall
+        stretch = stretch_of(wide / tall)
+        scale = min(room / wide, height / (tall * stretch))
+        room, height = scale * wide, scale * tall * stretch
     figure, (axes,) = style.page(1, 1, height, left=LEFT, right=style.width() - LEFT - room, top=_ABOVE,
                                  bottom=BELOW + _LEGEND)  # fmt: skip
     note = "joint space, in the working mode of the sketch" + "; cut open at edges without a line" * cut
+    if stretch != 1.0:
+        note += f"; {names[stretch > 1]} drawn {max(stretch, 1 / stretch):g} times larger"
     title(figure, "Workspace in the plane of the drives", note, left=LEFT)
     axes.set_xlim(middle.real - wide / 2, middle.real + wide / 2)
     axes.set_ylim(middle.imag - tall / 2, middle.imag + tall / 2)
-    axes.set_aspect("equal" if alike else "auto")
+    axes.set_aspect(stretch if alike else "auto")
     axes.grid(visible=False)
     axes.set_xlabel(coordinate_label(study, names[0]))
     axes.set_ylabel(coordinate_label(study, names[1]))
