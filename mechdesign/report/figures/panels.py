@@ -179,14 +179,15 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
 def legend_at_left(figure: Figure, handles: Sequence[Line2D], columns: int, **look: Any) -> None:
     """One legend at the bottom from the left edge of drawings on; a narrow page has as many columns as it holds."""
     labels = [str(handle.get_label()) for handle in handles]
-    style.grow(figure, below=legend_room(labels))
-    figure.legend(handles, labels, loc="lower left", ncols=fitting(labels) if style.narrow() else columns,
+    style.grow(figure, below=legend_room(labels, LEFT))
+    columns = fitting(labels, style.width() - LEFT) if style.narrow() else columns
+    figure.legend(handles, labels, loc="lower left", ncols=columns,
                   bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0), **look)  # fmt: skip
 
 
-def legend_room(labels: Sequence[str]) -> float:
-    """Inches below the panels that a legend needs beyond those it needs on a wide page."""
-    rows = (-(-len(labels) // fitting(labels, wide)) for wide in (style.width(), style.LOOKS["screen"].width))
+def legend_room(labels: Sequence[str], indent: float = 0.0) -> float:
+    """Inches below the panels that a legend needs beyond those it needs on a wide page; it begins at an indent."""
+    rows = (-(-len(labels) // fitting(labels, wide - indent)) for wide in (style.width(), style.LOOKS["screen"].width))
     narrow, wide = rows
     return _LEGEND_ROW * (narrow - wide)
 
