@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.studies import study_of
 from matplotlib.collections import LineCollection
+from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
@@ -308,3 +309,22 @@ def test_the_plane_of_drives_that_turn_is_cut_open_once() -> None:
         q1, q2 = curves[color].T
         assert abs(q2) == pytest.approx(elbow, abs=1e-4)
         assert np.ptp(q1) == pytest.approx(360, abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_the_size_of_a_rectangle_keeps_off_the_outline_of_the_circle(look: str) -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.workspace(study)
+    with style.context(look):
+        figure = inscribed_figure(WorkspaceView(study, result))
+        figure.canvas.draw()
+        (axes,) = figure.axes
+        (circle,) = (patch for patch in axes.patches if isinstance(patch, Circle))
+        (size,) = (text for text in axes.texts if " x " in text.get_text())
+        box = Text.get_window_extent(size).transformed(axes.transData.inverted())
+    corners = np.array(box.corners()) @ [1, 1j] - complex(*circle.center)
+    nearest = complex(
+        np.clip(0, corners.real.min(), corners.real.max()), np.clip(0, corners.imag.min(), corners.imag.max())
+    )
+    assert abs(corners).max() < circle.radius or abs(nearest) > circle.radius
