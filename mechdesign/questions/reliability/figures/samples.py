@@ -26,7 +26,7 @@ _MAX_LINEAR_RATIO = 50.0
 _DASHED = (0, (5, 2))
 _DIGIT = 0.075  # inches, of a number
 _TICK = 0.65  # inches from one number along x to the next
-_AROUND = 2.6  # inches above and below all panels, with a legend of several rows
+_AROUND = 2.8  # inches above and below all panels, with a legend of several rows
 
 
 class _Histogram(NamedTuple):
