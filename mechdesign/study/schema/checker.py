@@ -110,5 +110,5 @@ class Checker:
 
     def needs(self, section: str | None, what: str, path: KeyPath) -> None:
         """Check that the study has a section that `what` needs."""
-        if section is not None and self.reporter.raw((section,)) is None:
+        if section is not None and self.reporter.document.raw((section,)) is None:
             self.report(path, f"{what} needs the {section} section, and the study has none")
