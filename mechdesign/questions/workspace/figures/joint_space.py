@@ -65,9 +65,9 @@ def joint_space_figure(view: WorkspaceView) -> Figure | None:
         axes.add_collection(PolyCollection(list(quads[np.isfinite(quads).all(axis=(1, 2))]), facecolors=PALE,
                                            linewidths=0, antialiaseds=False))  # fmt: skip
     page.ends([replace(region, others=None, boundary=boundary, singularities=inside)])
-    axes.plot(*(float(sketch[name]) for name in names), "o", color=style.INK, markersize=5, zorder=4)
-    axes.annotate("sketch", [float(sketch[name]) for name in names], (6, 4), textcoords="offset points", fontsize=9,
-                  zorder=5, path_effects=HALO)  # fmt: skip
+    x, y = (float(sketch[name]) for name in names)
+    axes.plot(x, y, "o", color=style.INK, markersize=5, zorder=4)
+    axes.annotate("sketch", (x, y), (6, 4), textcoords="offset points", fontsize=9, zorder=5, path_effects=HALO)
     return page.figure
 
 
