@@ -22,8 +22,8 @@ from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import entry_of, from_cube, shown, variables_of
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.contained import fitting_scale
 from mechdesign.questions.workspace.question import Question, split
+from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
@@ -62,8 +62,8 @@ class Evaluator:
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
         designs = {self._entries.get(name, name): values for name, values in designs.items()}
-        known, variables = self.study.parameters.known(), variables_of(self.study)
-        entries = {name: variables[name] for name in designs if name not in known}
+        names, variables = self.study.parameters.names(), variables_of(self.study)
+        entries = {name: variables[name] for name in designs if name not in names}
         return self._formed(designs, [name for name, own in entries.items() if own.numeric and not own.integer])
 
     def _formed(self, designs: Mapping[str, Floats], numbers: Collection[str]) -> Evaluated:
@@ -95,7 +95,7 @@ class Evaluator:
     def _forms_study(self, name: str) -> bool:
         """Whether a variable decides the structure of the study: an entry, or a whole number that is read once."""
         parameters = self.study.parameters
-        return name not in parameters.known() or not parameters.moved([name]).isdisjoint(self.study.fixed)
+        return name not in parameters.names() or not parameters.moved([name]).isdisjoint(self.study.fixed)
 
     def _of(self, values: Mapping[str, float], numbers: Collection[str]) -> Evaluator | None:
         """The evaluator of the same goals for the study with these values of entries, kept for the next designs."""
@@ -167,7 +167,7 @@ class Evaluator:
             column, outline = self.layout.column[goal], goal.outline
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
-                region.values[goal.column] if shape is None else fitting_scale(shape, region.panels)[0]
+                region.values[goal.column] if shape is None else fitted(shape, region.panels)[0]
                 for region in given
             ])  # fmt: skip
             # A missing value counts as the worst.

@@ -33,9 +33,9 @@ _EXPECTED = defaultdict(
 _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 
-def unknown_key(name: str, known: Iterable[str]) -> str:
+def unknown_key(name: str, names: Iterable[str]) -> str:
     """Message of an unknown key, with the most similar key."""
-    return f"unknown key{suggestion(name, known)}"
+    return f"unknown key{suggestion(name, names)}"
 
 
 class Remark(NamedTuple):
@@ -66,17 +66,17 @@ class Reporter:
         """What is likely a mistake."""
         return tuple(problem for doubt in self._doubts for problem in self._placed(doubt))
 
-    def known(
-        self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
+    def check_name(
+        self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int], *, at_key: bool = False
     ) -> bool:
-        """Whether a name is known; if not, report it with the most similar name."""
-        candidates = list(known)
+        """Whether a name is among the names; if not, report it with the most similar of them."""
+        candidates = list(names)
         if name in candidates:
             return True
         hint = suggestion(name, candidates)
         if candidates and not hint:
             hint = f"; there are {', '.join(candidates[:MAX_NAMED])}"
-        self.report(tuple(path), f"there is no {what} {name!r}{hint}", at_key=at_key)
+        self.report(tuple(path), f"there is no {noun} {name!r}{hint}", at_key=at_key)
         return False
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
@@ -95,14 +95,14 @@ class Reporter:
                 except QuantityError as error:
                     self.report((*path, *keys), str(error))
 
-    def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
+    def unused(self, path: KeyPath, noun: str, others: Iterable[str]) -> None:
         """Warn of a name that nothing uses; if an override added it, report it as misspelt."""
         name = path[-1]
         if path in self.document.added:
             hint = suggestion(str(name), others)
-            self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
+            self.report(path, f"the study has no {noun} {name!r}, and nothing uses one{hint}", at_key=True)
         else:
-            self.doubt(path, f"nothing uses {what} {name!r}", at_key=True)
+            self.doubt(path, f"nothing uses {noun} {name!r}", at_key=True)
 
     def doubt(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Warn of what is likely a mistake at a path of the data."""
@@ -147,8 +147,8 @@ class Reporter:
                 location = location[:-1]
             kind = item["type"]
             if kind == "extra_forbidden":
-                known = schema_fields(root, location[:-1])
-                self.report(location, unknown_key(str(location[-1]), known), at_key=True)
+                names = schema_fields(root, location[:-1])
+                self.report(location, unknown_key(str(location[-1]), names), at_key=True)
             elif kind == "missing":
                 self.report(location, f"is missing{_meaning(root, location)}", at_key=True)
             else:

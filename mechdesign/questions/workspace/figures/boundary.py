@@ -120,9 +120,9 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
     assert study.workspace is not None
     point, local = study.workspace.point, region.local
-    given: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
-    plan = study.mechanism.plan(tuple(given))
-    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
+    coordinates: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
+    plan = study.mechanism.plan(tuple(coordinates))
+    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in coordinates.items()]
     return plan.solve(np.broadcast_arrays(*values), limits=False)
 
 
@@ -134,15 +134,15 @@ def inscribed_figure(view: WorkspaceView) -> Figure | None:
         return None
     shown, unit = some(view.regions), study.units.label("length")
     places = np.concatenate([region.places() for region in shown])
-    found = [_inscribed(table, region, unit) for region in shown]
+    by_region = [_inscribed(table, region, unit) for region in shown]
     # In small panels the sizes would lie over each other.
     titles = [region.title for region in shown]
     if len(shown) > 1:
         titles = ["\n".join([title, *(size.text for _, size in shapes)])
-                  for title, shapes in zip(titles, found, strict=True)]  # fmt: skip
+                  for title, shapes in zip(titles, by_region, strict=True)]  # fmt: skip
     title = f"largest circle and rectangle in the workspace{left_out(view.regions)}"
     page = sheet(study, places, titles, title, bar=False)
-    for axes, region, shapes in zip(page.axes, shown, found, strict=True):
+    for axes, region, shapes in zip(page.axes, shown, by_region, strict=True):
         fill(axes, region.local)
         for shape, size in shapes:
             shape.set(edgecolor=size.color, facecolor="none", linewidth=1.6, zorder=4)
@@ -150,7 +150,7 @@ def inscribed_figure(view: WorkspaceView) -> Figure | None:
     page.ends(shown)
     if len(shown) == 1:
         (axes,) = page.axes
-        place_labels(axes, [size for _, size in found[0]], covered(axes), order=5)
+        place_labels(axes, [size for _, size in by_region[0]], covered(axes), order=5)
     return page.figure
 
 
