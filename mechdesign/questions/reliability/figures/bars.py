@@ -39,6 +39,7 @@ _FAILURE_HEIGHT = 0.75
 _FAILURE_ROOM = 1.4
 _BEFORE_FAILURE = 1.1
 _PANEL_GAP = 0.5
+_NEGATIVE = 0.5  # inches, of the number of a negative bar
 _ACROSS = 0.3
 _MIN_WIDTH = 1.9  # of a panel
 
@@ -116,7 +117,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
     low = min(0.0, *(float(np.nanmin(shown)) for shown in bars)) if any((bar < -1.0).any() for bar in bars) else 0.0
     high = max(float(np.nanmax(shown, initial=1.0)) for shown in bars)
-    grid[0].set_xlim(1.25 * low, 1.25 * high)
+    # The number of a negative bar stands left of it.
+    share = _NEGATIVE / (grid[0].get_position().width * style.width()) if low < 0 else 0.0
+    grid[0].set_xlim(low - share / (1 - share) * (1.25 * high - low), 1.25 * high)
     if list(entries) != [_SHARE]:
         style.grow(figure, below=_LEGEND)
         legend_below(figure, list(entries.values()), list(entries))

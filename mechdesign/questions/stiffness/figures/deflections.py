@@ -37,6 +37,7 @@ MAX_LOADS = 4
 MAX_DIRECTIONS = 4
 MAX_NARROW_DIRECTIONS = 3
 _MAX_TICKS = 6  # below a panel
+_SAME = 1e-6  # of the mechanism's size, between the points of two poses that are one
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 _LETTERS_AN_INCH = 14.5  # of a panel's title
@@ -202,7 +203,12 @@ def directions_figure(view: StiffnessView) -> Figure | None:
     table, soft, section = tables["stiffness"], tables["compliance"], StiffnessSection.of(study)
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
     most = MAX_DIRECTIONS if not style.narrow() else MAX_NARROW_DIRECTIONS
-    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).astype(int))
+    # A motion that ends where it began shows its first pose once.
+    ends = [
+        np.ravel(shown.configuration.point(point))[index[[0, -1]]] for point in study.mechanism.points if len(index)
+    ]
+    closed = len(index) > 2 and all(abs(last - first) <= _SAME * study.mechanism.size for first, last in ends)
+    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index)), endpoint=not closed).astype(int))
     posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
     scenes = {k: scene for k, scene in posed.items() if scene is not None}
     if not scenes:
