@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mechdesign.cautions import Caution
-from mechdesign.statistics import Asked, Course
+from mechdesign.statistics import Course, Request
 
 if TYPE_CHECKING:
     import pandas
@@ -160,7 +160,7 @@ class Scope:
 
     poses_only: bool = False
     missing: str = ""
-    course: Callable[[Asked], Course | None] | None = None
+    course: Callable[[Request], Course | None] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -233,7 +233,7 @@ class Table:
         yield self
 
     @property
-    def seen(self) -> Table:
+    def pictured(self) -> Table:
         """The rows that pictures show: all of them."""
         return self
 
@@ -302,7 +302,7 @@ class LongTable(Table):
         )  # fmt: skip
 
     @property
-    def seen(self) -> Table:
+    def pictured(self) -> Table:
         """Those of its rows that pictures show."""
         some: Table = self.__dict__["_some"]
         return some
@@ -413,9 +413,9 @@ class Result:
         return f"<Result of {self.command}: {tables}; {count or 'no'} warning{'s' * (count != 1)}>"
 
     @property
-    def seen(self) -> Result:
+    def pictured(self) -> Result:
         """The result with those rows of its tables that pictures show."""
-        return replace(self, tables={name: table.seen for name, table in self.tables.items()})
+        return replace(self, tables={name: table.pictured for name, table in self.tables.items()})
 
     @property
     def main(self) -> Table:

@@ -87,7 +87,7 @@ def test_what_is_made_piece_by_piece_is_what_is_made_at_once(
     whole = mechdesign.kinematics(study, all_modes=all_modes)
     request.getfixturevalue("at_once")
     long = mechdesign.kinematics(study, all_modes=all_modes)
-    assert whole.seen.main is whole.main
+    assert whole.pictured.main is whole.main
     assert isinstance(long.main, LongTable)
     assert texts(long) == texts(whole)
     assert (long.warnings, long.counts) == (whole.warnings, whole.counts)

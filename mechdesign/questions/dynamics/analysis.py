@@ -26,7 +26,7 @@ from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
 from mechdesign.results import Drawn, Result, Scope, Table
-from mechdesign.statistics import Asked
+from mechdesign.statistics import Request
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.work.threads import one_thread
@@ -75,14 +75,14 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
 
 def tables(
     motion: Motion, question: MotionQuestion, chosen: Collection[str], outputs: Collection[str] | None = None,
-    requests: Collection[Asked] = (),
+    requests: Collection[Request] = (),
 ) -> tuple[dict[str, Table], Along | None]:  # fmt: skip
     """Some tables of a motion, and the motion between its poses, which is that of the question.
 
     Of the extremes those of some `outputs`, or all; the columns of `requests` are followed besides.
     """
     names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
-    integrals = [Asked(name, integral=True) for name in names] if "extremes" in chosen else []
+    integrals = [Request(name, integral=True) for name in names] if "extremes" in chosen else []
     along = along_of(question, names, requests=[*requests, *integrals])
     parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
     if "extremes" in chosen:
