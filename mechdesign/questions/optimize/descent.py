@@ -24,13 +24,13 @@ FIRST_WIDTH, LARGEST_WIDTH, SMALLEST_WIDTH, ROUGH_SMALLEST_WIDTH = 0.1, 0.5, 1e-
 # Parts of that width that are tried together, and the part to which it shrinks where none of them is better.
 NARROWER = (1.0, 0.25, 0.0625)
 SHRUNK = 1 / 64
-# Most steps of a descent. After `RACE` steps one ends that would not reach the best of the others in `CATCH_UP` more.
+# Most steps of a descent. After `RACE` steps a descent ends if it would not catch up with the best in `CATCH_UP` more.
 MOST_STEPS, RACE, CATCH_UP = 300, 8, 30
 # Most pairs of quadratic programs that minimise the models of one step.
 ROUNDS = 5
 # The minimum of the models is settled where a pair gains less than this part of the whole gain.
 SETTLED = 0.02
-# Rows of each worst, and of all conditions, that a program has per (variables + 1).
+# Most rows of each goal, and of all conditions, in a quadratic program, per (variables + 1).
 ROWS_HELD = 6
 # Descents that come nearer to each other than this, in parts of the ranges, continue as one.
 SAME = 1e-3

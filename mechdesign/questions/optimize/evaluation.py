@@ -56,7 +56,7 @@ class Evaluator:
         self._others: dict[tuple[float | str, ...], Evaluator | None] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy in another process makes evaluators of other studies by itself."""
+        """State for another process, which makes its own evaluators of other studies."""
         return self.__dict__ | {"_others": {}}
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:

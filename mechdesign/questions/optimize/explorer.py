@@ -9,8 +9,8 @@ import numpy as np
 
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 
-# Merits, larger than any goal, from which on a point misses a condition, has no value, or is not known at all; far
-# enough from each other for an order within each class.
+# Least merits, all larger than any goal, of points that miss a condition, of points without a value, and of those of
+# which nothing is known; far enough from each other for an order within each class.
 CONDITION_MISSED = 1e60
 NO_VALUE = 1e90
 UNKNOWN = 1e120
@@ -25,7 +25,7 @@ class Spent(Exception):
 
 @dataclass(frozen=True)
 class Part:
-    """Rows, columns `place` of `Points.rows`, of which a goal or a condition is the worst or the root mean square.
+    """The columns `place` of `Points.rows` whose worst value, or root mean square, is a goal or a condition.
 
     Parameters
     ----------

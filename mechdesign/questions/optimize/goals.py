@@ -21,7 +21,7 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import text_of
 from mechdesign.terms import Sum, command_of, path_of, terms_of
 
-# A shape that fits but for this part of its size is contained.
+# A shape counts as contained if it fits up to this part of its size.
 ROUNDING = 1e-9
 # A rule for the mean square of errors along a motion.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -59,7 +59,7 @@ class Goal:
     where: tuple[tuple[str, object], ...] = ()
     bound: float = 0.0
     unassembled: bool = False
-    expression: Expression | None = None  # over parameters, which no command computes: its word is empty then
+    expression: Expression | None = None  # over parameters; `command` is empty then
     outline: Outline | None = None
     gate: bool = False
 
@@ -198,7 +198,7 @@ def conditions_of(section: OptimizeSection, moved: Collection[str]) -> dict[Goal
 
 
 def bounds_of(condition: Condition | Containment, moved: Collection[str] = ()) -> Iterator[Goal]:
-    """The worst rows that a condition judges, one for each of its bounds; or the scale at which a shape is held.
+    """The goals by which a condition is judged, one for each bound; of a shape, the scale at which it fits.
 
     Designs differ in the parameters `moved`.
     """

@@ -134,7 +134,7 @@ class Designs:
         return np.array([*self.chosen, *(np.argmax(score) for score in scores)], dtype=np.intp)
 
     def merits(self, row: int) -> str:
-        """The optima that a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
+        """Which optima a design is, in words: ``knee, best GII, best for (1, 0) (1, 0.5)``."""
         places = np.flatnonzero(self.winners == row).tolist()
         marks = [self.marks[place] for place in places if place < len(self.chosen)]
         weights = [", ".join(f"{w:g}" for w in self.weights[place]) for place in places if place >= len(self.chosen)]

@@ -22,10 +22,10 @@ from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.search import sample, search
 from mechdesign.results import Table
 
-# Most evaluations for each goal where the study gives none, and where also designs are evaluated one by one.
+# Most evaluations for each goal where the study gives none: of designs in batches, and of designs one by one.
 FRONT_EVALUATIONS, ALONE_FRONT_EVALUATIONS = 30_000, 400
-# One in so many of all evaluations is spent at most on the best of each goal, on the ends of the front, and on the
-# weighted sums of a round.
+# Most evaluations, as one in so many of all, for the best of each goal, for the ends of the front, and for the weighted
+# sums of a round.
 BEST_PART, END_PART, SUMS_PART = 6, 20, 10
 # Size of a population for two goals, the least number of its generations, and the size of the smallest population. More
 # than two goals are spread by directions that divide each goal into this many parts, by the number of goals; else the

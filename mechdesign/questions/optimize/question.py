@@ -67,7 +67,7 @@ class DesignsQuestion:
     layout: Layout
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy in another process asks for the regions again."""
+        """State for another process, which computes the regions again."""
         return {name: value for name, value in self.__dict__.items() if name != "regions"}
 
     @property
@@ -87,7 +87,7 @@ class DesignsQuestion:
 
     @cached_property
     def regions(self) -> list[Question]:
-        """One question a value of the held coordinates, of which a design's worst answer counts; see `regions_of`."""
+        """A question for each value of the held coordinates; a design's worst answer counts. See `regions_of`."""
         return regions_of(self.study, self.goals)
 
     @property
@@ -181,7 +181,7 @@ def _misfits(
 
 
 class _Reader:
-    """Looks at the answers that the study's own design has, for the tables and rows of goals.
+    """Finds the tables and rows that goals need in the answers of the study's own design.
 
     `places` are those of goals in the study. What is read is described at `DesignsQuestion`; besides, `bounded` has
     goals with their bounds in the unit of their column, `rows` how many rows each has, and `margins` the number of

@@ -1,4 +1,4 @@
-"""A design that an optimisation chose: its mechanism, what was wanted of it, what it reaches, and the error."""
+"""A chosen design: its mechanism, its targets, what it reaches, and the errors."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def reached(table: Table) -> list[Reached]:
 
 
 def design_figure(study: Study, motion: Result, words: str) -> Figure:
-    """The mechanism along its motion or at its listed poses, the places wanted; below, curves wanted and reached."""
+    """The mechanism in motion or at its listed poses, with target places; below, target curves and those reached."""
     sweep, table = Sweep.of(DrawnMotion.of(motion).shown), motion.tables["motion"]
     shown = reached(table)
     title = style.folded(words, 11.0, style.width() - LEFT)
