@@ -113,7 +113,7 @@ def test_a_long_table_is_read_as_any_other(request: pytest.FixtureRequest) -> No
 def test_extremes_of_rates_are_in_the_pictures(at_once: None) -> None:
     study = study_of(FOUR_BAR)
     result = mechdesign.kinematics(study)
-    whole, seen = result.main, result.seen.main
+    whole, seen = result.main, result.pictured.main
     valid = whole["valid"]
     for name in ("P.x_velocity", "P.y_acceleration", "B.x", "crank_effort"):
         for extreme in (np.nanmin, np.nanmax):
