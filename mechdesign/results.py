@@ -233,7 +233,7 @@ class Table:
         yield self
 
     @property
-    def pictured(self) -> Table:
+    def seen(self) -> Table:
         """The rows that pictures show: all of them."""
         return self
 
@@ -302,7 +302,7 @@ class LongTable(Table):
         )  # fmt: skip
 
     @property
-    def pictured(self) -> Table:
+    def seen(self) -> Table:
         """Those of its rows that pictures show."""
         some: Table = self.__dict__["_some"]
         return some
@@ -413,9 +413,9 @@ class Result:
         return f"<Result of {self.command}: {tables}; {count or 'no'} warning{'s' * (count != 1)}>"
 
     @property
-    def pictured(self) -> Result:
+    def seen(self) -> Result:
         """The result with those rows of its tables that pictures show."""
-        return replace(self, tables={name: table.pictured for name, table in self.tables.items()})
+        return replace(self, tables={name: table.seen for name, table in self.tables.items()})
 
     @property
     def main(self) -> Table:

@@ -41,7 +41,7 @@ def readable(table: Table, shown: Table) -> list[list[str]]:
     shown : Table
         Those of its rows and columns.
     """
-    largest = _largest(table.pictured.columns)
+    largest = _largest(table.seen.columns)
     cells = []
     for column in shown.columns:
         values = column.values

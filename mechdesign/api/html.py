@@ -84,7 +84,7 @@ def answer_html(
         met=sum(verdict.met for verdict in judged),
         required=len(judged),
         unjudged=verdicts if isinstance(verdicts, str) else "",
-        headlines=headlines(answer.pictured),
+        headlines=headlines(answer.seen),
         warnings=answer.warnings,
         picture=_inline(picture),
         table=main,

@@ -211,7 +211,7 @@ class Answer(Result):
             return Gallery()
         with style.context():
             drawn = figures(self.study, self)
-            drawn.add(MECHANISM, mechanism_figure, self.study, self.pictured)
+            drawn.add(MECHANISM, mechanism_figure, self.study, self.seen)
         return drawn
 
 

@@ -80,7 +80,7 @@ def write(
         drawn: dict[str, bytes] = {}
         plots = output.plots and not result.interrupted
         if plots:
-            drawn, warnings = ahead.call(pictures, study, result.pictured, output, jobs, before)
+            drawn, warnings = ahead.call(pictures, study, result.seen, output, jobs, before)
         if output.report:
             from mechdesign.report.page import section
 
@@ -115,8 +115,8 @@ def _check_room(directory: Path, result: Result) -> None:
     """Check that the disk has room for long tables before they are written."""
     need = 0.0
     for table in result.tables.values():
-        if isinstance(table, LongTable) and len(table.pictured):
-            need += sum(map(len, csv_blocks(table.pictured))) / len(table.pictured) * len(table)
+        if isinstance(table, LongTable) and len(table.seen):
+            need += sum(map(len, csv_blocks(table.seen))) / len(table.seen) * len(table)
     free = shutil.disk_usage(directory).free if need else 0
     if need > free:
         raise OutputError(
@@ -203,7 +203,7 @@ def pictures(
     from mechdesign.report.page import vector
 
     formats = output.formats.split(",")
-    result = result.pictured
+    result = result.seen
     with style.context(output.style):
         gallery = figures(study, result, before)
 

@@ -15,6 +15,6 @@ def figure_of(study: Study, result: Result, name: str, before: Before | None = N
     """The figure of this name among the `figures` of a result; use inside `style.context`."""
     picture = next(picture for picture in pictures(result.command) if name in picture.names)
     gallery = Gallery()
-    gallery.add(name, picture, picture.view(study, result.pictured, before))
+    gallery.add(name, picture, picture.view(study, result.seen, before))
     assert not gallery.failed
     return gallery[name]

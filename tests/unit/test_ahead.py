@@ -75,7 +75,7 @@ def test_an_error_of_the_work_is_raised(module: str) -> None:
 def test_a_result_is_the_same_in_another_process() -> None:
     study = mechdesign.load(text=FOUR_BAR)
     result = mechdesign.kinematics(study)
-    _, sent = pickle.loads(pickle.dumps((study, result.pictured)))
+    _, sent = pickle.loads(pickle.dumps((study, result.seen)))
     assert sent.main["rocker.angle"].tolist() == result.main["rocker.angle"].tolist()
     largest = [each.main.scope.course(Request("rocker.angle")).worst(1)[0] for each in (result, sent)]
     assert largest[0] == largest[1]

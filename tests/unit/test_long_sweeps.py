@@ -87,7 +87,7 @@ def test_what_is_made_piece_by_piece_is_what_is_made_at_once(
     whole = mechdesign.kinematics(study, all_modes=all_modes)
     request.getfixturevalue("at_once")
     long = mechdesign.kinematics(study, all_modes=all_modes)
-    assert whole.pictured.main is whole.main
+    assert whole.seen.main is whole.main
     assert isinstance(long.main, LongTable)
     assert texts(long) == texts(whole)
     assert (long.warnings, long.counts) == (whole.warnings, whole.counts)
@@ -113,7 +113,7 @@ def test_a_long_table_is_read_as_any_other(request: pytest.FixtureRequest) -> No
 def test_extremes_of_rates_are_in_the_pictures(at_once: None) -> None:
     study = study_of(FOUR_BAR)
     result = mechdesign.kinematics(study)
-    whole, seen = result.main, result.pictured.main
+    whole, seen = result.main, result.seen.main
     valid = whole["valid"]
     for name in ("P.x_velocity", "P.y_acceleration", "B.x", "crank_effort"):
         for extreme in (np.nanmin, np.nanmax):

@@ -339,7 +339,7 @@ def drawn_design(designs: Designs, design: Design) -> DrawnDesign:
             return DrawnDesign(plain, result, list(zip(shapes, _centres(plain, shapes), strict=True)))
     with suppress(MechdesignError):
         if any(goal.command == "kinematics" for goal in designs.goals):
-            motion = kinematics(made).pictured
+            motion = kinematics(made).seen
             return DrawnDesign(made, motion=motion, shown=DrawnMotion.of(motion).shown)
         return DrawnDesign(made, shown=solve_shown(made))
     return DrawnDesign(made)

@@ -130,7 +130,7 @@ class Explorer:
     left, reserve : int
         Evaluations that are left, and how many of these are kept for later.
     visited : ndarray of int
-        Rows of `points` that were asked for since the last `forget`.
+        Rows of `points` that were requested since the last `forget`.
     """
 
     def __init__(
@@ -158,7 +158,7 @@ class Explorer:
 
     @property
     def visited(self) -> Ints:
-        """Rows of `points` that were asked for since the last `forget`, each once."""
+        """Rows of `points` that were requested since the last `forget`, each once."""
         return np.unique(np.concatenate([np.empty(0, dtype=np.intp), *self._visits]))
 
     def forget(self) -> None:

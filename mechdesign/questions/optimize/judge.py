@@ -184,7 +184,7 @@ class Designs:
         return "" if condition.outline is not None else self._kind(condition)[1]
 
     def columns(self, rows: Ints | slice, *, errors: bool = False) -> Iterator[Column]:
-        """Variables and goals of some designs, with the goals' errors where they are asked for, and the CPI."""
+        """Variables and goals of some designs, with the goals' errors if `errors` is true, and the CPI."""
         for name in self.variables:
             yield VARIABLE.column(self.shown(name)[rows], self.unit_of(name), variable=name)
         for goal in self.goals:

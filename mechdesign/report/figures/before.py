@@ -44,7 +44,7 @@ class Before(NamedTuple):
                 raise StudyError(f"{who}: it moves {then}, this study {now}; give both the same sweep or path")
         elif _kind(result) != _kind(earlier):
             raise StudyError(f"{who}: a path, a region and a region over a range are not drawn over each other")
-        return cls(before, earlier.pictured, _names(study, before))
+        return cls(before, earlier.seen, _names(study, before))
 
 
 def _runs_over(result: Result) -> str:

@@ -101,6 +101,6 @@ def figures(study: Study, result: Result, before: Before | None = None) -> Galle
     views: dict[type[View], View] = {}
     for picture in pictures(result.command):
         if picture.view not in views:
-            views[picture.view] = picture.view(study, result.pictured, before)
+            views[picture.view] = picture.view(study, result.seen, before)
         gallery.add(picture.names[0], picture, views[picture.view])
     return gallery

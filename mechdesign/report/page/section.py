@@ -52,11 +52,11 @@ def section(
     plots : bool
         Whether pictures are wanted; without them nothing moves.
     """
-    part, warnings, numbers = None, tuple(undrawn), headlines(result.pictured)
+    part, warnings, numbers = None, tuple(undrawn), headlines(result.seen)
     if plots and not result.interrupted:
         try:
             marked = [number.place for number in numbers if number.place is not None]
-            part = _moving(study, result.pictured, before, marked)
+            part = _moving(study, result.seen, before, marked)
         except Exception as error:
             still = f"the mechanism cannot be shown moving: {explain(error)[1]}"
             warnings = (*warnings, Caution("undrawn", still))
