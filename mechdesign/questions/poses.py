@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -310,6 +311,10 @@ class Shown:
     poses: Poses
     rows: Ints
     configuration: Configuration
+
+    def take(self, index: Ints) -> Self:
+        """Some of the poses."""
+        return replace(self, rows=self.rows[index], configuration=self.configuration.take(index))
 
 
 @dataclass(eq=False)

@@ -107,7 +107,7 @@ def poses_of(answers, name):
     """Places of the poses that a page draws, in rows of the table of motion."""
     result = answers[name][1]
     marked = [number.place for number in headlines(result) if number.place is not None]
-    drawn, _ = frames(result.drawn, result.tables["motion"], marked)
+    drawn, *_ = frames(result.drawn, result.tables["motion"], marked)
     return drawn.poses.numbers.tolist()
 
 

@@ -9,7 +9,7 @@ from helpers.pages import faults
 
 import mechdesign
 from mechdesign.questions.dynamics.analysis import DrawnForces
-from mechdesign.questions.dynamics.free_bodies import actions
+from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
 
@@ -52,7 +52,7 @@ def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
     study = mechdesign.load(text=text) if ":" in text else study_named(text)
     record = DrawnForces.of(mechdesign.dynamics(study))
     for index in (0, 7, 19):
-        acting = actions(record.motion, record.shown, index)
+        acting = [each.at(0) for each in actions_on(record.motion, record.shown.take(np.array([index])))]
         links = {action.link for action in acting} - {"ground", ""}
         assert links == set(study.mechanism.description.links) - {"ground"}
         largest = max(action.size for action in acting)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -36,13 +36,16 @@ class ForceQuestion:
 
     study: Study
     section: DynamicsSection
+    joints: Joints
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
-    tempo: float = 0.0  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
+    tempo: float  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
+    wanted: frozenset[str] | None = None  # columns of `statics` to be computed; None of all with what joints bear
 
-    @cached_property
-    def joints(self) -> Joints:
-        """The joints of the mechanism."""
-        return self.section.joints(self.study.mechanism)
+    @classmethod
+    def of(cls, study: Study, *, moves: bool, tempo: float = 0.0) -> ForceQuestion:
+        """What the section `dynamics` of a study asks."""
+        assert study.dynamics is not None
+        return cls(study, study.dynamics, study.dynamics.joints(study.mechanism), moves, tempo)
 
     @property
     def forces(self) -> list[str]:
@@ -83,24 +86,23 @@ class ForceQuestion:
                     forces.append(abs(quantity) / (length if kind == "moment" else 1.0))
         return sum(forces)
 
-    @quiet
-    def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
-        """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
-        columns, held = self._held(poses, linear, rows, moving)
-        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
-            columns |= self._parts(name, reaction)
-        return columns
+    def lean(self, names: Collection[str]) -> ForceQuestion:
+        """The question for some of the columns of `statics` alone."""
+        return replace(self, wanted=frozenset(names))
 
     @quiet
-    def values(
-        self, names: Sequence[str], poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
-    ) -> list[Value]:
-        """Some of the columns of `statics`; joint forces are computed only where one is among them."""
+    def columns(
+        self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+    ) -> Mapping[str, Value]:  # fmt: skip
+        """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
+
+        Where some columns alone are wanted it is the sizes of joint forces, if they are among these.
+        """
         columns, held = self._held(poses, linear, rows, moving)
-        if not set(names).isdisjoint(self.forces):
-            borne = zip(self.forces, reactions(self.joints, held), strict=True)
-            columns |= {name: np.abs(reaction.force) for name, reaction in borne}
-        return [columns[name] for name in names]
+        if self.wanted is None or not self.wanted.isdisjoint(self.forces):
+            for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
+                columns |= self._parts(name, reaction) if self.wanted is None else {name: np.abs(reaction.force)}
+        return columns
 
     def _held(
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
@@ -111,7 +113,7 @@ class ForceQuestion:
         Loading(study, section.loads, poses, rows).add(forces, moving)
         description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
         energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
-        masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
+        masses = self.masses(poses, rows, linear.configuration.places)
         energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
         held = balance(linear, forces)
         columns: dict[str, Value] = {}
@@ -125,6 +127,10 @@ class ForceQuestion:
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
         return columns, held
+
+    def masses(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
+        """Masses of bodies: those given, and of other links those of their beams."""
+        return {**self._beams(poses, rows, places), **self.study.mechanism.description.masses}
 
     def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""
@@ -173,5 +179,5 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         asked, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, pace.rated, asked.tempo),
+        borne=ForceQuestion.of(study, moves=pace.rated, tempo=asked.tempo),
     )  # fmt: skip

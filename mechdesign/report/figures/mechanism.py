@@ -14,7 +14,7 @@ from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import mass_centers
-from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.drawn import DrawnPoses
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
@@ -49,7 +49,7 @@ def mechanism_figure(study: Study, result: Result) -> Figure:
         scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
         if scenes[1] is not None:
             return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
-    shown = result.drawn.shown if isinstance(result.drawn, DrawnMotion | DrawnForces) else None
+    shown = result.drawn.shown if isinstance(result.drawn, DrawnPoses) else None
     return sketch_and_first_pose(study, shown, masses=isinstance(result.drawn, DrawnForces))
 
 
