@@ -39,11 +39,14 @@ class Forces:
         Force on the pin at each node.
     bodies : dict
         By body, the force on it at its base, and the moment about that.
+    parts : list of (str, Vector, Value, Vector)
+        What these add up: the body, the force, the moment about where it acts, and the arm from the base to there.
     """
 
     configuration: Configuration
     nodes: list[Vector] = field(default_factory=list)
     bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
+    parts: list[tuple[str, Vector, Value, Vector]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.nodes = [0.0] * len(self.configuration.nodes)
@@ -55,6 +58,7 @@ class Forces:
 
     def on_body(self, body: str, force: Vector, moment: Value = 0.0, arm: Vector = 0.0) -> None:
         """Add a force on a body at an arm from its base, and a moment."""
+        self.parts.append((body, force, moment, arm))
         before = self.bodies.get(body, (0.0, 0.0))
         self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
 

@@ -60,24 +60,28 @@ def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    for name in dict.fromkeys((section, "kinematics")):
-        asked: PoseSection | None = getattr(study, name)
-        if asked is not None and asked.at_nodes:
+    for asked in _with_poses(study, section):
+        if asked.at_nodes:
             # Here, for regions need SciPy, which is slow to import.
             from mechdesign.region.curves import workspace_nodes
 
             return workspace_nodes(study)
-        if asked is not None:
-            poses = expand(asked, study.folder, numbers)
-            if poses is not None:
-                return poses
+        poses = expand(asked, study.folder, numbers)
+        if poses is not None:
+            return poses
     return default(study.mechanism.description, numbers)
+
+
+def _with_poses(study: Study, section: str) -> list[PoseSection]:
+    """The sections of a study that may give the poses of one, in their order."""
+    own: PoseSection | None = getattr(study, section)
+    names = (section, *(own.fallbacks if own is not None else ("kinematics",)))
+    return [asked for name in dict.fromkeys(names) if (asked := getattr(study, name)) is not None]
 
 
 def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
-    asked = next((each for name in dict.fromkeys((section, "kinematics"))
-                  if (each := getattr(designs.study, name)) is not None and each.source is not None), None)  # fmt: skip
+    asked = next((each for each in _with_poses(designs.study, section) if each.source is not None), None)
     counts = (
         np.zeros((len(rows), 0))
         if asked is None

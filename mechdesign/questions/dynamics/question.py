@@ -11,9 +11,10 @@ from itertools import pairwise
 import numpy as np
 
 from mechdesign.expressions import Expression
+from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
+from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, springs
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
@@ -25,6 +26,7 @@ from mechdesign.questions.loads import Loading
 from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import MotionSection
 
 # Parts of what a joint bears, as columns of its own.
 PARTS = ("fx", "fy", "moment", "magnitude", "angle", "normal")
@@ -108,13 +110,9 @@ class ForceQuestion:
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
     ) -> tuple[dict[str, Value], Balance]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
-        study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
-        forces = Forces(linear.configuration)
-        Loading(study, section.loads, poses, rows).add(forces, moving)
-        description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
-        energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
+        mechanism = self.study.mechanism
         masses = self.masses(poses, rows, linear.configuration.places)
-        energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
+        forces, energy = self.forces_at(poses, linear.configuration, rows, moving, masses)
         held = balance(linear, forces)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
@@ -127,6 +125,18 @@ class ForceQuestion:
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
         return columns, held
+
+    def forces_at(
+        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving, masses: Mapping[str, Mass]
+    ) -> tuple[Forces, Energy]:
+        """What acts on the mechanism: loads, springs, and weights and inertia of some masses; and their energies."""
+        study, section = self.study, poses.section(self.section, rows)
+        geometry, gravity = study.mechanism.geometry, section.gravity[0] + 1j * section.gravity[1]
+        forces = Forces(configuration)
+        Loading(study, section.loads, poses, rows).add(forces, moving)
+        energy = springs(forces, geometry, list(study.mechanism.description.springs.values()), moving)
+        energy += inertia(forces, geometry, masses, moving, gravity, study.units.inertia_factor)
+        return forces, energy
 
     def masses(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of bodies: those given, and of other links those of their beams."""
@@ -168,16 +178,21 @@ def weighed_beams(study: Study) -> list[str]:
     ]  # fmt: skip
 
 
+def pace(study: Study) -> MotionSection:
+    """The section that gives the rates of a study's dynamics: its own, or without any that of kinematics."""
+    own = study.dynamics
+    return own if own is not None and own.moves else study.kinematics or KinematicsSection()
+
+
 def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
-    section, own = study.dynamics, study.kinematics or KinematicsSection()
+    section, rated = study.dynamics, pace(study)
     assert section is not None
-    pace = section if section.moves else own
-    rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
+    rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     asked = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         asked, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion.of(study, moves=pace.rated, tempo=asked.tempo),
+        borne=ForceQuestion.of(study, moves=rated.rated, tempo=asked.tempo),
     )  # fmt: skip

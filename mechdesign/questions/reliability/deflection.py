@@ -155,15 +155,22 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     if stiffness is None:
         return None, []
     section = poses.section(study.reliability)
-    loads = poses.section(stiffness).loads if section.load is None else (section.load,)
+    loads = poses.section(stiffness).wrenches if section.load is None else [section.load]
     notes = []
     if len(loads) > 1:
         notes.append(Caution(
             "assumed",
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            f"for example reliability.load: [{', '.join(f'{part:g}' for part in stiffness.loads[0])}]",
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0] or (0.0, 0.0, 0.0))}]",
         ))  # fmt: skip
-    load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
+    elif loads == [None]:
+        notes.append(Caution(
+            "assumed",
+            f"the load of the stiffness section does not act on {stiffness.at} alone: errors are those of the unloaded "
+            "mechanism",
+        ))  # fmt: skip
+    single = (loads[0] if len(loads) == 1 else None) or (0.0, 0.0, 0.0)
+    load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, single)))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
     asked, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism

@@ -18,7 +18,7 @@ from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
 from mechdesign.questions.stiffness.elements import beam_line, corners_of
-from mechdesign.questions.stiffness.figures.joint_forces import load_in_words
+from mechdesign.questions.stiffness.figures.joint_forces import cases_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
@@ -65,7 +65,8 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
     if scene is None or not drawn.twists:
         return None
     shapes, at = _shapes(drawn, scene), scene.points[asked.section.point]
-    loads = np.array(asked.section.loads[:MAX_LOADS])[:, : asked.size]
+    loads = asked.loads[0, :MAX_LOADS, : asked.size]
+    words = cases_in_words(study)
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
         return None
@@ -92,7 +93,7 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
             sweep = np.copysign(1.5 * np.pi, load[2])
             draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
         size = abs(shapes[0][1][0, k])
-        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {quantity(float(size), length)}",
+        axes.set_title(f"{words[k]}\n{name} moves {quantity(float(size), length)}",
                        loc="left", fontsize=9)  # fmt: skip
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
@@ -255,5 +256,5 @@ def directions_figure(view: StiffnessView) -> Figure | None:
 def _force(study: Study) -> float:
     """The force of an ellipse: about the largest of the study's loads, or else one unit."""
     assert study.stiffness is not None
-    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    loads = [abs(complex(*wrench[:2])) for wrench in study.stiffness.wrenches if wrench is not None]
     return round_down(max(loads)) if any(loads) else 1.0
