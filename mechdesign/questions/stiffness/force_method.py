@@ -34,6 +34,9 @@ from mechdesign.questions.stiffness.screws import RANK, RIGID
 SELF_STRESS = 1e-13
 # So are those with less than this fraction (rounding squared) of the largest energy that loop wrenches could store.
 STORED = 1e-26
+# Of a freedom the edges that have it (1 or 0), its twist and compliance, and what loads on beams put on it and strain it
+# by.
+_Row = tuple[Floats, Floats, Value | None, Floats | None, Floats | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +116,7 @@ class Loaded:
     @property
     def size(self) -> int:
         """Number of unit loads."""
-        return self.held.compliance.shape[1]
+        return int(self.held.compliance.shape[1])
 
     @cached_property
     def wrenches(self) -> Floats:
@@ -166,8 +169,7 @@ def twists_of(
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
-    # A row for each freedom: the edges that have it (1 or 0), the twist and the compliance, and loads within it.
-    rows = [
+    rows: list[_Row] = [
         (np.eye(len(network.edges))[k][:, None], *freedom, None, None)
         for k, edge in enumerate(network.edges) if not edge.beam
         for freedom in freedoms(edge.elements, section, configuration, origin)
@@ -203,7 +205,7 @@ def twists_of(
 def _beam_freedoms(
     network: Network, edges: Sequence[int], section: StiffnessSection, configuration: Configuration,
     origin: Complexes, applied: Applied | None,
-) -> Iterator[tuple[Floats, Floats, Value, Floats | None, Floats | None]]:  # fmt: skip
+) -> Iterator[_Row]:  # fmt: skip
     """Freedoms of the beams of one link, cut wherever something is attached.
 
     Yields of each freedom the edges that run over its part of the beams (1 or 0), shape (edges, n) or (edges, 1), its
