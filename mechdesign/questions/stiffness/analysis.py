@@ -28,7 +28,7 @@ from mechdesign.questions.poses import (
     solve_poses,
     study_poses,
 )
-from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold
+from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold, pushes
 from mechdesign.questions.stiffness.compliance import Held, put
 from mechdesign.questions.stiffness.elements import Guide, Hinge, corners_of
 from mechdesign.questions.stiffness.force_method import Effects, effects_of
@@ -150,6 +150,8 @@ class DrawnPose:
         Equivalent springs of the legs in it.
     twists : dict of str to ndarray, shape (3, loads)
         By vertex, its twist about the asked point under each load, in the units of the mechanism.
+    pushes : dict
+        By the number of each load elsewhere, its places, forces and moments; see `pushes`.
     """
 
     body: Body
@@ -157,6 +159,7 @@ class DrawnPose:
     configuration: Configuration
     springs: Springs
     twists: dict[str, Floats]
+    pushes: dict[int, list[tuple[complex, complex, float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +187,8 @@ def _drawn_pose(body: Body, poses: Poses, solved: Solved, pose: Pose | None) -> 
     body = body.at(poses, np.array([row]))
     moved = by_forces(body, configuration, loads=True).displacements if body.given.wrenches else {}
     twists = {vertex: (twist @ body.summed(configuration))[0] for vertex, twist in moved.items()}
-    return DrawnPose(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
+    springs = solved.springs.take(solved.springs.row == row)
+    return DrawnPose(body, row, configuration, springs, twists, pushes(body, configuration))
 
 
 def solve(

@@ -34,8 +34,8 @@ from mechdesign.questions.stiffness.screws import RANK, RIGID
 SELF_STRESS = 1e-13
 # So are those with less than this fraction (rounding squared) of the largest energy that loop wrenches could store.
 STORED = 1e-26
-# Of a freedom the edges that have it (1 or 0), its twist and compliance, and what loads on beams put on it and strain it
-# by.
+# Of a freedom: the edges that have it (1 or 0), its twist, its compliance, and what loads on beams put on it and strain
+# it by.
 _Row = tuple[Floats, Floats, Value | None, Floats | None, Floats | None]
 
 

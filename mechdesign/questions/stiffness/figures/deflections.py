@@ -86,12 +86,13 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
         moved = lines[0][0]
         axes.plot([at.real, moved.real], [at.imag, moved.imag], ":", color=style.BLUE, linewidth=1.4, zorder=5.2)
         axes.plot([moved.real], [moved.imag], "o", color=style.BLUE, zorder=6)
-        # The arrows act where the load does: at the asked point, here where it has moved.
-        if push := complex(*load[:2]):
-            draw(axes, force(moved, push / abs(push), style.VERMILION), order=5.5)
-        if load[2:] and load[2]:
-            sweep = np.copysign(1.5 * np.pi, load[2])
-            draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
+        # The arrows act where the load does; at the asked point, where it has moved.
+        own = (complex(moved), complex(*load[:2]), load[2] if load[2:] else 0.0)
+        for place, push, turn in drawn.pushes.get(k, [own]):
+            if push:
+                draw(axes, force(place, push / abs(push), style.VERMILION), order=5.5)
+            if turn:
+                draw(axes, arc(place, -np.pi / 4, np.copysign(1.5 * np.pi, turn), ARC, style.VERMILION), order=5.5)
         size = abs(shapes[0][1][0, k])
         axes.set_title(f"{words[k]}\n{name} moves {quantity(float(size), length)}",
                        loc="left", fontsize=9)  # fmt: skip
