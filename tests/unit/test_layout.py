@@ -29,7 +29,6 @@ ORDER = (
     ("mechdesign.questions.kinematics",),
     ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.stiffness",),
-    ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.reliability",),
     ("mechdesign.questions.workspace",),
     ("mechdesign.questions.optimize",),

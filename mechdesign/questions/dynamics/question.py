@@ -23,7 +23,6 @@ from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import MotionSection
@@ -151,7 +150,7 @@ class ForceQuestion:
         for name in weighed_beams(self.study):
             link, section = mechanism.description.links[name], sections[stiffness.elastic[name]]
             assert section.density is not None
-            corners = [mechanism.geometry.place(name, point, places) for point in corners_of(link)]
+            corners = [mechanism.geometry.place(name, point, places) for point in link.corners]
             spans = [(b - a, (a + b) / 2) for a, b in pairwise(corners)]
             bars = [section.density * section.extent[0] * np.abs(along) for along, _ in spans]
             mass = sum(bars)

@@ -23,7 +23,6 @@ from mechdesign.questions.reliability.question import Channel, CoordinateChannel
 from mechdesign.questions.reliability.schema.section import links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
-from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -179,7 +178,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
     for link, points in network.points.items():
         carried = {(link, graph.node(point)): vertex for point, vertex in points if vertex in network.paths}
-        corners = [(link, graph.node(point)) for point in corners_of(links[link])]
+        corners = [(link, graph.node(point)) for point in links[link].corners]
         if len(carried) == len(points) and len({*carried.values()}) == 1:
             bodies[link] = next(iter(carried.values()))
         elif len(corners) == 2 and carried.keys() >= {*corners}:

@@ -30,7 +30,7 @@ from mechdesign.questions.poses import (
 )
 from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold, pushes
 from mechdesign.questions.stiffness.compliance import Held, put
-from mechdesign.questions.stiffness.elements import Guide, Hinge, corners_of
+from mechdesign.questions.stiffness.elements import Guide, Hinge
 from mechdesign.questions.stiffness.force_method import Effects, effects_of
 from mechdesign.questions.stiffness.tables import (
     Springs,
@@ -317,7 +317,7 @@ def _without_beam(study: Study, body: Body) -> list[Caution]:
             "ends",
         )
         for name in body.given.elastic
-        if len(corners_of(links[name])) < 2
+        if len(links[name].corners) < 2
     ]
 
 

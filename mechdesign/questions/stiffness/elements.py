@@ -29,11 +29,6 @@ NEAREST = 1e-9
 _FAR_FROM_JOINTS = 10.0
 
 
-def corners_of(link: Link) -> tuple[str, ...]:
-    """The points between which the beams of an elastic link run; a telescopic one is a single beam."""
-    return link.ends or tuple(link.points)
-
-
 @dataclass(frozen=True)
 class Hinge:
     """A revolute joint at a point; driven if `drive` names a drive."""
@@ -175,7 +170,7 @@ class BeamLine:
 
 def beam_line(link: Link, configuration: Configuration) -> BeamLine:
     """The beams of a link in a batch of poses; a telescopic link has a direction even where its length is zero."""
-    names = corners_of(link)
+    names = link.corners
     corners = np.array([configuration.point(name) for name in names])
     spans = np.diff(corners, axis=0)
     lengths = np.abs(spans)

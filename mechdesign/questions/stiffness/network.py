@@ -23,7 +23,7 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.statics import PIN
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift, corners_of
+from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
@@ -230,7 +230,7 @@ class _Builder:
         """Add the beams of a link, from their beginning to each other point and to each slide on the link."""
         link = self.mechanism.description.links[name]
         body = rod_of(name) if link.telescopic else name
-        points = {point: point for point in corners_of(link)}
+        points = {point: point for point in link.corners}
         if not link.telescopic:
             points |= {point: point for point in link.points} | self.riding.get(name, {})
         root, *seats = points

@@ -178,11 +178,11 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.questions.stiffness.elements import beam_line, corners_of
+    from mechdesign.questions.stiffness.elements import beam_line
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
-    corners = corners_of(link)
+    corners = link.corners
     yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in corners])
     if link.telescopic or len(corners) < 2:
         return

@@ -17,7 +17,7 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
-from mechdesign.questions.stiffness.elements import beam_line, corners_of
+from mechdesign.questions.stiffness.elements import beam_line
 from mechdesign.questions.stiffness.figures.joint_forces import cases_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
@@ -165,7 +165,7 @@ def _bent(
     course = beam_line(beam.link, configuration)
     # The rod of a telescopic leg slides in its cylinder, whose pin stays where it is.
     root = beam.link.name if beam.link.telescopic else ways[0].a
-    sitting = [(root, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
+    sitting = [(root, beam.link.corners[0]), *((edge.b, edge.point) for edge in ways)]
     feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
     bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
     order = sorted(range(len(feet)), key=feet.__getitem__)
