@@ -6,14 +6,12 @@ tolerances that go by the size of a dimension, are found anew from the data.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
 
 from mechdesign.errors import StudyError, printable
-from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
@@ -48,14 +46,13 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
+    texts = overrides(changes)
     document = Document.of(data)
-    override(document, overrides(changes))
+    override(document, texts)
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
-    return load_document(
-        document, study.source, (*study.overrides, *overrides(changes)),
-        original=study.mechanism if same_sketch(data, study.resolved) else None,
-    )  # fmt: skip
+    original = study.mechanism if same_sketch(data, study.resolved) else None
+    return load_document(document, study.source, (*study.overrides, *texts), original=original)
 
 
 def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:
@@ -88,12 +85,11 @@ def entry_unit(study: Study, name: str) -> str:
 
 def remeasured(study: Study, names: Collection[str]) -> bool:
     """Whether dimensions measured in the sketch depend on these parameters or places."""
-    if not study.parameters.measured:
+    parameters = study.parameters
+    if not parameters.measured:
         return False
-    sketch = study.resolved["mechanism"].get("sketch")
-    return _mentions(sketch, study.parameters.moved(names)) or not _drawing(study).isdisjoint(
-        study.parameters.moved_places(names)
-    )
+    drawn_anew = not parameters.sketched.isdisjoint(parameters.moved(names))
+    return drawn_anew or not _drawing(study).isdisjoint(parameters.moved_places(names))
 
 
 def _drawing(study: Study) -> set[str]:
@@ -104,20 +100,11 @@ def _drawing(study: Study) -> set[str]:
         joint = joints.get(place.rpartition(".")[0])
         owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
     points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
-    found = {f"{name}.length" for name in owners if len(links[name].points) > 2}
+    lengths = {f"{name}.length" for name in owners if len(links[name].points) > 2}
     # The numbers of the ground place its points in the sketch.
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
-    return found | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
-
-
-def _mentions(data: Any, names: Collection[str]) -> bool:
-    """Whether a text in the data is an expression with one of the names."""
-    for _, text in leaves(data) if names else ():
-        with contextlib.suppress(ExpressionError):
-            if isinstance(text, str) and not Expression.parse(text).names.isdisjoint(names):
-                return True
-    return False
+    return lengths | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:
@@ -159,9 +146,9 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
     described, numbers = study.mechanism.description.links[name], study.mechanism.nominal
     raw = dict(zip(LINK_KEYS, links[name], strict=False)) if isinstance(links[name], list) else dict(links[name])
     given = raw.get("points") if any(key in raw for key in LINK_KEYS) else raw
-    known = given if isinstance(given, dict) else {}
+    written = given if isinstance(given, dict) else {}
     points = {
-        point: known.get(point) or [numbers[term] if isinstance(term, str) else term for term in terms]
+        point: written.get(point) or [numbers[term] if isinstance(term, str) else term for term in terms]
         for point, terms in described.points.items()
         if point not in (described.ends or ())
     }
@@ -199,12 +186,12 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return None
     text, document = study.text.decode("utf-8-sig"), read(study.text, "")
     written = document.data
-    wanted = {key: value for key, value in data.items() if key in written}
+    target = {key: value for key, value in data.items() if key in written}
     # The loader fills in all units; the text may name only some.
     if "units" in written:
-        wanted["units"] = written["units"]
+        target["units"] = written["units"]
     edits = []
-    for keys, entries in _replaced(written, wanted, ()):
+    for keys, entries in _replaced(written, target, ()):
         if not entries:
             edits.append(_removal(text, document, keys))
             continue
@@ -215,16 +202,16 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         between = ", " if inside_flow else "\n" + " " * (name.column - 1)
         edits.append((name.start, value.end, between.join(_in_one_line(*entry) for entry in entries.items())))
     now = dict(leaves(written))
-    for keys, new in leaves(wanted):
+    for keys, new in leaves(target):
         if keys in now and new != now[keys]:
             edits.append((document.values[keys].start, document.values[keys].end, in_yaml(new)))
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
     if "seed" not in written and data["seed"]:
-        wanted["seed"] = data["seed"]
+        target["seed"] = data["seed"]
         text = f"seed: {data['seed']}\n{text}"
     try:
-        return text if read(text.encode(), "").data == wanted else None
+        return text if read(text.encode(), "").data == target else None
     except StudyError:
         return None
 

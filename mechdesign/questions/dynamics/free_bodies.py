@@ -13,7 +13,7 @@ from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.statics import PIN, Contact
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.dynamics.tables import asked_of
+from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
@@ -77,8 +77,8 @@ class _Poses:
     """Poses with their rates."""
 
     def __init__(self, motion: Motion, shown: Shown) -> None:
-        self.motion, self.asked = motion, asked_of(motion)
-        self.study, self.poses = self.asked.study, motion.question.poses
+        self.motion, self.question = motion, question_of(motion)
+        self.study, self.poses = self.question.study, motion.question.poses
         self.rows, self.configuration = shown.rows, shown.configuration
         linear = self.study.mechanism.linearize(self.configuration)
         solved = SolvedPoses(self.rows, self.poses.groups[0].names, self.configuration)
@@ -101,7 +101,7 @@ class _Poses:
         return Acting(kind, name, link, at, way, turning.real, reaction)
 
     def _joints(self) -> Iterator[Acting]:
-        for name, contact in zip(self.asked.forces, self.asked.joints.contacts, strict=True):
+        for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
             place, sides = self.configuration.nodes[contact.node], _sides(contact)
             if sides[0] != sides[1]:
@@ -110,10 +110,10 @@ class _Poses:
                     yield self._acting("joint", contact.joint, side, place, force, sign * moment, reaction=sign < 0)
 
     def _masses(self) -> Iterator[Acting]:
-        geometry, section = self.study.mechanism.geometry, self.poses.section(self.asked.section, self.rows)
+        geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section, self.rows)
         factor, still = self.study.units.inertia_factor, Moving()
         gravity = section.gravity[0] + 1j * section.gravity[1]
-        for body, mass in self.asked.masses(self.poses, self.rows, self.configuration.places).items():
+        for body, mass in self.question.masses(self.poses, self.rows, self.configuration.places).items():
             for kind, fall, moving in (("weight", gravity, still), ("inertia", 0j, self.moving)):
                 forces = Forces(self.configuration)
                 inertia(forces, geometry, {body: mass}, moving, fall, factor)
@@ -123,7 +123,7 @@ class _Poses:
                 yield self._acting(kind, kind, _link(body), place, force, moment - (np.conj(arm) * force).imag)
 
     def _loads(self) -> Iterator[Acting]:
-        for load in self.asked.section.loads:
+        for load in self.question.section.loads:
             forces = Forces(self.configuration)
             Loading(self.study, [load], self.poses, self.rows).add(forces, self.moving)
             ends = (load.at,) if load.at is not None else load.between or ()
@@ -149,7 +149,7 @@ class _Poses:
             node, link = graph.node(end), end.rpartition(".")[0]
             body = link if link in forces.bodies or not link else rod_of(link)
             force = forces.bodies[body][0] if link else forces.nodes[node]
-            owner = _link(body) if link else _link(self.asked.joints.sole.get(node, ""))
+            owner = _link(body) if link else _link(self.question.joints.sole.get(node, ""))
             yield self._acting(kind, name, owner, self.configuration.nodes[node], force)
 
     def _efforts(self) -> Iterator[Acting]:

@@ -410,7 +410,7 @@ def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collec
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
     """Report a bound that a parameter in `moved` changes."""
-    raw, names = checker.reporter.raw(path), frozenset[str]()
+    raw, names = checker.reporter.document.raw(path), frozenset[str]()
     # A text that is no expression has been reported.
     with suppress(ExpressionError):
         names = Expression.parse(str(raw)).names
@@ -435,7 +435,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
     command, _, rest = name.partition(".")
     known = _known()
     if rest:
-        checker.known(command, COMMANDS, "command", path)
+        checker.check_name(command, COMMANDS, "command", path)
     elif required or name not in known:
         names = known if required else (*known, *checker.parameters.nominal)
         hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"

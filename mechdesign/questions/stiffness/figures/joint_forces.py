@@ -68,10 +68,10 @@ def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
         return None
     loads = cases_in_words(study)[:MAX_LOADS]
     kinds = {"force": forces[:MAX_JOINTS], "moment": moments[:MAX_JOINTS]}
-    heading, what = ("Forces in the joints", "force") if section.dynamics else (HEADING, "static force")
+    heading, noun = ("Forces in the joints", "force") if section.dynamics else (HEADING, "static force")
     return {
         "joint_forces": joint_curves(study, heading, kinds, loads, over),
-        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, what=what),
+        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, noun=noun),
     }
 
 
