@@ -187,7 +187,9 @@ class StiffnessSection(PoseSection):
     def _loads_in_full(cls, raw: Any) -> Any:
         if not isinstance(raw, dict) or not isinstance(raw.get("loads"), list):
             return raw
-        return {**raw, "loads": [_load(load, raw) for load in raw["loads"]]}
+        # Without a point, which is a mistake of its own, a list of numbers acts nowhere.
+        loads = [_load(load, raw) for load in raw["loads"] if "at" in raw or not isinstance(load, list)]
+        return {**raw, "loads": loads}
 
     @property
     def wrenches(self) -> list[tuple[Number, Number, Number] | None]:
@@ -267,7 +269,7 @@ class StiffnessSection(PoseSection):
         own = checker.parts.get("dynamics")
         checker.needs("dynamics", "'dynamics: true'", ("stiffness", "dynamics"))
         pace = own if own is not None and own.moves else checker.parts.get("kinematics")
-        constant = pace is None or (pace.motion is None and not pace.of_given(checker.mechanism.drives))
+        constant = pace is None or (pace.motion is None and not pace.inverse(checker.mechanism.drives))
         if self.source is not None and not constant:
             message = "the rates of dynamics are known at its own poses alone: leave out those of stiffness"
             checker.report(("stiffness", "dynamics"), message)
