@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
 from typing import ClassVar
 
 import numpy as np
@@ -23,7 +22,7 @@ from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import follow
+from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
@@ -122,7 +121,7 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(follow, question)))
+    a_pose = replace(whole, course=Courses(question))
     scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
