@@ -14,10 +14,9 @@ import numpy as np
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints, Reaction
-from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.stiffness.applied import Applied
 from mechdesign.questions.stiffness.elements import Coil
-from mechdesign.questions.stiffness.force_method import load, twists_of
+from mechdesign.questions.stiffness.force_method import load, moments_about, twists_of
 from mechdesign.questions.stiffness.network import Network, build_bodies, build_network
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
@@ -51,17 +50,12 @@ def with_open_moments(
     for position, contact in enumerate(joints.contacts):
         if contact.joint in joints.open and not contact.turns:
             k, sign = _edge(network, contact.on, contact.by, joints.graph.nodes[contact.node])
-            arm = (configuration.nodes[contact.node] - origin)[:, None]
-            besides = np.abs(_moments(loaded.open_wrenches[:, k], arm)).max(axis=1, initial=0.0)
-            moment = sign * _moments(loaded.wrenches[:, k, :, -1:], arm)[:, 0]
+            arm = configuration.nodes[contact.node] - origin
+            besides = np.abs(moments_about(arm, loaded.open_wrenches[:, k])).max(axis=1, initial=0.0)
+            moment = sign * moments_about(arm, loaded.wrenches[:, k, :, -1:])[:, 0]
             moment = np.where(known & (besides <= RIGID_MOMENT * length), moment, np.nan)
             completed[position] = reactions[position]._replace(moment=moment)
     return completed
-
-
-def _moments(wrenches: Floats, arm: Complexes) -> Floats:
-    """Moments of wrenches of shape (n, 3, loads) about a point at an arm, shape (n, 1); shape (n, loads)."""
-    return np.asarray(wrenches[:, 2] - (arm.real * wrenches[:, 1] - arm.imag * wrenches[:, 0]))
 
 
 def _edge(network: Network, on: str, by: str, point: str) -> tuple[int, int]:

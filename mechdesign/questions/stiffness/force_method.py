@@ -470,6 +470,11 @@ def points_of(network: Network) -> list[tuple[str, str, str]]:
     return [(link, point, vertex) for link, points in network.points.items() for point, vertex in points]
 
 
+def moments_about(arm: Complexes, wrenches: Floats) -> Floats:
+    """Moments, shape (n, loads), of wrenches (n, 3, loads) about a place at an arm (n,) from where they are taken."""
+    return np.asarray(wrenches[:, 2] - (arm.real[:, None] * wrenches[:, 1] - arm.imag[:, None] * wrenches[:, 0]))
+
+
 def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configuration, applied: Floats) -> Effects:
     """Effects of loads in a batch of poses, each a sum of those of `Loaded`, shape (n, its loads, loads)."""
     size = loaded.size
@@ -477,8 +482,7 @@ def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configu
     effects = Effects.unknown(network, len(applied), applied.shape[2], size)
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
-        arm = (configuration.point(network.edges[k].point) - origin)[:, None]
-        moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
+        moment = moments_about(configuration.point(network.edges[k].point) - origin, wrench)
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
     for row, (_, point, vertex) in enumerate(points_of(network)):
         dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
