@@ -45,11 +45,11 @@ class Leg:
 def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
     """The legs that carry the asked body, in the order of their `links`; None where they are not serial."""
     legs: list[tuple[int, Leg]] = []
-    for piece in _pieces(bodies.carrying, bodies.asked):
+    for piece in _pieces(bodies.carrying, bodies.target):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
-        if not {GROUND, bodies.asked} <= ends:
+        if not {GROUND, bodies.target} <= ends:
             continue
-        path = _path(piece, bodies.asked)
+        path = _path(piece, bodies.target)
         if path is None or any(isinstance(element, Shift) for edge in piece for element in edge.elements):
             return None
         names = [name for end in path[1:-1] if (name := link_of(end.split("@")[0]))]
