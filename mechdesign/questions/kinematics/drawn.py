@@ -41,7 +41,7 @@ class Vectors:
 
     kind: str
     unit: str
-    each: Sequence[Vector]
+    arrows: Sequence[Vector]
 
 
 @dataclass(frozen=True, eq=False)
