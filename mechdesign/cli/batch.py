@@ -36,7 +36,7 @@ from mechdesign.errors import StudyError
 from mechdesign.files import owned
 from mechdesign.report import manifest
 from mechdesign.report.page import pages
-from mechdesign.report.requirements import number_of
+from mechdesign.report.requirements import command_of, number_of
 from mechdesign.study import Study
 from mechdesign.study.loading import Source
 from mechdesign.work import interrupts, shards
@@ -57,7 +57,7 @@ def questions(study: Study) -> tuple[str, ...]:
 
     Sweeps and sensitivities, which compute the whole study many times, come last.
     """
-    judged = {requirement.command for requirement in study.requirements}
+    judged = {command_of(requirement) for requirement in study.requirements}
     commands = [command for command in COMMANDS if command in study.questions or command in judged]
     cases = [case.name for case in (SWEEP, SENSITIVITIES) if getattr(study, case.section or case.name) is not None]
     return (*(commands or ["kinematics"]), *cases)

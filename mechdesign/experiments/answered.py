@@ -14,7 +14,7 @@ from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.schema import Requirement
 from mechdesign.questions.together import Group
 from mechdesign.report import requirements
-from mechdesign.report.requirements import Verdict
+from mechdesign.report.requirements import Verdict, command_of
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
@@ -123,7 +123,7 @@ class Sheet:
                     self._numbers[rows[good], k] = values[good]
                     self._units[k] = unit
             for k, requirement in enumerate(self._required):
-                if requirement.command == command:
+                if command_of(requirement) == command:
                     self._judge(k, requirement, rows, designs, group)
         except UnknownColumnError as error:
             if len(rows) == 1:

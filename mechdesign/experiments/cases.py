@@ -16,6 +16,7 @@ from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.look import look
 from mechdesign.questions.together import Group
 from mechdesign.report import requirements
+from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study, forms
 from mechdesign.study.designs import Designs
@@ -102,7 +103,7 @@ class Answer:
 
 def commands_of(study: Study, results: Iterable[CaseNumber]) -> tuple[str, ...]:
     """The commands that compute the requirements of a study and some results."""
-    needed = {requirement.command for requirement in study.requirements} | {number.command for number in results}
+    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in results}
     return tuple(command for command in COMMANDS if command in needed)
 
 

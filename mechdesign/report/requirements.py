@@ -17,6 +17,7 @@ from mechdesign.rows import Chosen, UnknownColumnError, choose, located
 from mechdesign.study import Study
 from mechdesign.study.text.units import written
 from mechdesign.terms import Sum, is_plain, path_of, terms_of
+from mechdesign.terms import command_of as command_named
 
 HELP_PAGE = "reference/study/requirements"
 
@@ -87,9 +88,14 @@ def judged_again(study: Study, verdicts: Sequence[Verdict], warnings: Iterable[C
     return (*verdicts[: len(verdicts) - len(study.barred)], *on_warnings(study, warnings)) if verdicts else ()
 
 
+def command_of(requirement: Requirement) -> str:
+    """The command whose result a requirement judges."""
+    return command_named(requirement.result)
+
+
 def judged_by(study: Study, command: str) -> list[int]:
     """Which requirements of a study a command's verdicts are on: those of its result, of a sweep all of them."""
-    return [k for k, requirement in enumerate(study.requirements) if command in (requirement.command, SWEEP.name)]
+    return [k for k, requirement in enumerate(study.requirements) if command in (command_of(requirement), SWEEP.name)]
 
 
 def number_of(study: Study, command: str) -> int:
@@ -114,7 +120,7 @@ def foresee(study: Study, commands: Iterable[str], *, goals: bool = False) -> No
     from mechdesign.questions.look import look
 
     problems: list[Problem] = []
-    judged = {requirement.command for requirement in study.requirements}
+    judged = {command_of(requirement) for requirement in study.requirements}
     if goals and study.optimize is not None:
         from mechdesign.questions.optimize.question import designs_question
 
@@ -179,7 +185,7 @@ def requirements(study: Study, result: Result, *, whole: bool = True) -> tuple[V
     verdicts: list[Verdict] = []
     problems: list[Problem] = []
     for index, requirement in enumerate(study.requirements):
-        if requirement.command != result.command:
+        if command_of(requirement) != result.command:
             continue
         try:
             verdicts.append(judge(result, requirement, study.mechanism.mobility, whole=whole))

@@ -239,11 +239,6 @@ class Requirement(Condition):
     kinematics.extremes.C.x.range Example: kinematics.C.x_velocity.rms
     """
 
-    @property
-    def command(self) -> str:
-        """The command whose result is judged."""
-        return command_of(self.result)
-
 
 _PAIR = fields.pair_of("[width, height]")
 
