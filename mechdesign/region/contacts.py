@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.numerics.roots import MAX_PARABOLAS, dips
+from mechdesign.numerics.roots import parabola
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import BATCH, Designs, is_turn, trace
 from mechdesign.region.shapes import RAYS, Shape
@@ -22,16 +22,18 @@ CHECKED_ALONG = 101
 # The checked outline is smaller by this part, so that one that just touches the boundary passes.
 TOUCHING = 1e-7
 # Rounds of the check: an outline that lies outside shrinks and is checked again.
-LOOKS = 4
+ROUNDS = 4
 # Contacts of a shape: the lowest local minima of the scales that rays allow, so many, and one with a hole between rays.
 MINIMA = 6
 CONTACTS = MINIMA + 1
 # Scales that agree in so many decimals of the lowest are equal.
 EVEN = 10
-# Contacts within this factor of the lowest are found exactly, in so many steps: each traces rays to places spread evenly
-# between the two beside the contact, as parts of the way, and nearer and nearer to where a parabola has its lowest.
+# Contacts within this factor of the lowest are found exactly, in so many looks, and in more for the final check.
 LOW = 1.3
-STEPS = 3
+LOOKS = 3
+MORE_LOOKS = 5
+# Places of a look: evenly spread between the directions beside a contact, as parts of the way to them, and nearer and
+# nearer to where a parabola is lowest. What takes time is the look, not the number of its places.
 EVENLY = np.linspace(-1, 1, 9)[1:-1, None]
 NEARER = np.array([0, 1e-4, -1e-4, 3e-3, -3e-3, 0.05, -0.05])[:, None]
 # A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
@@ -76,7 +78,7 @@ class Contacts:
         around, beside = self._with_overlooked(around, beside)
         contact, lane = np.nonzero(np.isfinite(beside[1]) & (beside[1] <= LOW * beside[1].min(axis=0)))
         self.theta, self.scales = around[1], beside[1]
-        lowest = self._lowest(around[:, contact, lane], beside[:, contact, lane], lane)
+        lowest = self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, LOOKS)
         self.theta[contact, lane], self.scales[contact, lane] = lowest
         least = self.scales.min(axis=0)
         # Where no ray meets the region it is farther than it is wide.
@@ -126,25 +128,20 @@ class Contacts:
         more[1][:, 0, lane] = self.at(np.tile(lane, 3), angles.ravel()).reshape(3, -1)
         return np.concatenate([theta, more[0]], axis=1), np.concatenate([scales, more[1]], axis=1)
 
-    def _lowest(self, theta: Floats, scales: Floats, lane: Ints, steps: int = STEPS) -> tuple[Floats, Floats]:
+    def _lowest(self, theta: Floats, scales: Floats, lane: Ints, looks: int) -> tuple[Floats, Floats]:
         """Directions and scales of contacts between three directions, the middle one the lowest, of each of `lane`."""
-        contact = np.arange(len(lane))
-        for _ in range(steps):
+        for _ in range(looks):
             low, middle, high = theta
-            with np.errstate(invalid="ignore", divide="ignore"):
-                fall, rise = (scales[0] - scales[1]) / (middle - low), (scales[2] - scales[1]) / (high - middle)
-                vertex = middle + 0.5 * (fall * (high - middle) - rise * (middle - low)) / (fall + rise)
+            _, _, vertex = parabola(theta, scales)
             vertex = np.where((vertex > low) & (vertex < high), vertex, middle)
-            places = np.concatenate([
-                middle + np.where(EVENLY > 0, high - middle, middle - low) * EVENLY,
-                vertex + np.minimum(high - vertex, vertex - low) * NEARER
-            ])
+            even = middle + EVENLY * np.where(EVENLY > 0, high - middle, middle - low)
+            places = np.concatenate([even, vertex + NEARER * np.minimum(high - vertex, vertex - low)])
             values = self.at(np.tile(lane, len(places)), places.ravel()).reshape(places.shape)
             places, values = np.concatenate([theta, places]), np.concatenate([scales, values])
             order = places.argsort(axis=0, kind="stable")
             places, values = np.take_along_axis(places, order, axis=0), np.take_along_axis(values, order, axis=0)
-            best = np.clip(values.argmin(axis=0), 1, len(values)-2) + np.array([[-1], [0], [1]])
-            theta, scales = places[best, contact], values[best, contact]
+            best = values.argmin(axis=0).clip(1, len(values) - 2) + np.array([[-1], [0], [1]])
+            theta, scales = np.take_along_axis(places, best, axis=0), np.take_along_axis(values, best, axis=0)
         return theta[1], scales[1]
 
     def checked(self) -> Floats:
@@ -153,8 +150,10 @@ class Contacts:
         theta, scales = self._spread(CHECKED)
         around, beside = _valleys(theta, scales)
         contact, lane = np.nonzero(self._inside & (beside[1] <= LOW * scale))
-        np.minimum.at(scale, lane, self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, 5)[1])
-        for _ in range(LOOKS):
+        np.minimum.at(
+            scale, lane, self._lowest(around[:, contact, lane], beside[:, contact, lane], lane, MORE_LOOKS)[1]
+        )
+        for _ in range(ROUNDS):
             outline = (1 - TOUCHING) * scale * self._shape.radius(theta) * np.exp(1j * theta)
             place, lane = np.nonzero(self._inside & ~self._designs.inside(self._centre + outline, lanes))
             if not lane.size:
