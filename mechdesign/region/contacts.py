@@ -34,8 +34,8 @@ LOOKS = 3
 MORE_LOOKS = 5
 # Places of a look: evenly spread between the directions beside a contact, as parts of the way to them, and nearer and
 # nearer to where a parabola is lowest. What takes time is the look, not the number of its places.
-EVENLY = np.linspace(-1, 1, 9)[1:-1, None]
-NEARER = np.array([0, 1e-4, -1e-4, 3e-3, -3e-3, 0.05, -0.05])[:, None]
+EVENLY = np.array([-0.7, -0.35, 0.35, 0.7])[:, None]
+NEARER = np.array([0, 1e-4, -1e-4, 0.01, -0.01])[:, None]
 # A hole that no ray meets is looked for from these places, given from the centre in half widths and half heights. Two
 # parabolas lead from the place where a margin is lowest to the hole: their sampling distances, the samples around the
 # place, and the longest step, in sampling distances.
