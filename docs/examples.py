@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from forking import forked
+from forking import PICTURES, forked
 from steps import step
 
 import mechdesign
@@ -50,6 +50,7 @@ _FENCE = re.compile(r"(?ms)^(?P<fence>`{3,})(?P<kind>[^\n]*)\n(?P<body>.*?)^(?P=
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w])")
 # Python of one page at a time: the folder it runs in and what it prints are those of the whole process.
 _PYTHON = threading.Lock()
+_PICTURE = re.compile(r"(\w+)\.png")
 _CAPTION = re.compile(r":caption: (?P<name>\S+?)(?P<more>, continued)?\n")
 
 
@@ -60,6 +61,7 @@ class Page:
     path: Path
     folder: Path
     tools: Path
+    pictures: frozenset[str]
     study: str = ""
     names: dict[str, Any] = field(default_factory=dict)
     printed: str = ""
@@ -78,13 +80,14 @@ def merged(base: Any, part: Any) -> Any:
     return part
 
 
-def terminal(command: str, folder: Path, tools: Path) -> str:
+def terminal(command: str, folder: Path, tools: Path, pictures: Iterable[str]) -> str:
     """What a terminal shows of a command: first what goes to standard output, then the messages.
 
-    `tools` is the folder of the program `mechdesign`.
+    `tools` is the folder of the program `mechdesign`; of its pictures those named are drawn.
     """
     ours, theirs = pty.openpty()
     settings = os.environ | {"TERM": "dumb", "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}", "NO_COLOR": "1"}
+    settings[PICTURES] = " ".join(pictures)
     with subprocess.Popen(
         command, shell=True, cwd=folder, env=settings, stdin=subprocess.DEVNULL, stdout=theirs, stderr=subprocess.PIPE
     ) as process:
@@ -165,7 +168,7 @@ def _commands(body: str) -> Iterator[tuple[str, str]]:
 def _console(page: Page, body: str, where: int) -> str:
     found = []
     for command, told in _commands(body):
-        shown = terminal(command, page.folder, page.tools)
+        shown = terminal(command, page.folder, page.tools, page.pictures)
         if not agree(told, shown):
             page.fail(where, f"$ {command}\nshows\n{shown}where the page has\n{told}")
             told = shown
@@ -214,7 +217,8 @@ def _run(tools: Path, path: Path) -> tuple[str, list[str]]:
     # What an earlier run has left could make a page true that is not.
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    page = Page(path, folder, tools)
+    text = path.read_text(encoding="utf-8")
+    page = Page(path, folder, tools, frozenset(_PICTURE.findall(text)))
 
     def block(found: re.Match[str]) -> str:
         kind, body = found["kind"].strip(), found["body"]
@@ -232,8 +236,7 @@ def _run(tools: Path, path: Path) -> tuple[str, list[str]]:
         return f"{found['fence']}{found['kind']}\n{body}{found['fence']}"
 
     with step(f"examples of {path.relative_to(ROOT)}"):
-        text = _FENCE.sub(block, path.read_text(encoding="utf-8"))
-    return text, page.wrong
+        return _FENCE.sub(block, text), page.wrong
 
 
 def pages(names: Iterable[str] = ()) -> list[Path]:

@@ -3,7 +3,8 @@
 That saves a second a call.
 
 `mechdesign` in the folder that `forked` gives stands for it in a shell: its arguments, settings, folder and streams go
-to that process, and the exit code comes back.
+to that process, and the exit code comes back. Of the pictures of a question only those are drawn that the setting
+`PICTURES` names, but for a report.
 """
 
 from __future__ import annotations
@@ -15,14 +16,17 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
 from mechdesign.__main__ import main
 from mechdesign.commands import QUESTIONS
+from mechdesign.report.figures import pictures
+from mechdesign.report.figures.pictures import Picture, View
 
+PICTURES = "PICTURES_OF_PAGE"
 _IMPORTED = (
     "mechdesign.cli.batch",
     "mechdesign.report.page.section",
@@ -100,7 +104,19 @@ def _keep(connection: socket.socket) -> None:
     os.environ.clear()
     os.environb.update(setting.split(b"=", 1) for setting in told[:end])
     sys.argv = ["mechdesign", *map(os.fsdecode, told[end + 1 :])]
+    if "--report" not in sys.argv:
+        _draw_only(os.environ[PICTURES].split())
     main()
+
+
+def _draw_only(names: Iterable[str]) -> None:
+    """Leave out the pictures of questions that are not among these."""
+    every, shown = pictures.pictures, set(names)
+
+    def wanted(command: str) -> list[Picture[View]]:
+        return [picture for picture in every(command) if shown.intersection(picture.names)]
+
+    pictures.pictures = wanted
 
 
 if __name__ == "__main__":

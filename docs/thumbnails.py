@@ -34,7 +34,7 @@ def thumbnail(path: Path) -> str | None:
     """The mechanism of a study along its motion, as SVG; None where the study has no motion."""
     study = mechdesign.load(path)
     try:
-        shown = moving(study, mechdesign.kinematics(study))
+        shown = moving(study, mechdesign.kinematics(study), plain=True)
     except MechdesignError:
         return None
     if shown is None or "times" not in shown.data:
@@ -42,9 +42,6 @@ def thumbnail(path: Path) -> str | None:
     root, tracks = fromstring(shown.drawing), Tracks(shown.data)
     root.set("xmlns", "http://www.w3.org/2000/svg")
     root.attrib.pop("class")
-    # Names are too small to be read, and so is the bar of the scale, which is drawn last.
-    for child in [*root[-2:], *(child for child in root[:-2] if child.find("text") is not None)]:
-        root.remove(child)
     for trace in root.iterfind("path[@class='moving-trace']"):
         trace.set("d", re.sub(r"\d+\.\d", lambda number: f"{float(number[0]):.0f}", trace.get("d", "")))
     rules: dict[tuple[str, ...], str] = {}

@@ -133,12 +133,11 @@ def dips(
     x, values, active = x.copy(), values.copy(), np.arange(x.shape[1])
     for _ in range(steps):
         (a, b, c), (fa, fb, fc) = x[:, active], values[:, active]
+        fall, rise, vertex = parabola(x[:, active], values[:, active])
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
             # A convex function stays above both lines from an end of the bracket through the middle place.
             too_high = fb - enough[active] > STEEP * np.maximum(fall * (c - b), rise * (b - a))
             too_high &= np.isfinite(enough[active])
-            vertex = b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)
         converged = np.abs(vertex - b) <= LOWEST_ACCURACY * np.maximum(np.abs(c), c - a)
         keep = ~(too_high | converged | (fb < enough[active]))
         active, a, b, c, fa, fb, fc, vertex = (v[keep] for v in (active, a, b, c, fa, fb, fc, vertex))
@@ -155,3 +154,14 @@ def dips(
         x[0, active], values[0, active] = np.where(begins, other, a), np.where(begins, f_other, fa)
         x[2, active], values[2, active] = np.where(begins, c, other), np.where(begins, fc, f_other)
     return x[1], values[1]
+
+
+def parabola(x: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of the parabolas through three points, `x` and `values` of shape (3, n): two slopes, and the place of the vertex.
+
+    The slopes are those from the middle point up to the points on either side. The vertex is not finite for a line.
+    """
+    (a, b, c), (fa, fb, fc) = x, values
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        fall, rise = (fa - fb) / (b - a), (fc - fb) / (c - b)
+        return fall, rise, b + 0.5 * (fall * (c - b) - rise * (b - a)) / (fall + rise)

@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 
-from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.region.contacts import CONTACTS, Contacts, within_scan
 from mechdesign.region.panels import Panels
 from mechdesign.region.rays import SAME_ROOT, is_turn
@@ -38,6 +38,8 @@ ALONG = 1e-3
 LEAST_GAIN = 1e-14
 # A start is given up if so many times its predicted gain would not reach the best start of the same design.
 LEAD = 3.0
+# Or if a larger shape of the same design is so near, in sizes and stretches: both grow to the same largest one.
+NEAR = 0.01
 # Logarithm of the scale of a missing contact.
 MISSING = 1e3
 # Sets of contacts that may stop a shape together, one a row: at most one contact more than there are free parameters.
@@ -131,6 +133,7 @@ def _largest(
         best = np.zeros(len(panels.closes))
         np.maximum.at(best, lane, scale)
         worth = (hoped > LEAST_GAIN) & (LEAD * hoped >= np.log(best[lane[left]] / scale[left]))
+        worth &= ~_behind(lane, scale, centre / size, stretch)[left]
         left, step, hoped, shares = left[worth], step[worth], hoped[worth], shares[worth]
         if not left.size:
             break
@@ -148,6 +151,14 @@ def _largest(
         centre[kept], stretch[kept] = to[better], by[better]
         scale[kept], theta[kept], heights[kept], slopes[kept] = new_scale, new_theta, new_heights, new_slopes
     return lane, centre, stretch, scale
+
+
+def _behind(lane: Ints, scale: Floats, centre: Complexes, stretch: Floats) -> Flags:
+    """Which shapes have a larger one of the same of the designs `lane` near; of equal ones the first is the larger."""
+    near = (lane[:, None] == lane) & (np.abs(centre[:, None] - centre) < NEAR)
+    near &= np.abs(stretch[:, None] - stretch) < NEAR
+    place = np.lexsort((np.arange(len(lane)), -scale)).argsort()
+    return np.asarray((near & (place < place[:, None])).any(axis=1))
 
 
 def _step(heights: Floats, slopes: Floats, curvature: Floats, damping: Floats) -> tuple[Floats, Floats, Floats]:

@@ -59,12 +59,13 @@ _RATES = ("velocity", "acceleration")
 
 
 def moving(
-    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = ()
+    study: Study, result: Result, before: Before | None = None, marked: Sequence[float] = (), *, plain: bool = False
 ) -> Moving | None:  # fmt: skip
     """The moving mechanism of a result: along a sweep or path, or over the grid of a workspace.
 
     Of an optimisation it is that of the best design. The curves beside a motion show those of the study before, too.
-    `marked` are places of the motion, in rows of its table, that are among the poses drawn.
+    `marked` are places of the motion, in rows of its table, that are among the poses drawn. A `plain` motion is the
+    linkage with its paths, without names, ruler and curves.
     """
     command = result.command
     if isinstance(result.drawn, DrawnDesigns):
@@ -75,13 +76,20 @@ def moving(
         study, result = best.study, judged
     with style.context():
         if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.motion:
-            return _motion(study, result, result.drawn, f"{command}-curves", before, marked)
+            return _motion(study, result, result.drawn, f"{command}-curves", before, marked, plain=plain)
         return roaming(study, result, command) if "local" in result.tables else None
 
 
 def _motion(
-    study: Study, result: Result, drawn: DrawnPoses, name: str, before: Before | None, marked: Sequence[float]
-) -> Moving | None:  # fmt: skip
+    study: Study,
+    result: Result,
+    drawn: DrawnPoses,
+    name: str,
+    before: Before | None,
+    marked: Sequence[float],
+    *,
+    plain: bool,
+) -> Moving | None:
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(drawn.shown)
     sweep, motion, table = frames(drawn, result.tables[drawn.name], marked)
@@ -116,18 +124,18 @@ def _motion(
     data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
     data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
     figure, beside, data["dots"] = None, "", []
-    if isinstance(drawn, DrawnMotion):
+    if isinstance(drawn, DrawnMotion) and not plain:
         figure = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before)
     if figure is not None:
         beside = inline(figure, name, described(figure))
         data["dots"] = _dots(figure, table, numbers)
     data["numbers"] = numbers.tracks
-    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin))
+    drawing = _drawing(study, whole, sheet, scenes, sweep.words(begin), plain=plain)
     replaces = ["motion"] * bool(beside) + ["paths"] * ("instant_centres" not in result.tables and before is None)
     return Moving(drawing, beside, data, sweep.words(begin), headings, rows, meanings(table), replaces)
 
 
-def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str) -> str:
+def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], words: str, *, plain: bool) -> str:
     """The first of some valid poses, with the paths of the points."""
     scene = scenes[0]
     root = sheet.root(f"the mechanism at {words}")
@@ -135,8 +143,9 @@ def _drawing(study: Study, whole: Sweep, sheet: Sheet, scenes: Sequence[Scene], 
     for look in path_looks(whole):
         sketcher.trace(look.path, look.color, look.width, look.share)
     sketcher.draw()
-    sketcher.names(scenes)
-    sketcher.ruler(study.units.label("length"))
+    if not plain:
+        sketcher.names(scenes)
+        sketcher.ruler(study.units.label("length"))
     return tostring(root, encoding="unicode")
 
 
