@@ -110,6 +110,7 @@ class Core:
         self.graph: Graph = build_graph(description)
         self.geometry = Geometry(self.graph, description.places)
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
+        self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
 
@@ -122,7 +123,7 @@ class Core:
     @property
     def equations(self) -> Equations:
         """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size or 1.0)
+        return Equations(self.graph, self.geometry, self.size or 1.0, tuple(c.gap for c in self.couplings))
 
     def coordinate(self, name: str) -> Coordinate:
         """Look a coordinate up by name.

@@ -47,7 +47,7 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
     """The links that the drives place directly, and the groups in the order of their solution."""
     description, graph, plan = mechanism.description, mechanism.graph, mechanism.forward
     placed = placed_before(graph, plan.structure)
-    solved = [k for k, group in enumerate(plan.structure.groups) if group.form != "place"]
+    solved = [k for k, group in enumerate(plan.structure.groups) if group.solved]
     at_once = placed[solved[0]] if solved else placed[-1]
     lines = []
     links = [body for body in graph.bodies if body in at_once and body != GROUND and not body.endswith(":rod")]

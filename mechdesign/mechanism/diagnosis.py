@@ -253,7 +253,7 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
         except Undetermined:
             groups = ()
         for group in groups:
-            if group.form != "place":
+            if group.solved:
                 loop = _parts(graph, [GROUND, *owners_of(graph, group.edges)])
                 return f"A rigid loop: {loop}; leave one of them out, or divide one by a joint"
     edges, _ = doubled(equations, equations.generic())

@@ -61,7 +61,8 @@ class Mechanism(Core):
     def mobility(self) -> int:
         """Degrees of freedom by counting, unknowns of the vector loops less their equations."""
         graph = self.graph
-        return (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1) - 2 * len(graph.edges)
+        unknowns = (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1)
+        return unknowns - 2 * len(graph.edges) - len(self.couplings)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -115,7 +116,7 @@ class Mechanism(Core):
                     "poses",
                 )
             try:
-                structure = compile_structure(self.graph, coordinates)
+                structure = compile_structure(self.graph, coordinates, self.couplings)
                 check_independent(self.equations, structure)
             except Undetermined as error:
                 raise diagnosis.undetermined(
@@ -253,6 +254,7 @@ class Variant(Mechanism):
         self.sketch = original.sketch
         self.drives = original.drives
         self.bounds = original.bounds
+        self.couplings = original.couplings
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
 

@@ -156,6 +156,20 @@ class Measure:
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
+
+    `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
+    is a parameter as in a `Measure`. `phase` is the name of an added constant that the sketch shows.
+    """
+
+    name: str
+    sets: str
+    of: Expression
+    phase: str = ""
+
+
+@dataclass(frozen=True)
 class Limit:
     """Bounds of a distance of two points, a drive, the angle between two links, or a measure."""
 
@@ -186,3 +200,4 @@ class Description:
     angle_unit: float = 1.0
     masses: Mapping[str, Mass] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
+    couplings: Mapping[str, Coupling] = field(default_factory=dict)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from mechdesign.mechanism.coordinates import Coordinate
 
 # Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
 GRADIENT_STEP = 1e-6
+
+
+Pull = tuple[Literal["node", "slide"], int, Vector] | tuple[Literal["body"], str, Value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,29 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
     gradient = _gradient(coordinate, configuration.user_values(coordinate))
     return _radians(coordinate, sum(g * _user(part, first(configuration, part, rates), coordinate)
                                     for g, part in zip(gradient, coordinate.parts, strict=True)))  # fmt: skip
+
+
+@quiet
+def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Iterator[Pull]:
+    """Forces and moments that do the work ``effort * first(coordinate, rates)`` on any `rates`, the adjoint of `first`.
+
+    Of each the node, body or slide that it acts on.
+    """
+    kind = coordinate.kind
+    if kind in ("x", "y"):
+        yield "node", coordinate.node, effort * (1.0 if kind == "x" else 1j)
+    elif kind == "distance":
+        span = _span(configuration.nodes, coordinate)
+        along = span * (effort / np.sqrt(norm2(span)))
+        yield from (("node", coordinate.other, along), ("node", coordinate.node, -along))
+    elif kind == "slide":
+        yield "slide", coordinate.slide, effort
+    elif kind == "angle":
+        yield from (("body", coordinate.body, effort), ("body", coordinate.reference, -1.0 * effort))
+    elif kind == "expression":
+        gradient = _gradient(coordinate, configuration.user_values(coordinate))
+        for slope, part in zip(gradient, coordinate.parts, strict=True):
+            yield from pulled(configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
 
 
 @quiet

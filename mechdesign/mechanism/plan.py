@@ -45,10 +45,17 @@ class Plan:
         self.structure = structure
         self.modes = tuple(modes)
         self.follows = follows and core.description.branch == "follow"
-        self.iterative = any(group.form == "newton" for group in structure.groups)
-        # Angles in given expressions; their turns are counted on the way from the sketch.
-        inner = angles_of(c for c in structure.given if c.kind == "expression")
-        self.angles = tuple(angle for name, angle in inner.items() if name not in self.counted)
+        # Angles in given expressions and in couplings; their turns are counted on the way from the sketch, unless they
+        # follow from values.
+        inner = angles_of(c for c in structure.values if c.kind == "expression")
+        self.angles = tuple(
+            angle for name, angle in inner.items()
+            if name not in self.counted and structure.counted(angle, core.graph) is None
+        )  # fmt: skip
+        self.iterative = any(group.form == "newton" for group in structure.groups) or bool(
+            structure.functions and self.angles
+        )
+        self.followers = tuple(coupling.follower for coupling in core.couplings)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -85,7 +92,7 @@ class Plan:
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
         state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
-        state.near |= {c.name: v for c, v in zip(self.structure.given, given, strict=True) if c.kind == "angle"}
+        state.near = {**state.near, **self._given_angles(given)}
         return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
@@ -167,13 +174,13 @@ class Plan:
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
-        parts = [*parts] if self.angles else parts
+        counted = [angle.name for angle in (*self.angles, *self.followers)]
+        parts = [*parts] if counted else parts
         whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
-            angle.name: np.concatenate([np.broadcast_to(some.near[angle.name], some.shape) for some in parts]).reshape(
-                shape
-            )
-            for angle in self.angles
+            name: np.concatenate([np.broadcast_to(some.near[name], some.shape) for some in parts]).reshape(shape)
+            for name in counted
+            if all(name in some.near for some in parts)
         }
         return replace(whole, near={**self.turns(values, dims), **near}, counted=self.counted)
 
@@ -202,14 +209,18 @@ class Plan:
         if self.angles:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
             poses = replace(poses, near={**poses.near, **near})
+        if self.followers:
+            poses = replace(poses, near={**poses.near, **state.counted(self.followers)})
         if limits:
             self.judge(poses)
         return poses
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """By name, values that angles are reported within half a turn of: given angles, and the limits of drives."""
-        near = self.core.turns(dims)
-        return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+        return self.core.turns(dims) | self._given_angles(given)
+
+    def _given_angles(self, given: Sequence[Value]) -> dict[str, Value]:
+        return {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
 
     @cached_property
     def _drawn_angles(self) -> dict[str, float]:

@@ -78,6 +78,7 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     A pose that has converged is not changed any more: its result does not depend on its batch.
     """
     group = state.structure.groups[index]
+    state.count_turns(group)
     unknowns: list[Value] = [np.asarray(value, dtype=float) for value in guess]
     count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
@@ -170,6 +171,8 @@ def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, beg
         if group.form == "newton":
             assert guess is not None
             solve_newton(state, index, guess[state.structure.unknowns[index]])
+        elif group.form == "coupled":
+            state.couple(group)
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)

@@ -16,18 +16,21 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.coordinates import Coordinate, coupled
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, bases
 from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
 from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
+from mechdesign.mechanism.outputs import pulled
+from mechdesign.mechanism.structure import Group
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"
@@ -35,12 +38,16 @@ PIN = "pin:"
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail."""
+    """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
+
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets.
+    """
 
     linear: Linearization
     forces: Forces
     efforts: list[Value]
     edges: list[Vector]
+    couplings: list[Value]
 
 
 @quiet
@@ -69,33 +76,71 @@ def balance(linear: Linearization, forces: Forces) -> Balance:
         if edge.slide is not None:
             slides[edge.slide] = slides[edge.slide] + dot(linear.direction(k), force)
 
-    for index in reversed(range(len(structure.groups))):
-        group = structure.groups[index]
+    def carry(group: Group, forces: list[Vector]) -> None:
+        """Pass forces on a group's nodes on towards the nodes that it starts from."""
         for k, sign in reversed(group.tree):
             edge = structure.edges[k]
             begin, end = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
-            nodes[begin] = plus(nodes[begin], 1, nodes[end])
-            transmit(k, sign * nodes[end])
-        if group.form == "place":
+            forces[begin] = plus(forces[begin], 1, forces[end])
+            transmit(k, sign * forces[end])
+
+    def along(number: int) -> Value:
+        """What acts along the coordinate of a value."""
+        total: Value = 0.0
+        for frame, tie in enumerate(structure.ties):
+            for sign, k in tie.given:
+                total = plus(total, sign, frames[frame] if k == number else 0.0)
+        for slide, k in structure.known_slides:
+            total = plus(total, 1, slides[slide] if k == number else 0.0)
+        return total
+
+    def pull(coordinate: Coordinate, effort: Value) -> list[Vector]:
+        """Add what an effort on a coordinate does to angles and slides; returns its forces at nodes."""
+        extra: list[Vector] = [0.0] * len(nodes)
+        for kind, at, force in pulled(linear.configuration, coordinate, effort):
+            if kind == "body":
+                frames[bodies[at][0]] = frames[bodies[at][0]] + force
+            elif kind == "slide":
+                slides[at] = slides[at] + force
+            else:
+                extra[at] = plus(extra[at], 1, force)
+                on_pins[at] = plus(on_pins[at], 1, force)
+        return extra
+
+    couplings: dict[int, Value] = {}
+    on_pins = list(forces.nodes)
+    for index in reversed(range(len(structure.groups))):
+        group = structure.groups[index]
+        carry(group, nodes)
+        if group.form == "coupled":
+            (number,) = group.conditions
+            effort = along(number)
+            couplings[number] = -1.0 * effort
+            nodes = [plus(node, 1, extra) for node, extra in zip(nodes, pull(structure.values[number], effort), strict=True)]
+        if not group.solved:
             continue
         turning: list[Value] = [0.0] * len(group.angles)
         for frame, tie in enumerate(structure.ties):
             if tie.root in group.angles:
                 place = group.angles.index(tie.root)
                 turning[place] = turning[place] + frames[frame]
-        held = linear.hold_group(index, group, [*turning, *(slides[slide] for slide in group.slides)])
+        moving = [*turning, *(slides[slide] for slide in group.slides)]
+        moving += [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
+        held, couples = linear.hold_group(index, group, moving)
+        for number, effort in zip(group.conditions, couples, strict=True):
+            couplings[number] = effort
+            extra = pull(structure.values[number], effort)
+            carry(group, extra)
+            nodes = [plus(node, 1, force) for node, force in zip(nodes, extra, strict=True)]
         for loop, force in zip(group.loops, held, strict=True):
             nodes[loop.start] = plus(nodes[loop.start], 1, force)
             nodes[loop.end] = plus(nodes[loop.end], -1, force)
             for k, sign in loop.edges:
                 transmit(k, sign * force)
-    efforts: list[Value] = [0.0] * len(structure.given)
-    for frame, tie in enumerate(structure.ties):
-        for sign, k in tie.given:
-            efforts[k] = plus(efforts[k], -sign, frames[frame])
-    for slide, k in structure.known_slides:
-        efforts[k] = plus(efforts[k], -1, slides[slide])
-    return Balance(linear, forces, efforts, edges)
+    efforts: list[Value] = [plus(0.0, -1, along(k)) for k in range(len(structure.given))]
+    acting = replace(forces)
+    acting.nodes, acting.bodies = on_pins, forces.bodies
+    return Balance(linear, acting, efforts, edges, [couplings[k] for k in structure.numbers])
 
 
 class Contact(NamedTuple):
@@ -132,7 +177,8 @@ class Joints:
 
     def __init__(self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset()) -> None:
         self.description, self.graph, self.bases = description, graph, bases(graph)
-        self.loaded = loaded
+        self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
+        self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
         #: By node at which one body alone has a point, this body: it bears what acts on the pin.
         self.sole: dict[int, str] = {}
         #: By leg, prismatic or fixed joint, the two bodies that it keeps from turning against each other.
@@ -304,6 +350,10 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         if drive.kind == "angle":
             turn(drive.body, effort)
             turn(drive.reference, -1.0 * effort)
+    for coupling, effort in zip(joints.couplings, balance.couplings, strict=True):
+        for kind, at, moment in pulled(linear.configuration, coupling.gap, effort):
+            if kind == "body":
+                turn(at, moment)
     for node, body in joints.sole.items():
         if not nothing(force := balance.forces.nodes[node]):
             turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))
