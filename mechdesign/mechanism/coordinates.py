@@ -132,12 +132,16 @@ def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupl
 
 def _parts(expression: Expression, description: Description, graph: Graph) -> dict[str, Coordinate]:
     """Coordinates and parameters of an expression by name."""
-    return {
-        part: Coordinate(part, "parameter", "none")
-        if MEASURED + part in description.places
-        else resolve(part, description, graph)
-        for part in sorted(expression.names)
-    }
+    parts: dict[str, Coordinate] = {}
+    for part in sorted(expression.names):
+        own = description.places.get(part)
+        if MEASURED + part in description.places:
+            parts[part] = Coordinate(part, "parameter", "none")
+        elif own is not None and own.in_coupling:
+            parts[part] = Coordinate(part, "parameter", "angle" if own.quantity == "angle" else "none")
+        else:
+            parts[part] = resolve(part, description, graph)
+    return parts
 
 
 def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:

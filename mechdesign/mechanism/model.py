@@ -32,6 +32,7 @@ class Place:
     name: str
     nominal: float
     quantity: Quantity | Physical = "length"
+    in_coupling: bool = False  # whether the function of a coupling names it
 
 
 @dataclass(frozen=True)
@@ -160,13 +161,12 @@ class Coupling:
     """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
-    is a parameter as in a `Measure`. `phase` is the name of an added constant that the sketch shows.
+    is a parameter as in a `Measure`, or a place of the coupling's own.
     """
 
     name: str
     sets: str
     of: Expression
-    phase: str = ""
 
 
 @dataclass(frozen=True)
