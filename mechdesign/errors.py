@@ -55,14 +55,14 @@ def few_comparisons() -> Iterator[None]:
         _compared.reset(token)
 
 
-def nearest(name: str, known: Iterable[str]) -> str | None:
-    """The known name most similar to this one; None if no name is similar."""
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """The name of `names` most similar to this one; None if none is similar."""
     compared = _compared.get()
     if compared is not None:
         if len(compared) >= MAX_COMPARED and name not in compared:
             return None
         compared.add(name)
-    folded = {candidate.casefold(): candidate for candidate in known}
+    folded = {candidate.casefold(): candidate for candidate in names}
     close = difflib.get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.6)
     return folded[close[0]] if close else None
 
@@ -91,22 +91,22 @@ def cut(text: str, most: int = MAX_ECHO) -> str:
 def _brief(message: str) -> str:
     """A message in one line, with long quotations shortened."""
 
-    def shorter(found: re.Match[str]) -> str:
-        text = found[0]
+    def shorter(match: re.Match[str]) -> str:
+        text = match[0]
         return text if len(text) <= MAX_ECHO + 2 else cut(text[:-1], MAX_ECHO + 1) + text[-1]
 
     return printable(_QUOTED.sub(shorter, message))
 
 
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """``; did you mean 'x'?`` if a known name is similar to this one, else an empty text."""
-    near = nearest(name, known)
+def suggestion(name: str, names: Iterable[str]) -> str:
+    """``; did you mean 'x'?`` if one of the names is similar to this one, else an empty text."""
+    near = nearest(name, names)
     return f"; did you mean {near!r}?" if near is not None else ""
 
 
-def counted(number: int, what: str) -> str:
+def counted(number: int, noun: str) -> str:
     """``1 drive``, ``2 drives``."""
-    return f"{number} {what}{'s' * (number != 1)}"
+    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 class MechdesignError(Exception):
@@ -134,7 +134,7 @@ class Problem:
         place = printable(self.file)
         if self.line:
             place += f":{self.line}:{self.column}"
-        key = printable(_LONG_SEGMENT.sub(lambda found: cut(found[0]), self.key))
+        key = printable(_LONG_SEGMENT.sub(lambda match: cut(match[0]), self.key))
         return ": ".join(part for part in (place, key, _brief(self.message)) if part)
 
 

@@ -39,11 +39,11 @@ def formats_of(listed: str | None, option: str) -> str:
     StudyError
         If one is none of `FORMATS`.
     """
-    wanted = dict.fromkeys((listed or FORMATS[0]).replace(" ", "").lower().split(","))
-    for kind in wanted:
+    kinds = dict.fromkeys((listed or FORMATS[0]).replace(" ", "").lower().split(","))
+    for kind in kinds:
         if kind not in FORMATS:
             raise StudyError(f"{option} takes {', '.join(FORMATS)} or several with commas between, not {kind!r}")
-    return ",".join(wanted)
+    return ",".join(kinds)
 
 
 def replace(path: Path, blocks: Iterable[bytes]) -> str:
@@ -195,8 +195,8 @@ def marked(path: Path, mark: bytes) -> bool:
 
 
 def _foreign(path: Path) -> StudyError:
-    what = "a link" if path.is_symlink() else "no result of mechdesign's"
-    return StudyError(f"{path}: is {what}, and would be replaced; move it away, or write the results elsewhere")
+    kind = "a link" if path.is_symlink() else "no result of mechdesign's"
+    return StudyError(f"{path}: is {kind}, and would be replaced; move it away, or write the results elsewhere")
 
 
 def check_writable(directory: Path) -> None:

@@ -42,7 +42,7 @@ class _Names(Mapping[str, Any]):
         return iter(dict.fromkeys((*USUAL, *files)))
 
     def __contains__(self, name: object) -> bool:
-        return name in USUAL or any(name == each for each in self)
+        return name in USUAL or any(name == listed for listed in self)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)

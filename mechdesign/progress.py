@@ -14,8 +14,8 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def start(self, total: int, what: str) -> None:
-        """Begin a stage of `total` steps named `what`; ends the stage before it."""
+    def start(self, total: int, stage: str) -> None:
+        """Begin a stage of `total` steps named `stage`; ends the stage before it."""
 
     def update(self, n: int) -> None:
         """`n` more steps are done."""

@@ -218,10 +218,10 @@ class Table:
 
     def where(self, **values: object) -> NDArray[np.bool_]:
         """Which rows have these values in columns of these names, as a mask."""
-        found = np.ones(len(self), dtype=bool)
+        mask = np.ones(len(self), dtype=bool)
         for name, value in values.items():
-            found &= self[name] == value
-        return found
+            mask &= self[name] == value
+        return mask
 
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
@@ -309,18 +309,18 @@ class LongTable(Table):
 
     def blocks(self) -> Iterator[Table]:
         """The rows, made anew, as tables one after the other."""
-        found: Iterator[Table] = self.__dict__["_source"]()
-        return found
+        blocks: Iterator[Table] = self.__dict__["_source"]()
+        return blocks
 
     def take(self, rows: NDArray[Any]) -> Table:
         """The table of some rows, by a mask or by their numbers."""
-        wanted = np.arange(len(self))[rows]
+        numbers = np.arange(len(self))[rows]
         parts, begin = [], 0
         for block in self.blocks():
-            here = np.flatnonzero((wanted >= begin) & (wanted < begin + len(block)))
-            parts.append((here, block.take(wanted[here] - begin)))
+            here = np.flatnonzero((numbers >= begin) & (numbers < begin + len(block)))
+            parts.append((here, block.take(numbers[here] - begin)))
             begin += len(block)
-            if begin > wanted.max(initial=-1):
+            if begin > numbers.max(initial=-1):
                 break
         order = np.argsort(np.concatenate([here for here, _ in parts]), kind="stable")
         return Table(self.name, tuple(
@@ -352,13 +352,13 @@ class _LongColumn(Column):
     """A column of a `LongTable`."""
 
     def __init__(self, like: Column, values: Callable[[str], NDArray[Any]]) -> None:
-        told = {"name": like.name, "unit": like.unit, "meaning": like.meaning, "kind": like.kind}
-        self.__dict__.update(told, _numeric=like.numeric, _values=values)
+        attributes = {"name": like.name, "unit": like.unit, "meaning": like.meaning, "kind": like.kind}
+        self.__dict__.update(attributes, _numeric=like.numeric, _values=values)
 
     @property
     def values(self) -> NDArray[Any]:
-        found: NDArray[Any] = self.__dict__["_values"](self.name)
-        return found
+        values: NDArray[Any] = self.__dict__["_values"](self.name)
+        return values
 
     @property
     def numeric(self) -> bool:

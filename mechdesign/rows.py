@@ -216,12 +216,12 @@ def in_unit(value: Any, table: Table, name: str, rows: Flags | None = None) -> f
     return amount_in(value, f"{table.name}.{name}", unit_of(table, name, rows))
 
 
-def amount_in(value: Any, what: str, unit: str) -> float:
+def amount_in(value: Any, label: str, unit: str) -> float:
     """A number in a unit, which a bare number has already; raises UnknownColumnError if the kinds differ."""
     try:
         return value.within(unit) if isinstance(value, Measured) else float(value)
     except ValueError as error:
-        raise UnknownColumnError(f"{what}: {error}") from None
+        raise UnknownColumnError(f"{label}: {error}") from None
 
 
 def _interval(span: Span, table: Table, name: str, rows: Flags) -> Interval:

@@ -54,9 +54,9 @@ def readable(table: Table, shown: Table) -> list[list[str]]:
 
 def _largest(columns: Iterable[Column]) -> Mapping[str, float]:
     """The largest finite size of the numbers of each unit."""
-    found: dict[str, float] = {}
+    largest: dict[str, float] = {}
     for column in columns:
         if column.values.dtype.kind == "f":
             size = float(np.max(np.abs(column.values), initial=0.0, where=np.isfinite(column.values)))
-            found[column.unit] = max(found.get(column.unit, 0.0), size)
-    return found
+            largest[column.unit] = max(largest.get(column.unit, 0.0), size)
+    return largest

@@ -78,7 +78,7 @@ def answer_html(
         command=answer.command,
         study=study.name,
         question=QUESTIONS[answer.command].question,
-        counts=[f"{what}: {count:,}" for what, count in answer.counts.items()],
+        counts=[f"{noun}: {count:,}" for noun, count in answer.counts.items()],
         wrong=[text for text in (answer.interrupted, answer.failed) if text],
         verdicts=shown,
         met=sum(verdict.met for verdict in judged),

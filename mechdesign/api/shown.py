@@ -111,7 +111,7 @@ class Answer(Result):
         if name in drawn.failed:
             raise MechdesignError(f"picture {name} could not be drawn: {drawn.failed[name]}")
         there = f"there are {', '.join(drawn)}" if drawn else "there are none"
-        failed = "".join(f"; pictures {what} could not be drawn: {why}" for what, why in drawn.failed.items())
+        failed = "".join(f"; pictures {picture} could not be drawn: {why}" for picture, why in drawn.failed.items())
         raise StudyError(f"{self.command} has no picture {shown(name)}{suggestion(name, drawn)}; {there}{failed}")
 
     def save(
@@ -147,11 +147,11 @@ class Answer(Result):
             raise StudyError(f"animate=True takes a result of kinematics, not of {self.command}")
         if not plots and (animate or formats is not None):
             raise StudyError("plots=False and animate=True or formats contradict each other")
-        asked = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
+        output = Extras(plots, formats_of(formats, "formats"), animate, self.all_modes)
         folder = Path(directory)
-        check_folder(folder, self.study, self.command, asked)
+        check_folder(folder, self.study, self.command, output)
         with owned(folder):
-            undrawn = writer.write(folder, self.study, self, self.verdicts, asked)
+            undrawn = writer.write(folder, self.study, self, self.verdicts, output)
         for warning in undrawn:
             warnings.warn(str(warning), stacklevel=2)
         return folder

@@ -56,7 +56,7 @@ def of_verdicts(study: Study, command: str, verdicts: Sequence[Verdict]) -> Iter
 
 def of_warnings(study: Study, command: str, warnings: Sequence[Caution]) -> Iterator[Problem]:
     """Warnings of a command with their places: line and column if they concern the study file."""
-    known = {str(problem): problem for problem in study.warnings}
+    placed = {str(problem): problem for problem in study.warnings}
     for warning in warnings:
         file = str(study.path) if study.path is not None else ""
-        yield known.get(str(warning)) or Problem(f"{study.label}: {command}: {warning}", file=file)
+        yield placed.get(str(warning)) or Problem(f"{study.label}: {command}: {warning}", file=file)

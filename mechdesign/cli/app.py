@@ -52,8 +52,8 @@ def _guard() -> Iterator[None]:
         raise typer.Exit(code) from None
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(show: bool) -> None:
+    if show:
         import mechdesign
 
         print(f"mechdesign {mechdesign.__version__}")
@@ -101,7 +101,7 @@ def _ask(command: str, study: Path | None, **said: Any) -> int:
 def _sweep(study: Path | None, **said: Any) -> int:
     from mechdesign.cli.sweep import Matrix, sweep
 
-    matrix = Matrix(**{each.name: said.pop(each.name) for each in given.MATRIX})
+    matrix = Matrix(**{option.name: said.pop(option.name) for option in given.MATRIX})
     options = Options(command=SWEEP.name, **said)
     with _placed(options):
         return sweep(study, options, matrix)
@@ -145,9 +145,9 @@ def _placed(options: Options) -> AbstractContextManager[None]:
     return on(named(options.executor, options.jobs))
 
 
-for _name, _asked in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
+for _name, _question in (*COMMANDS.items(), (SENSITIVITIES.name, SENSITIVITIES)):
     _takes = (*given.COMMON, given.REPORT, *given.OWN.get(_name, ()))
-    _add(partial(_ask, _name), _name, _takes, _asked.question, f"{_asked.question} {_asked.answer}")
+    _add(partial(_ask, _name), _name, _takes, _question.question, f"{_question.question} {_question.answer}")
 _add(
     _sweep,
     SWEEP.name,

@@ -57,19 +57,23 @@ def questions(study: Study) -> tuple[str, ...]:
     Sweeps and sensitivities, which compute the whole study many times, come last.
     """
     judged = {command_of(requirement) for requirement in study.requirements}
-    asked = [command for command in COMMANDS if command in study.questions or command in judged]
-    cases = [each.name for each in (SWEEP, SENSITIVITIES) if getattr(study, each.section or each.name) is not None]
-    return (*(asked or ["kinematics"]), *cases)
+    commands = [command for command in COMMANDS if command in study.questions or command in judged]
+    cases = [
+        question.name
+        for question in (SWEEP, SENSITIVITIES)
+        if getattr(study, question.section or question.name) is not None
+    ]
+    return (*(commands or ["kinematics"]), *cases)
 
 
-def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
+def study_files(paths: Sequence[Path] | None) -> list[Path | None]:
     """Study files without repetitions: those named, those in a folder (``*.yaml``, ``*.yml``), those of a pattern.
 
     A folder or pattern without study files is returned itself.
     """
     if not paths:
         return [None]
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     for path in paths:
         here = [path]
         if path.is_dir():
@@ -77,12 +81,12 @@ def found_studies(paths: Sequence[Path] | None) -> list[Path | None]:
         elif glob.has_magic(str(path)) and not path.exists():
             here = sorted(map(Path, glob.glob(str(path), recursive=True)))
         for file in here or [path]:
-            found.setdefault(os.path.abspath(file), file)
-    return [*found.values()]
+            files.setdefault(os.path.abspath(file), file)
+    return [*files.values()]
 
 
 def source_of(path: Path | None, options: Options) -> Source:
-    """Read one of the studies that `found_studies` gives; see `source`.
+    """Read one of the studies that `study_files` gives; see `source`.
 
     Raises
     ------
@@ -102,11 +106,11 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
     are jobs; their messages and results come in the order of the studies. One that fails does not stop the others,
     unless `options.fail_fast`. After an interrupt the summary and the JUnit file show what was finished.
     """
-    asked = found_studies(paths)
+    files = study_files(paths)
     with LiveTable(quiet=options.quiet) as live_table:
-        record = BatchRecord(options, asked, live_table)
+        record = BatchRecord(options, files, live_table)
         try:
-            tasks = _read(asked, options, record, only)
+            tasks = _read(files, options, record, only)
             if not record.stopped:
                 _answer(tasks, options, record)
         except KeyboardInterrupt:
@@ -130,11 +134,11 @@ def _read(paths: Sequence[Path | None], options: Options, record: BatchRecord, o
             own = _as_in_shards(label, root, options) if options.command == MERGE else options
             if own != options:
                 study = load_source(origin, own)
-            asked = _places(only or questions(study), root, own)
+            folders = _places(only or questions(study), root, own)
             places.check_reports(root, own)
-            for command, directory in asked:
+            for command, directory in folders:
                 places.check(study, command, directory, own)
-            tasks.append(Task(number, origin, label, root, asked, own))
+            tasks.append(Task(number, origin, label, root, folders, own))
         except Exception as error:
             record.missing(number, failure(label, "check", Path(), error, study))
             if record.stopped:
@@ -146,8 +150,8 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
     """The options with the overrides and seed of a study's shards, or of the results merged from them."""
     if options.overrides or options.seed is not None:
         return options
-    folders = [root, *sorted(each for each in root.glob("*") if each.is_dir())]
-    parts = [path for directory in folders for path in shards.found(directory)]
+    folders = [root, *sorted(child for child in root.glob("*") if child.is_dir())]
+    parts = [path for directory in folders for path in shards.files_in(directory)]
     origins = [shards.head_of(parts[0])["origin"]] if parts else filter(None, map(manifest.read, folders))
     for origin in origins:
         changes, seed = origin.get("overrides"), origin.get("seed")
@@ -160,16 +164,16 @@ def _as_in_shards(label: str, root: Path, options: Options) -> Options:
 
 def _places(commands: Sequence[str], root: Path, options: Options) -> tuple[tuple[str, Path], ...]:
     """Questions of a study with their folders; if its shards are of a single command, that command alone."""
-    found = tuple((command, place(root / command, options)) for command in commands)
+    folders = tuple((command, place(root / command, options)) for command in commands)
     if options.command != MERGE:
-        return found
-    if alone := shards.found(root):
+        return folders
+    if alone := shards.files_in(root):
         return ((shards.head_of(alone[0])["command"], root),)
     if (done := manifest.read(root)) is not None and done.get("command") in QUESTIONS:
         return ((done["command"], root),)
-    begun = tuple((command, directory) for command, directory in found if shards.found(directory))
-    given = {shards.head_of(path)["command"] for _, directory in begun for path in shards.found(directory)}
-    return found if not begun or "run" in given else begun
+    begun = tuple((command, directory) for command, directory in folders if shards.files_in(directory))
+    sharded = {shards.head_of(path)["command"] for _, directory in begun for path in shards.files_in(directory)}
+    return folders if not begun or "run" in sharded else begun
 
 
 def _answer(tasks: Sequence[Task], options: Options, record: BatchRecord) -> None:

@@ -67,22 +67,22 @@ class End:
 class BatchRecord:
     """Collects the outcomes of studies in any order, shows them in that of the studies, and writes the summary."""
 
-    def __init__(self, options: Options, asked: Sequence[Path | None], live_table: LiveTable) -> None:
+    def __init__(self, options: Options, studies: Sequence[Path | None], live_table: LiveTable) -> None:
         self.options = options
         self.live_table = live_table
-        self.several = len(asked) > 1
+        self.several = len(studies) > 1
         self.interrupted = False
         self.stopped = False  # no further question is started
-        self._asked = asked
+        self._studies = studies
         self._root = options.out or RESULTS
         self._check()
-        self._outcomes: list[list[Outcome]] = [[] for _ in asked]
+        self._outcomes: list[list[Outcome]] = [[] for _ in studies]
         self._entries: dict[int, Entry] = {}
         self._tasks: Sequence[Task] = ()
         self._words: list[list[str]] = []
         self._ended: set[int] = set()  # indices of tasks
         self._first = 0  # first task that has not ended
-        self._left = len(asked)  # studies without an answer
+        self._left = len(studies)  # studies without an answer
         self._exit_code = 0
 
     def _check(self) -> None:
@@ -175,9 +175,9 @@ class BatchRecord:
             if self._file(path, self._index(), PAGE):
                 terminal.say(f"index of the reports in {path}", quiet=options.quiet)
                 first = path
-        told = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
-        if len(table) > 1 and told:
-            terminal.say("\n".join([f"failed: {len(told)} of {counted(len(table), 'question')}", *told]))
+        failures = [summary.in_brief(outcome) for outcome in outcomes if outcome.command and outcome.exit_code]
+        if len(table) > 1 and failures:
+            terminal.say("\n".join([f"failed: {len(failures)} of {counted(len(table), 'question')}", *failures]))
         terminal.suggest(first, quiet=options.quiet or options.json)
         return max(self._exit_code, *(outcome.exit_code for outcome in outcomes))
 
@@ -195,7 +195,7 @@ class BatchRecord:
         """The page of all studies, also of those that the run did not come to."""
         from mechdesign.report.page.page import Entry, index
 
-        labels = {number: name_of(path) for number, path in enumerate(self._asked)}
+        labels = {number: name_of(path) for number, path in enumerate(self._studies)}
         labels |= {task.number: task.label for task in self._tasks}
         return index([
             self._entries.get(number) or Entry(label, label, failed=_LEFT, outcome="not answered")
@@ -205,11 +205,11 @@ class BatchRecord:
     def _with_left(self) -> Iterator[Outcome]:
         """Outcomes in the order of the studies, with those of questions that were not reached."""
         tasks = {task.number: task for task in self._tasks}
-        for number, (path, outcomes) in enumerate(zip(self._asked, self._outcomes, strict=True)):
+        for number, (path, outcomes) in enumerate(zip(self._studies, self._outcomes, strict=True)):
             yield from outcomes
-            told = {outcome.command for outcome in outcomes}
+            answered = {outcome.command for outcome in outcomes}
             if (task := tasks.get(number)) is not None:
-                left = [command for command, _ in task.questions if not {command, _LOST} & told]
+                left = [command for command, _ in task.questions if not {command, _LOST} & answered]
             else:
                 left = [] if outcomes else ["check"]
             label = name_of(path) if task is None else task.label

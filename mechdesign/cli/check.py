@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mechdesign.cli import terminal
 from mechdesign.cli.annotations import annotate, of_error
-from mechdesign.cli.batch import found_studies, source_of
+from mechdesign.cli.batch import source_of, study_files
 from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import load_source
 from mechdesign.cli.options import Options
@@ -32,8 +32,8 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
     """Validate studies, describe their mechanisms on stdout and draw them; returns the highest exit code."""
     worst = 0
     owners: dict[str, Path | None] = {}
-    asked = found_studies(paths)
-    for path in asked:
+    files = study_files(paths)
+    for path in files:
         try:
             study = load_source(source_of(path, options), options)
             label = study.label
@@ -52,10 +52,10 @@ def check(paths: Sequence[Path] | None, options: Options) -> int:
             _foresee(study)
             if not options.no_plots:
                 claim(owners, study)
-                directory = folder(study, "check", options, several=len(asked) > 1)
-                told = write_sketch(directory, study, extras("check", options))
-                terminal.say(f"{label}: {told}", quiet=options.quiet)
-                if len(asked) == 1:
+                directory = folder(study, "check", options, several=len(files) > 1)
+                sentence = write_sketch(directory, study, extras("check", options))
+                terminal.say(f"{label}: {sentence}", quiet=options.quiet)
+                if len(files) == 1:
                     terminal.suggest(directory / f"{MECHANISM}.{options.kinds.split(',')[0]}", quiet=options.quiet)
         except Exception as error:
             code, message = explained(error)

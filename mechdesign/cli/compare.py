@@ -68,11 +68,11 @@ def compare(
         check_writable(out)
         check_marked(out / _TABLE, _HEADER)
         check_marked(out / _PICTURE, writer.CREATOR.encode())
-    found = folders.compare(old, new, chosen)
+    comparison = folders.compare(old, new, chosen)
     if out is not None:
-        _write(out, found)
-    code = _tell(found, "compare", junit, as_json=json, quiet=quiet)
-    if out is not None and found.moved:
+        _write(out, comparison)
+    code = _tell(comparison, "compare", junit, as_json=json, quiet=quiet)
+    if out is not None and comparison.moved:
         terminal.suggest(out / _PICTURE, quiet=quiet or json)
     return code
 
@@ -133,30 +133,32 @@ def _repeat(there: Path, where: Path, content: dict[str, Any], options: Options)
     writer.write(there, study, result, requirements.requirements(study, result), tables)
 
 
-def _verify(found: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
+def _verify(comparison: Comparison, folder: str, kept: Path, content: dict[str, Any], there: Path) -> None:
     """Add the differences between the stored and the repeated tables, and between the bytes of all files."""
     # The repeated study contains its overrides.
     before, after = content | {"overrides": []}, folders.results(there)["."]
-    found.notes += [f"{folder}: {note}" for note in folders.notes(before, after)]
-    folders.compare_results(found, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
+    comparison.notes += [f"{folder}: {note}" for note in folders.notes(before, after)]
+    folders.compare_results(comparison, folder, (kept, before), (there, after), _EXACTLY, illegible=True)
     again, listed = after["files"], content["files"]
-    told = {difference.table for difference in found.differences if difference.folder == folder}
+    tables = {difference.table for difference in comparison.differences if difference.folder == folder}
     drawn = tuple(f".{kind}" for kind in (*FORMATS, "gif", "json"))
     for name in dict.fromkeys((*listed, *again)):
         table, digest = name.removesuffix(".csv"), listed.get(name, "")
         # Other texts and pictures also depend on the study's text, which the manifest does not contain.
         here_alone = (name in again) != (name in listed) and not name.endswith(drawn)
-        wanted = again.get(name, "") if name in after["tables"] or here_alone else digest
-        known = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
-        wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in known.items() if other != wanted]
-        if wrong and table not in told:
-            found.differences.append(Difference(folder, table, "", "bytes", old=", ".join(wrong), new=wanted[:_SHOWN]))
+        expected = again.get(name, "") if name in after["tables"] or here_alone else digest
+        digests = {"in the manifest": digest, "of the file": manifest.digest(kept / name)}
+        wrong = [f"SHA-256 {other[:_SHOWN] or 'none'} {where}" for where, other in digests.items() if other != expected]
+        if wrong and table not in tables:
+            comparison.differences.append(
+                Difference(folder, table, "", "bytes", old=", ".join(wrong), new=expected[:_SHOWN])
+            )
 
 
-def _write(out: Path, found: Comparison) -> None:
+def _write(out: Path, comparison: Comparison) -> None:
     creator = writer.CREATOR.encode()
-    writer.write_file(out / _TABLE, to_csv(found.table).encode(), _HEADER)
-    if not found.moved:
+    writer.write_file(out / _TABLE, to_csv(comparison.table).encode(), _HEADER)
+    if not comparison.moved:
         # Files of an older comparison are removed.
         if marked(out / _PICTURE, creator):
             (out / _PICTURE).unlink()
@@ -166,42 +168,44 @@ def _write(out: Path, found: Comparison) -> None:
 
     with style.context():
         writer.write_file(
-            out / _PICTURE, style.encoded(differences_figure(found.moved), "png", writer.CREATOR), creator
+            out / _PICTURE, style.encoded(differences_figure(comparison.moved), "png", writer.CREATOR), creator
         )
 
 
-def _tell(found: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
+def _tell(comparison: Comparison, command: str, junit: Path | None, *, as_json: bool, quiet: bool) -> int:
     """Show a comparison and return the exit code."""
-    for note in found.notes:
+    for note in comparison.notes:
         terminal.say(f"{command}: note: {note}", quiet=quiet)
-    for difference in found.differences:
+    for difference in comparison.differences:
         if difference.change in _SAID:
             terminal.say(f"{command}: {difference}")
-    tables, columns = found.compared["tables"], found.compared["columns"]
+    tables, columns = comparison.compared["tables"], comparison.compared["columns"]
     compared = f"{counted(tables, 'table')} with {counted(columns, 'column')}"
-    terminal.say(f"{command}: {counted(len(found.differences), 'difference')} in {compared}", quiet=quiet)
+    terminal.say(f"{command}: {counted(len(comparison.differences), 'difference')} in {compared}", quiet=quiet)
     if as_json or not sys.stdout.isatty():
-        terminal.show(found.table, as_json=as_json)
+        terminal.show(comparison.table, as_json=as_json)
     else:
-        terminal.show_lines([str(each) for each in found.differences if each.change not in _SAID])
+        terminal.show_lines([str(line) for line in comparison.differences if line.change not in _SAID])
     if junit is not None:
-        writer.write_file(junit, _junit(found, command).encode(), mark(junit))
-    return 1 if found.differences else 0
+        writer.write_file(junit, _junit(comparison, command).encode(), mark(junit))
+    return 1 if comparison.differences else 0
 
 
-def _junit(found: Comparison, command: str) -> str:
+def _junit(comparison: Comparison, command: str) -> str:
     """JUnit XML: a suite for each folder, with a case for each table and one for all other differences."""
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    cases = dict.fromkeys([*found.cases, *((difference.folder, difference.table) for difference in found.differences)])
+    cases = dict.fromkeys(
+        [*comparison.cases, *((difference.folder, difference.table) for difference in comparison.differences)]
+    )
     for folder in dict.fromkeys(folder for folder, _ in cases):
         suite = TestSuite(folder)
         for table in [name for where, name in cases if where == folder]:
             case = TestCase(table or "result", classname=f"mechdesign.{command}.{folder}", time=0)
             wrong = [
                 difference
-                for difference in found.differences
+                for difference in comparison.differences
                 if (difference.folder, difference.table) == (folder, table)
             ]
             if wrong:

@@ -34,14 +34,14 @@ def show(words: Sequence[str], group: Mapping[str, Any]) -> None:
     StudyError
         If a word is not known; the message names the nearest.
     """
-    known = entries(commands(group))
-    found = [(word, find(known, word) or [*holding(known, word), *find_messages(word)]) for word in words]
-    for word, hits in found:
+    index = entries(commands(group))
+    matches = [(word, find(index, word) or [*holding(index, word), *find_messages(word)]) for word in words]
+    for word, hits in matches:
         if not hits:
-            close = near(known, word)
+            close = near(index, word)
             cure = f"; did you mean {close!r}?" if close else "; 'mechdesign docs' lists what there is"
             raise StudyError(f"the reference has no {word!r}{cure}")
-    texts = [_told(known, hits) for _, hits in found] or [_overview(known)]
+    texts = [_lines(index, hits) for _, hits in matches] or [_overview(index)]
     emit_words("\n".join(line for text in texts for line in text).rstrip("\n") + "\n")
 
 
@@ -65,12 +65,14 @@ def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
     """Entries of commands and their options, as Typer has them."""
     options: dict[tuple[str, str], Entry] = {}
     for name, command in group.items():
-        for given in command.params:
-            flags = [*given.opts, *given.secondary_opts] if given.param_type_name == "option" else []
+        for parameter in command.params:
+            flags = [*parameter.opts, *parameter.secondary_opts] if parameter.param_type_name == "option" else []
             for flag in flags:
-                before = options[flag, given.help].where if (flag, given.help) in options else ()
-                takes = "" if given.is_flag else f"{flag} {given.metavar or given.type.name.upper()}"
-                options[flag, given.help] = Entry(flag, "option", given.help, takes=takes, where=(*before, name))
+                before = options[flag, parameter.help].where if (flag, parameter.help) in options else ()
+                takes = "" if parameter.is_flag else f"{flag} {parameter.metavar or parameter.type.name.upper()}"
+                options[flag, parameter.help] = Entry(
+                    flag, "option", parameter.help, takes=takes, where=(*before, name)
+                )
         arguments = [param.metavar for param in command.params if param.param_type_name == "argument"]
         some = ["[OPTIONS]"] * (len(command.params) > len(arguments))
         usage = " ".join(["mechdesign", name, *arguments, *some])
@@ -78,17 +80,17 @@ def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
     yield from options.values()
 
 
-def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
+def _lines(index: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
     """Lines of the entries; those with equal explanations share one, and a single key lists the keys below it."""
     alike: dict[Entry, list[Entry]] = {}
     for hit in hits:
         alike.setdefault(replace(hit, word=""), []).append(hit)
     for entry, same in alike.items():
-        for each in same:
+        for twin in same:
             bold = sys.stdout.isatty() and "NO_COLOR" not in os.environ
-            yield f"{typer.style(each.word, bold=True) if bold else each.word} ({each.kind})"
+            yield f"{typer.style(twin.word, bold=True) if bold else twin.word} ({twin.kind})"
         yield from (_INDENT + line for line in _body(entry, same[0].last))
-        keys = below(known, same[0]) if len([each for each in alike if each.kind == entry.kind]) == 1 else []
+        keys = below(index, same[0]) if len([twin for twin in alike if twin.kind == entry.kind]) == 1 else []
         if keys:
             yield f"{_INDENT}keys:"
             yield from (f"{2 * _INDENT}{key.last}: {key.text}" for key in keys)
@@ -97,7 +99,7 @@ def _told(known: Sequence[Entry], hits: Sequence[Entry]) -> Iterator[str]:
 
 def _body(entry: Entry, name: str) -> Iterator[str]:
     yield entry.text
-    told = {
+    facts = {
         "takes": entry.takes,
         "mapping": entry.mapping,
         "unit": entry.unit,
@@ -106,22 +108,22 @@ def _body(entry: Entry, name: str) -> Iterator[str]:
         "left out": entry.default,
         "stands in": ", ".join(entry.where),
     }
-    yield from (f"{what}: {text}" for what, text in told.items() if text)
+    yield from (f"{label}: {text}" for label, text in facts.items() if text)
     yield from (f"{_INDENT}{word}: {meaning}" for word, meaning in entry.words)
     yield from (f"example: {name}: {example}" for example in entry.examples)
 
 
-def _overview(known: Sequence[Entry]) -> Iterator[str]:
+def _overview(index: Sequence[Entry]) -> Iterator[str]:
     yield _OVERVIEW
     yield ""
-    sections = [entry for entry in known if entry.kind == "key" and "." not in entry.word]
+    sections = [entry for entry in index if entry.kind == "key" and "." not in entry.word]
     yield f"study: {', '.join(entry.word for entry in sections)}"
     for section in sections:
-        if keys := below(known, section):
+        if keys := below(index, section):
             yield f"{section.word}: {', '.join(key.last for key in keys)}"
     yield ""
     kinds: dict[str, list[str]] = {}
-    for entry in known:
+    for entry in index:
         kinds.setdefault(entry.kind, []).append(entry.word)
     for kind, words in kinds.items():
         if kind != "key":

@@ -99,8 +99,8 @@ def source(path: Path | None, options: Options) -> Source:
     if path is None:
         here = Path("study.yaml")
         path = here if here.exists() else template_path()
-        what = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
-        terminal.say(f"study: {what}", quiet=options.quiet)
+        label = "study.yaml" if here.exists() else "the built-in two-link arm (no study.yaml here)"
+        terminal.say(f"study: {label}", quiet=options.quiet)
     if path == STANDARD_INPUT:
         return Source(None, Folder(anywhere=options.allow_files), sys.stdin.buffer.read(MAX_BYTES + 1))
     return Source(path, Folder(path.parent, options.allow_files), read_file(path))
@@ -135,16 +135,16 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
     if options.part is not None:
         return _shard(study, command, directory, options, options.part, progress)
     begun = time.perf_counter()
-    asked = extras(command, options)
+    output = extras(command, options)
     before = under = None
     if options.before is not None:
         before = load(options.before, seed=options.seed, allow_files=options.allow_files)
-        manifest.check_folder(directory, study, command, asked, before)
-        asked = dataclasses.replace(asked, before=manifest.shown_before(before))
+        manifest.check_folder(directory, study, command, output, before)
+        output = dataclasses.replace(output, before=manifest.shown_before(before))
     share, merging = None, options.command == MERGE and command in DIVIDED
-    if merging and shards.found(directory):
+    if merging and shards.files_in(directory):
         share = shards.merge(directory, manifest.computed_from(study, command))
-    elif (options.resume or merging) and (kept := _finished(study, command, directory, asked)) is not None:
+    elif (options.resume or merging) and (kept := _finished(study, command, directory, output)) is not None:
         return kept
     elif merging:
         # A mistake in the study explains the missing shards.
@@ -164,17 +164,17 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
             if before is not None:
                 under = Before.of(study, result, before, _earlier(before, command, options))
     except Interrupted as interrupt:
-        writer.write(directory, study, interrupt.result, (), asked)
+        writer.write(directory, study, interrupt.result, (), output)
         terminal.say(f"{study.label}: {command}: {interrupt}")
         raise
     except AssemblyError as error:
         if error.result is not None:
-            plain = dataclasses.replace(asked, plots=False, animate=False, report=False)
+            plain = dataclasses.replace(output, plots=False, animate=False, report=False)
             writer.write(directory, study, error.result, (), plain)
         raise
     try:
         with progress:
-            verdicts, undrawn = _judged_and_written(directory, study, result, asked, options.jobs, progress, under)
+            verdicts, undrawn = _judged_and_written(directory, study, result, output, options.jobs, progress, under)
     except KeyboardInterrupt:
         if journal is not None:
             journal.save()
@@ -192,12 +192,12 @@ def answer(study: Study, command: str, directory: Path, options: Options, progre
 
 def _shard(study: Study, command: str, directory: Path, options: Options, shard: Shard, progress: Progress) -> Outcome:
     """Compute one shard of a command and keep it for `merge`; what is not divided is left to `merge`."""
-    told, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
+    sentence, begun = f"shard {shard} is kept in {directory}", time.perf_counter()
     if command not in DIVIDED:
         return Outcome(study.label, command, directory, 0, 0, shard="nothing is divided; merge computes it")
     origin = manifest.computed_from(study, command)
     if options.resume and shards.is_current(directory, origin):
-        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=told)
+        return Outcome(study.label, command, directory, 0, 0, kept=True, shard=sentence)
     if command in LONG:
         requirements.foresee(study, [command])
     taken = shards.Taken(shard)
@@ -215,7 +215,7 @@ def _shard(study: Study, command: str, directory: Path, options: Options, shard:
         raise
     taken.write(directory, origin, options.command)
     seconds = time.perf_counter() - begun
-    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=told)
+    return Outcome(study.label, command, directory, 0, 0, seconds=seconds, shard=sentence)
 
 
 def _earlier(before: Study, command: str, options: Options) -> Result:
@@ -228,9 +228,9 @@ def _earlier(before: Study, command: str, options: Options) -> Result:
     return result
 
 
-def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Outcome | None:
+def _finished(study: Study, command: str, directory: Path, output: Extras) -> Outcome | None:
     """The outcome of an earlier run in the directory, if it is complete and this run would give the same."""
-    content = manifest.is_current(directory, study, command, asked)
+    content = manifest.is_current(directory, study, command, output)
     if content is None:
         return None
     numbers = {"worst": math.nan, "margin": math.nan}
@@ -240,7 +240,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
             for entry in content["requirements"][: len(judged_by(study, command))]
         ]
         table = _main_table(directory, content)
-        warnings, failed = [Caution(**each) for each in content["warnings"]], str(content["failed"])
+        warnings, failed = [Caution(**warning) for warning in content["warnings"]], str(content["failed"])
     except (ValueError, StopIteration, OSError):
         # The manifest was changed by hand.
         return None
@@ -258,7 +258,7 @@ def _finished(study: Study, command: str, directory: Path, asked: Extras) -> Out
 def _placed(study: Study, warnings: Sequence[Caution]) -> list[Caution]:
     """Warnings of a result, those of the study with file, line and column."""
     places = study.cautions
-    return [dataclasses.replace(each, message=str(places.get(each, each))) for each in warnings]
+    return [dataclasses.replace(warning, message=str(places.get(warning, warning))) for warning in warnings]
 
 
 def _exit_code(failed: str, verdicts: Sequence[Verdict], table: Table) -> int:
@@ -284,7 +284,7 @@ def _main_table(directory: Path, content: Mapping[str, Any]) -> Table:
 
 
 def _judged_and_written(
-    directory: Path, study: Study, result: Result, asked: Extras, jobs: int | None, progress: Progress,
+    directory: Path, study: Study, result: Result, output: Extras, jobs: int | None, progress: Progress,
     before: Before | None,
 ) -> tuple[Sequence[Verdict], Sequence[Caution]]:  # fmt: skip
     """Judge a result by the study's requirements and write it; the verdicts, and which pictures could not be drawn."""
@@ -293,9 +293,9 @@ def _judged_and_written(
     except StudyError:
         if result.command in LONG:
             # A requirement that names a missing row must not lose a long computation.
-            writer.write(directory, study, result, (), asked)
+            writer.write(directory, study, result, (), output)
         raise
-    undrawn = writer.write(directory, study, result, verdicts, asked, jobs, progress, before)
+    undrawn = writer.write(directory, study, result, verdicts, output, jobs, progress, before)
     return judged_again(study, verdicts, (*result.warnings, *undrawn)), undrawn
 
 
@@ -345,17 +345,17 @@ def write_report(
     """
     from mechdesign.report.page import page
 
-    told = []
+    answers = []
     for outcome in outcomes:
         path = outcome.directory / pages.SECTION
         part = json.loads(path.read_text(encoding="utf-8")) if outcome.written and path.exists() else None
-        told.append(
+        answers.append(
             page.Answered(outcome.command, outcome.word, outcome.exit_code, outcome.failed, outcome.verdicts, part)
         )
-    told += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
+    answers += [page.Answered(command, "not asked", 0, "the run ended before it") for command in left]
     below = any(outcome.directory != directory for outcome in outcomes)
     path = directory / pages.REPORT
-    writer.write_file(path, page.report(study, told, below=below, plots=not options.no_plots), places.PAGE)
+    writer.write_file(path, page.report(study, answers, below=below, plots=not options.no_plots), places.PAGE)
     printed = ""
     if options.report == PDF:
         from mechdesign.report.page import printing
@@ -363,7 +363,7 @@ def write_report(
         writer.write_file(directory / pages.PRINTED, printing.pdf(path), places.PAGE)
         printed = f", printed in {directory / pages.PRINTED}"
     terminal.say(f"{study.label}: report in {path}{printed}", quiet=options.quiet)
-    return [number for each in told if each.section is not None for number in each.section["headlines"]]
+    return [number for answer in answers if answer.section is not None for number in answer.section["headlines"]]
 
 
 def interrupted(study: Study, command: str, directory: Path, error: KeyboardInterrupt) -> Outcome:

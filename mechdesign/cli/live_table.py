@@ -45,10 +45,10 @@ class Reported(Progress):
         self._told = 0.0
         self._say()
 
-    def start(self, total: int, what: str) -> None:
+    def start(self, total: int, stage: str) -> None:
         """Begin a stage; an interrupt is raised here."""
         interrupts.check()
-        self._stage, self._done, self._total = what, 0, total
+        self._stage, self._done, self._total = stage, 0, total
         self._say()
 
     def update(self, n: int) -> None:
@@ -167,8 +167,8 @@ class LiveTable:
             state = bar if how.total else Text("under way", style="dim")
             grid.add_row(Text(self._labels[index]), how.command, state, f"{time.monotonic() - since:.1f}")
         hidden = len(self._failed) - len(failed)
-        told = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
+        parts = [f"{self._ended} of {len(self._labels)} studies", f"{time.monotonic() - self._begun:.0f} s"]
         if self._failed:
-            told.insert(1, f"{len(self._failed)} failed" + f", {hidden} of them above" * bool(hidden))
-        grid.add_row(Text(told[0]), Text(told[1]), Text("; ".join(told[2:])), "")
+            parts.insert(1, f"{len(self._failed)} failed" + f", {hidden} of them above" * bool(hidden))
+        grid.add_row(Text(parts[0]), Text(parts[1]), Text("; ".join(parts[2:])), "")
         return grid

@@ -34,10 +34,10 @@ def _studies(incomplete: str) -> list[str]:
     """Study files that complete a word; where there are none the shell completes names of folders."""
     folder, slash, start = incomplete.rpartition("/")
     try:
-        found = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
+        names = sorted(path.name for path in Path(folder + slash).glob("*.yaml"))
     except OSError:
         return []
-    return [f"{folder}{slash}{name}" for name in found if name.startswith(start)]
+    return [f"{folder}{slash}{name}" for name in names if name.startswith(start)]
 
 
 def _templates(incomplete: str) -> list[str]:
@@ -56,8 +56,8 @@ def _parameter(name: str, kind: Any, default: Any, meaning: Any) -> Parameter:
 
 
 def _study(kind: Any, metavar: str, meaning: str) -> Parameter:
-    told = f"{meaning} {_LEFT_OUT}"
-    argument = typer.Argument(metavar=metavar, help=told, show_default=False, autocompletion=_studies)
+    text = f"{meaning} {_LEFT_OUT}"
+    argument = typer.Argument(metavar=metavar, help=text, show_default=False, autocompletion=_studies)
     return _parameter("study", kind | None, None, argument)
 
 
@@ -81,12 +81,12 @@ def _report(meaning: str) -> Parameter:
 
 def with_kinds(words: Sequence[str]) -> list[str]:
     """Words of a command line with the kind of the report after a `--report` that stands alone."""
-    told = []
+    filled = []
     for word, follower in zip_longest(words, words[1:]):
-        told.append(word)
+        filled.append(word)
         if word == _REPORT and follower not in (HTML, PDF):
-            told.append(HTML)
-    return told
+            filled.append(HTML)
+    return filled
 
 
 def _out(meaning: str) -> Parameter:

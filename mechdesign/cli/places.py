@@ -73,7 +73,7 @@ def check(study: Study, command: str, directory: Path, options: Options) -> None
         check_marked(directory / shards.FILE, shards.MARK)
         return
     manifest.check_folder(directory, study, command, extras(command, options))
-    for part in shards.found(directory) if os.path.isdir(directory) else ():
+    for part in shards.files_in(directory) if os.path.isdir(directory) else ():
         check_marked(part, shards.MARK)
     if command in RESUMED:
         check_marked(directory / NAME, MARK)

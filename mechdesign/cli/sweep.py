@@ -46,7 +46,7 @@ class Matrix:
         if self.vary or self.cases is not None:
             yield from (f"matrix.{key}=" for key in ("vary", "method", "samples", "cases"))
         if self.vary:
-            varied = [_varied(each) for each in self.vary]
+            varied = [_varied(option) for option in self.vary]
             names = [name for name, _ in varied]
             for name in names:
                 if names.count(name) > 1:

@@ -70,7 +70,7 @@ def coloured(text: str, stream: TextIO) -> str:
     """A text, with its verdicts in colour where the stream is a terminal with colours and ``NO_COLOR`` is not set."""
     if not stream.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM", "dumb") == "dumb":
         return text
-    return _VERDICT.sub(lambda found: f"{found[1]}{_GREEN if found[2] == 'met' else _RED}{found[2]}{_PLAIN}", text)
+    return _VERDICT.sub(lambda match: f"{match[1]}{_GREEN if match[2] == 'met' else _RED}{match[2]}{_PLAIN}", text)
 
 
 def _is_terminal() -> bool:
@@ -182,9 +182,9 @@ def lively() -> bool:
     return sys.stderr.isatty() and os.environ.get("TERM", "dumb") != "dumb" and not ci
 
 
-def announced(total: int, what: str) -> str:
+def announced(total: int, noun: str) -> str:
     """Announcement of a stage of `_GREAT` steps or more; empty for smaller ones."""
-    return f"{total} {what} to compute; Ctrl-C ends it" if total >= _GREAT else ""
+    return f"{total} {noun} to compute; Ctrl-C ends it" if total >= _GREAT else ""
 
 
 class Bar(Progress):
@@ -197,21 +197,21 @@ class Bar(Progress):
         self._bar: Shown | None = None
         self._task: TaskID | None = None
         self._total = self._done = 0
-        self._what = ""
+        self._stage = ""
 
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
             self._bar = self._task = None
 
-    def start(self, total: int, what: str) -> None:
+    def start(self, total: int, stage: str) -> None:
         """Begin a stage, and announce a great one even without a bar; an interrupt is raised here."""
         interrupts.check()
-        if great := announced(total, what):
+        if great := announced(total, stage):
             say(great, quiet=self._quiet)
-        self._total, self._done, self._what = total, 0, what
+        self._total, self._done, self._stage = total, 0, stage
         if self._bar is not None and self._task is not None:
-            self._bar.reset(self._task, total=total, description=what)
+            self._bar.reset(self._task, total=total, description=stage)
 
     def update(self, n: int) -> None:
         """Add `n` finished steps; an interrupt is raised here."""
@@ -230,4 +230,4 @@ class Bar(Progress):
         columns = (*Shown.get_default_columns(), MofNCompleteColumn())
         self._bar = Shown(*columns, console=Console(stderr=True), transient=True)
         self._bar.start()
-        self._task = self._bar.add_task(self._what, total=self._total, completed=self._done)
+        self._task = self._bar.add_task(self._stage, total=self._total, completed=self._done)

@@ -33,38 +33,38 @@ def watch(path: Path, commands: Sequence[str], options: Options) -> int:
     """
     for command in commands:
         if command not in QUESTIONS:
-            known = ", ".join(QUESTIONS)
-            raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {known}")
+            listed = ", ".join(QUESTIONS)
+            raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {listed}")
     if path == STANDARD_INPUT or (path.exists() and not path.is_file()):
         raise StudyError(f"{path}: is no file that could be watched")
     files = {path}
     with suppress(KeyboardInterrupt):
         while True:
-            seen = _contents(files)
+            contents = _contents(files)
             if batch.run([path], options, commands) == Interrupted.exit_code:
                 return Interrupted.exit_code
             files = {path, *_named(path, options)}
-            seen = _contents(files - seen.keys()) | {file: seen[file] for file in files & seen.keys()}
+            contents = _contents(files - contents.keys()) | {file: contents[file] for file in files & contents.keys()}
             names = ", ".join(sorted(map(str, files)))
             terminal.say(
                 f"{path}: answered again when one of these is saved, until Ctrl-C: {names}", quiet=options.quiet
             )
-            _await_change(seen)
+            _await_change(contents)
     return 0
 
 
-def _await_change(seen: dict[Path, bytes | None]) -> None:
+def _await_change(contents: dict[Path, bytes | None]) -> None:
     """Return when a file has changed and then stays the same for two checks: an editor may still be writing."""
-    stamps = _stamps(seen)
-    changed = _contents(seen) != seen
+    stamps = _stamps(contents)
+    changed = _contents(contents) != contents
     while True:
         time.sleep(_LOOK)
         interrupts.check()
-        now = _stamps(seen)
+        now = _stamps(contents)
         if now == stamps and changed:
             return
         if now != stamps:
-            stamps, changed = now, _contents(seen) != seen
+            stamps, changed = now, _contents(contents) != contents
 
 
 def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
@@ -72,8 +72,8 @@ def _stamps(files: Iterable[Path]) -> list[tuple[int, int, int] | None]:
     stamps: list[tuple[int, int, int] | None] = []
     for file in files:
         try:
-            found = file.stat()
-            stamps.append((found.st_ino, found.st_size, found.st_mtime_ns))
+            status = file.stat()
+            stamps.append((status.st_ino, status.st_size, status.st_mtime_ns))
         except OSError:
             stamps.append(None)
     return stamps

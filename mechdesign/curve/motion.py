@@ -94,7 +94,7 @@ class Curve:
         """The same places on every line, line by line, for `solve`."""
         return np.repeat(np.arange(self.lines), len(s)), np.tile(s, self.lines)
 
-    def given(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
+    def inputs(self, line: Ints, s: Floats) -> tuple[Poses, list[Floats]]:
         """Poses at places of lines, and what they give (radians, lengths)."""
         poses = self.poses.along(line, s)
         columns = zip(poses.groups[0].columns(), self._units, strict=True)
@@ -104,8 +104,8 @@ class Curve:
         self, line: Ints, s: Floats, *, judged: bool = True, turning: bool = True
     ) -> tuple[Poses, Configuration]:  # fmt: skip
         """Poses at places of lines, shape (n,); `judged` by the stated limits, `turning` with the turns of angles."""
-        poses, given = self.given(line, s)
-        configuration = self._solved(line, s, poses, given)
+        poses, values = self.inputs(line, s)
+        configuration = self._solved(line, s, poses, values)
         if turning:
             configuration = self.with_turns(line, s, configuration)
         if judged:
@@ -214,10 +214,10 @@ class Curve:
         begin, stop = (low + (high - low) * (k / parts) for k in (number, number + 1))
         return Pieces.of(line, begin, np.where(number + 1 == parts, high, stop))
 
-    def _solved(self, line: Ints, s: Floats, poses: Poses, given: Sequence[Floats]) -> Configuration:
+    def _solved(self, line: Ints, s: Floats, poses: Poses, values: Sequence[Floats]) -> Configuration:
         start = None if self._anchors is None else self._anchors.take(self._anchor_of(line, s))
         vectors = self._vectors.take(line) if poses.places else None
-        return self.plan.solve(given, poses.places, vectors=vectors, start=start, limits=False)
+        return self.plan.solve(values, poses.places, vectors=vectors, start=start, limits=False)
 
     @cached_property
     def _vectors(self) -> Vectors:
@@ -232,10 +232,10 @@ class Curve:
             return None
         rows = evenly(self.poses.line, ANCHORS)
         line, s = (part.ravel() for part in np.meshgrid(np.arange(self.lines), rows.astype(float), indexing="ij"))
-        poses, given = self.given(line, s)
+        poses, values = self.inputs(line, s)
         sketch = begun(self.mechanism, {name: v[:: len(rows)] for name, v in poses.places.items()})
         start = sketch.take(line) if sketch.shape else sketch
-        solved = self.plan.solve(given, poses.places, start=start, limits=False)
+        solved = self.plan.solve(values, poses.places, start=start, limits=False)
         if not sketch.shape:
             sketch = replace(sketch, shape=(1,), reason=sketch.reason.reshape(1))
         own = [np.broadcast_to(np.arange(sketch.shape[0]), (self.lines,))]
@@ -270,9 +270,9 @@ class Curve:
         margins, angles = [], []
         for k in range(0, max(len(s), 1), AT_ONCE):
             some = slice(k, k + AT_ONCE)
-            poses, given = self.given(line[some], s[some])
-            configuration = self._solved(line[some], s[some], poses, given)
-            margins.append(self.margins.of(configuration, given))
+            poses, values = self.inputs(line[some], s[some])
+            configuration = self._solved(line[some], s[some], poses, values)
+            margins.append(self.margins.of(configuration, values))
             angles.append(self._angles_of(configuration))
         return np.concatenate(margins, axis=1), np.concatenate(angles, axis=1)
 
@@ -341,12 +341,12 @@ class Curve:
     def turning_point(self, line: int, place: float, reach: float) -> tuple[float, Configuration, int] | None:
         """Fold of a group without a closed form near a place; see `mechdesign.mechanism.margins.turning_point`."""
 
-        def given(s: float) -> list[float]:
-            return [float(v[0]) for v in self.given(np.array([line]), np.array([s]))[1]]
+        def inputs(s: float) -> list[float]:
+            return [float(v[0]) for v in self.inputs(np.array([line]), np.array([s]))[1]]
 
         at = np.array([line]), np.array([place])
-        near = self._solved(*at, *self.given(*at)).take(0)
-        return turning_point(self.plan, given, place, reach, near) if near.valid else None
+        near = self._solved(*at, *self.inputs(*at)).take(0)
+        return turning_point(self.plan, inputs, place, reach, near) if near.valid else None
 
     def margins_at(self, line: Ints, s: Floats) -> Floats:
         """All margins at places of lines, shape (causes, n)."""

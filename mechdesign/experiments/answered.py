@@ -75,13 +75,13 @@ class Answered:
 class Sheet:
     """Collects the answers of some cases, command by command."""
 
-    def __init__(self, study: Study, wanted: Sequence[Wanted], count: int) -> None:
-        self._required, self._wanted, self._mobility = study.requirements, wanted, study.mechanism.mobility
+    def __init__(self, study: Study, results: Sequence[Wanted], count: int) -> None:
+        self._required, self._results, self._mobility = study.requirements, results, study.mechanism.mobility
         self._fail_on = study.fail_on
-        self._numbers = np.full((count, len(wanted)), np.nan)
+        self._numbers = np.full((count, len(results)), np.nan)
         self._worst, self._margins = np.full((2, count, len(self._required)), np.nan)
         self._met = np.zeros((count, len(self._required)), dtype=bool)
-        self._units = [""] * (len(wanted) + len(self._required))
+        self._units = [""] * (len(results) + len(self._required))
         self._reasons: list[dict[str, int]] = [{} for _ in range(count)]
         self._warnings = np.zeros(count, dtype=np.intp)
         # By the kind of warning and the row: the first warning, and the number of warnings.
@@ -117,7 +117,7 @@ class Sheet:
         """Read the numbers and verdicts of a group, design by design where they cannot be read together."""
         command, good = group.result.command, np.array([end.error is None for end in group.ends])
         try:
-            for k, number in enumerate(self._wanted if good.any() else ()):
+            for k, number in enumerate(self._results if good.any() else ()):
                 if number.command == command:
                     values, unit = number.find(group)
                     self._numbers[rows[good], k] = values[good]
@@ -140,9 +140,13 @@ class Sheet:
         if good.any():
             follows = any(getattr(bound, "expression", None) for bound in (requirement.at_least, requirement.at_most))
             own = group.rows.tolist() if follows else group.rows[:1].tolist()
-            found = judged(group, [designs.required(row)[k] for row in own])
-            self._units[len(self._wanted) + k] = found.unit
-            for column, values in ((self._worst, found.worst), (self._margins, found.margin), (self._met, found.met)):
+            judgement = judged(group, [designs.required(row)[k] for row in own])
+            self._units[len(self._results) + k] = judgement.unit
+            for column, values in (
+                (self._worst, judgement.worst),
+                (self._margins, judgement.margin),
+                (self._met, judgement.met),
+            ):
                 column[rows[good], k] = values[good]
         margins = _ordered(self._margins[:, k])
         least = int(margins[rows].argmin())
@@ -176,10 +180,10 @@ class Sheet:
 
     def _worst_of(self, k: int) -> Worst:
         row = int(_ordered(self._margins[:, k]).argmin())
-        known, verdict = self._verdicts.get(k, (-1, None))
+        judged_row, verdict = self._verdicts.get(k, (-1, None))
         unmet = np.flatnonzero(~self._met[:, k])
         first = int(unmet[0]) if len(unmet) else 0
-        if verdict is None or known != row:
+        if verdict is None or judged_row != row:
             verdict = _unanswered(self._required[k])
         return Worst(row, verdict, len(unmet), first)
 

@@ -27,15 +27,15 @@ TOGETHER: Mapping[str, Callable[[Study, Poses], Answers]] = {
 
 def answers(designs: Designs, command: str) -> Answers:
     """A command's answer for each design, or the error of a design that has none."""
-    found: list[Group] = []
+    answered: list[Group] = []
     if designs.count > 1 and command in TOGETHER and shared(designs.study, command, designs.changed):
         # Where a group has an error, its designs are answered one by one.
         for rows, study, poses in grouped(designs, command, np.arange(designs.count), lambda *_: None):
             with suppress(MechdesignError):
                 groups = TOGETHER[command](study, poses).groups
-                found += [replace(group, rows=rows[group.rows]) for group in groups]
-    left = set(range(designs.count)).difference(*(group.rows.tolist() for group in found))
-    return Answers([*found, *(_alone(designs, k, command) for k in sorted(left))])
+                answered += [replace(group, rows=rows[group.rows]) for group in groups]
+    left = set(range(designs.count)).difference(*(group.rows.tolist() for group in answered))
+    return Answers([*answered, *(_alone(designs, k, command) for k in sorted(left))])
 
 
 def _alone(designs: Designs, k: int, command: str) -> Group:

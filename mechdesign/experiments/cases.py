@@ -34,21 +34,21 @@ def seeded(study: Study, seed: int | None) -> Study:
 
 
 def answers(
-    study: Study, cases: Sequence[Changes], wanted: Sequence[Wanted] = (), *, begin: int = 0, jobs: int | None = 1
+    study: Study, cases: Sequence[Changes], results: Sequence[Wanted] = (), *, begin: int = 0, jobs: int | None = 1
 ) -> Iterator[Answered]:
-    """Verdicts on the requirements and the wanted numbers of the cases of a study, batch by batch.
+    """Verdicts on the requirements and the `results` of the cases of a study, batch by batch.
 
     Each question that they need is asked once for every case, with the study's seed. `Answered.reasons` says why a case
     could not be loaded or answered. A batch has many cases where their questions can be asked of many designs at once,
     else one. Cases before `begin` are left out.
     """
-    together = set(commands_of(study, wanted)) <= batches.TOGETHER.keys()
+    together = set(commands_of(study, results)) <= batches.TOGETHER.keys()
     at_once = min(max(len(cases) // CHUNKS, CASES_AT_ONCE), MOST_AT_ONCE) if together else 1
     if begin >= len(cases):
         return
     # A computation that is resumed has the same batches.
     chunks = (cases[max(k, begin) : k + at_once] for k in range(begin - begin % at_once, len(cases), at_once))
-    answer = Answer(study, tuple(wanted), cases[0])
+    answer = Answer(study, tuple(results), cases[0])
     yield from map_chunks(answer, chunks, jobs, processes=True, travels=True)
 
 
@@ -57,12 +57,12 @@ class Answer:
     """Answers cases of a study that change the same entries; `first` is the first of all of them."""
 
     study: Study
-    wanted: tuple[Wanted, ...]
+    results: tuple[Wanted, ...]
     first: Changes
 
     def __call__(self, cases: Sequence[Changes]) -> Answered:
         """The answers of a batch of cases."""
-        sheet = Sheet(self.study, self.wanted, len(cases))
+        sheet = Sheet(self.study, self.results, len(cases))
         alike: dict[str, list[int]] = {}
         for k, case in enumerate(cases):
             alike.setdefault(compiled.form_of(case), []).append(k)
@@ -96,34 +96,34 @@ class Answer:
 
     def _together(self, sheet: Sheet, rows: Ints, designs: Designs) -> None:
         """Answer designs of a study."""
-        for command in commands_of(designs.study, self.wanted):
+        for command in commands_of(designs.study, self.results):
             for group in batches.answers(designs, command).groups:
                 sheet.note(rows[group.rows], designs, group)
 
 
-def commands_of(study: Study, wanted: Iterable[Wanted]) -> tuple[str, ...]:
-    """The commands that compute what a study requires and the wanted numbers."""
-    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in wanted}
+def commands_of(study: Study, results: Iterable[Wanted]) -> tuple[str, ...]:
+    """The commands that compute the requirements of a study and some results."""
+    needed = {command_of(requirement) for requirement in study.requirements} | {number.command for number in results}
     return tuple(command for command in COMMANDS if command in needed)
 
 
-def foresee(study: Study, wanted: Iterable[Wanted]) -> None:
-    """Find wanted numbers and requirements that no result has, by a short look at each result.
+def foresee(study: Study, results: Iterable[Wanted]) -> None:
+    """Find results and requirements that no table has, by a short look at each command's answer.
 
     Raises
     ------
     StudyError
         Every such mistake in one go, with its place.
     """
-    wanted = tuple(wanted)
+    results = tuple(results)
     problems: list[Problem] = []
-    for command in commands_of(study, wanted):
+    for command in commands_of(study, results):
         try:
             result = look(study, command)
         except AssemblyError:
             # A case with other numbers may assemble.
             continue
-        for number in wanted:
+        for number in results:
             if number.command == command:
                 try:
                     number.find(Group.alone(result))

@@ -62,7 +62,7 @@ def compiled(study: Study, changes: Changes, first: Changes) -> Form | None:
 
 
 def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form | None:
-    known, own, added = set(study.parameters.nominal), dict[str, str](), dict[str, Any]()
+    names, own, added = set(study.parameters.nominal), dict[str, str](), dict[str, Any]()
     written: list[tuple[str, Any]] = []
     for number, (name, value) in enumerate(changes):
         if not is_number(value):
@@ -78,7 +78,7 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
             own[name] = str(keys[2])
             continue
         parameter = f"entry_{number}"
-        while parameter in known:
+        while parameter in names:
             parameter += "_"
         own[name] = parameter
         raw = value_at(study.resolved, keys)

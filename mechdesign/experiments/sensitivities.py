@@ -55,7 +55,7 @@ class Changing:
 
 
 def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
-    """The wanted results and the numbers that change, checked by a short look at the study's results.
+    """The results to differentiate and the numbers that change, checked by a short look at the study's answers.
 
     Raises
     ------
@@ -67,62 +67,62 @@ def prepared(study: Study) -> tuple[list[Wanted], list[Changing]]:
         raise StudyError(
             "sensitivities need a section of that name, e.g. sensitivities: {results: [GII], parameters: [r]}"
         )
-    wanted = wanted_in(SENSITIVITIES.name, section.results)
-    found: list[Changing] = []
+    results = wanted_in(SENSITIVITIES.name, section.results)
+    changes: list[Changing] = []
     problems: list[Problem] = []
     for k, parameter in enumerate(section.parameters):
         try:
             changing = _changing(study, parameter)
-            if changing.name in [other.name for other in found]:
+            if changing.name in [other.name for other in changes]:
                 raise StudyError(f"{changing.given} is listed twice")
-            found.append(changing)
+            changes.append(changing)
         except StudyError as error:
             problems.append(study.problem(error.problems[0].message, "sensitivities", "parameters", k))
     if problems:
         raise StudyError(problems)
-    foresee(study, wanted)
-    return wanted, found
+    foresee(study, results)
+    return results, changes
 
 
 def _changing(study: Study, changed: Changed) -> Changing:
-    given = changed.parameter
-    path = entry(study.resolved, f"mechanism.parameters.{given}" if given in study.parameters.nominal else given)
+    title = changed.parameter
+    path = entry(study.resolved, f"mechanism.parameters.{title}" if title in study.parameters.nominal else title)
     raw = value_at(study.resolved, path)
     if raw is None:
-        raise StudyError(f"{given} is left to its default; give it a value in the study first")
+        raise StudyError(f"{title} is left to its default; give it a value in the study first")
     try:
         number = read_number(raw, Context(study.units, study.parameters.nominal))
     except PydanticCustomError:
-        raise StudyError(f"{given} is {shown(raw)}, and only a number can change a little") from None
+        raise StudyError(f"{title} is {shown(raw)}, and only a number can change a little") from None
     if number.expression is not None:
-        raise StudyError(f"{given} is the expression {shown(raw)}; name a parameter in it")
+        raise StudyError(f"{title} is the expression {shown(raw)}; name a parameter in it")
     if changed.step is None and not number:
-        raise StudyError(f"{given} is 0; say by how much it changes, {{parameter: {given}, step: 0.1}}")
+        raise StudyError(f"{title} is 0; say by how much it changes, {{parameter: {title}, step: 0.1}}")
     name = dotted(path)
     unit = entry_unit(study, name)
     try:
         given_step = Amount.of(changed.step or 0.0)
         step = (given_step.within(unit) if unit else given_step) or _PART * abs(number)
     except QuantityError as error:
-        raise StudyError(f"{given}: {error}") from None
-    return Changing(given, name, number, step, unit)
+        raise StudyError(f"{title}: {error}") from None
+    return Changing(title, name, number, step, unit)
 
 
 @one_thread()
 def sensitivities(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Differentiate results of a study by central differences; see `mechdesign.sensitivities`."""
     study = seeded(study, seed)
-    wanted, numbers = prepared(study)
+    results, numbers = prepared(study)
     judged_by_none = {key: value for key, value in study.resolved.items() if key != "requirements"}
     plain = replace(study, requirements=(), fail_on=(), resolved=judged_by_none)
     cases: list[Changes] = [(), *(case for number in numbers for case in number.cases())]
     progress.start(len(cases), "cases")
-    tally = Tally(cases, len(wanted), 0)
-    for answered in answers(plain, cases, wanted, jobs=jobs):
+    tally = Tally(cases, len(results), 0)
+    for answered in answers(plain, cases, results, jobs=jobs):
         tally.add(answered)
         progress.update(len(answered.table))
-    rows = list(_rows(wanted, numbers, tally))
-    table = _table(rows, [tally.result(k)[1] for k in range(len(wanted))], numbers)
+    rows = list(_rows(results, numbers, tally))
+    table = _table(rows, [tally.result(k)[1] for k in range(len(results))], numbers)
     counts = {"cases": len(cases), "derivatives": len(rows), "uncertain": sum(bool(row.doubt) for row in rows)}
     failed = f"the study itself has no answer: {tally.reason(0)}" if tally.reason(0) else ""
     warnings = [
@@ -156,14 +156,14 @@ class Row:
         return self.derivative * abs(self.at / self.value) if self.value and self.at else math.nan
 
 
-def _rows(wanted: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
-    values = np.column_stack([tally.result(k)[0] for k in range(len(wanted))])
-    middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(wanted))
+def _rows(results: Sequence[Wanted], numbers: Sequence[Changing], tally: Tally) -> Iterator[Row]:
+    values = np.column_stack([tally.result(k)[0] for k in range(len(results))])
+    middle, sides = values[0], values[1:].reshape(len(numbers), 2, len(STEPS), len(results))
     slopes = [slope(middle, pair[0], pair[1], number.step) for number, pair in zip(numbers, sides, strict=True)]
     count = 2 * len(STEPS)
     reasons = [next(filter(None, map(tally.reason, range(1 + k * count, 1 + (k + 1) * count))), "")
                for k in range(len(numbers))]  # fmt: skip
-    for k, result in enumerate(wanted):
+    for k, result in enumerate(results):
         for number, found_slope, reason in zip(numbers, slopes, reasons, strict=True):
             value, error, below, above = (float(part[k]) for part in found_slope)
             scale = abs(middle[k]) * _NOTHING / number.step

@@ -34,7 +34,7 @@ _SECTION = "matrix"
 
 
 def prepared(study: Study) -> tuple[Design, list[Wanted]]:
-    """The cases of a study and the numbers wanted of each, checked by a short look at the study's results.
+    """The cases of a study and the results to compute of each, checked by a short look at the study's answers.
 
     Raises
     ------
@@ -47,15 +47,15 @@ def prepared(study: Study) -> tuple[Design, list[Wanted]]:
             "a sweep needs cases: --vary mechanism.parameters.r=30:50:5, or a section 'matrix' in the study"
         )
     goals = {number.title: number for number in goals_of(matrix.best)}
-    wanted = [*({number.title: number for number in wanted_in(_SECTION, matrix.results)} | goals).values()]
-    if not commands_of(study, wanted):
+    results = [*({number.title: number for number in wanted_in(_SECTION, matrix.results)} | goals).values()]
+    if not commands_of(study, results):
         message = "what is to be found of each case? name 'results', such as kinematics.mu.min, or give 'requirements'"
         raise StudyError([study.problem(message, _SECTION)])
     cases = cases_of(study)
-    foresee(study, wanted)
+    foresee(study, results)
     # A number with a requirement has a column already.
     required = requirement_names(study)
-    return cases, [number for number in wanted if number.title not in required]
+    return cases, [number for number in results if number.title not in required]
 
 
 @one_thread()
@@ -65,14 +65,14 @@ def sweep(
 ) -> Result:  # fmt: skip
     """Answer every case of a study's matrix; see `mechdesign.sweep`."""
     study = seeded(study, seed)
-    cases, wanted = prepared(study)
+    cases, results = prepared(study)
     progress.start(len(cases), "cases")
-    tally = Tally(cases, len(wanted), len(study.requirements))
+    tally = Tally(cases, len(results), len(study.requirements))
     if journal is not None:
         tally.recall(journal)
         progress.update(len(tally))
     try:
-        for answered in answers(study, cases, wanted, begin=len(tally), jobs=jobs):
+        for answered in answers(study, cases, results, begin=len(tally), jobs=jobs):
             tally.add(answered)
             progress.update(len(answered.table))
             if journal is not None:
@@ -83,20 +83,20 @@ def sweep(
             journal.save()
         if not len(tally):
             raise
-        raise Interrupted(_result(study, cases, tally, wanted)) from None
-    return _result(study, cases, tally, wanted)
+        raise Interrupted(_result(study, cases, tally, results)) from None
+    return _result(study, cases, tally, results)
 
 
-def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Result:
+def _result(study: Study, cases: Design, tally: Tally, results: Sequence[Wanted]) -> Result:
     """The result with the table of the answered cases."""
-    count, asked, failed = len(tally), len(cases), tally.failed
+    count, total, failed = len(tally), len(cases), tally.failed
     counts = {"cases": count, "not_met": int((tally.table[:, 0] == 1).sum()), "failed": len(failed)}
     message = ""
     if failed:
         first = f"{tally.named(failed[0])}: {tally.reason(failed[0])}"
         message = f"{len(failed)} of {counted(count, 'case')} failed; the first, {first}"
-    part = f"{count} of {asked} cases were answered; this is what they are" if count < asked else ""
-    table = SWEEP.table(_columns(study, cases, tally, wanted))
+    part = f"{count} of {total} cases were answered; this is what they are" if count < total else ""
+    table = SWEEP.table(_columns(study, cases, tally, results))
     ranked = None
     if goals := _goals(study):
         ranking = Ranking.of(goals, {name: table[name] for name in goals}, table["exit_code"] == 0)
@@ -106,15 +106,15 @@ def _result(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted])
             table = table.take(np.argsort(ranking.rank, kind="stable"))
     return Result(
         "sweep", {"sweep": table}, tuple(_warnings(study, tally, ranked)), counts, message, interrupted=part,
-        drawn=_drawn(study, tally, wanted),
+        drawn=_drawn(study, tally, results),
     )  # fmt: skip
 
 
-def _drawn(study: Study, tally: Tally, wanted: Sequence[Wanted]) -> DrawnCases:
+def _drawn(study: Study, tally: Tally, numbers: Sequence[Wanted]) -> DrawnCases:
     """The entries that vary, the results with what is required of them, and which are goals."""
     bounds = [(requirement.at_least, requirement.at_most) for requirement in study.requirements]
     limits = dict(zip(requirement_names(study), bounds, strict=True))
-    results = limits | {number.title: (None, None) for number in wanted}
+    results = limits | {number.title: (None, None) for number in numbers}
     entries = [name for name, _ in tally.cases[0]]
     return DrawnCases(entries, results, _goals(study), tally.verdicts)
 
@@ -125,7 +125,7 @@ def _goals(study: Study) -> dict[str, int]:
     return {number.title: sign for number, sign in goals_of(best).items()}
 
 
-def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]) -> Iterator[Column]:
+def _columns(study: Study, cases: Design, tally: Tally, numbers: Sequence[Wanted]) -> Iterator[Column]:
     """Columns: number and exit code of the case, varied entries, requirements, results, warnings and the reason."""
     count, table = len(tally), tally.table
     yield from SWEEP.columns({}, case=np.arange(1, count + 1), exit_code=table[:, 0].astype(np.intp))
@@ -137,7 +137,7 @@ def _columns(study: Study, cases: Design, tally: Tally, wanted: Sequence[Wanted]
         limit = str(tally.worst[k].verdict.requirement)
         yield SWEEP["<requirement>"].column(worst, unit, requirement=name, limit=limit)
         yield SWEEP["<requirement>_met"].column(met == 1, requirement=name)
-    for k, number in enumerate(wanted):
+    for k, number in enumerate(numbers):
         yield SWEEP["<result>"].column(*tally.result(k), result=number.title)
     reasons = np.array([*tally.reasons], dtype=object)[table[:, 2].astype(np.intp)]
     yield from SWEEP.columns({}, warnings=table[:, 1].astype(np.intp), reason=reasons)
@@ -172,10 +172,12 @@ def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caut
         yield Caution("suspect", words)
     if isinstance(cases, Listed):
         first: dict[str, int] = {}
-        twice = [(k, seen) for k, row in enumerate(cases.rows) if (seen := first.setdefault(json.dumps(row), k)) != k]
+        twice = [
+            (k, earlier) for k, row in enumerate(cases.rows) if (earlier := first.setdefault(json.dumps(row), k)) != k
+        ]
         if twice:
-            k, seen = twice[0]
-            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {seen + 1} once more"
+            k, earlier = twice[0]
+            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {earlier + 1} once more"
             yield Caution("suspect", words, "sweep", pose=tally.named(k))
     for kind, warned in tally.warned.items():
         case = tally.named(warned.case)

@@ -54,7 +54,7 @@ class Tally:
         numbers = [self.reasons.setdefault(reason, len(self.reasons)) for reason in answered.reasons]
         table[:, 2] = np.array(numbers)[table[:, 2].astype(np.intp)]
         self._rows.frombytes(table.tobytes())
-        self._units = [known or unit for known, unit in zip(self._units, answered.units, strict=True)]
+        self._units = [own or unit for own, unit in zip(self._units, answered.units, strict=True)]
         for kind, warned in answered.warned.items():
             before = self.warned.setdefault(kind, replace(warned, case=begin + warned.case, cases=0))
             before.cases += warned.cases
@@ -133,7 +133,7 @@ class Tally:
             journal.add(key, block, journal.words)
         self.reasons = {reason: k for k, reason in enumerate(state["reasons"])}
         self._units = state["units"]
-        self.warned = {kind: Warned(**each) for kind, each in state["warned"].items()}
+        self.warned = {kind: Warned(**entry) for kind, entry in state["warned"].items()}
         self.worst = [Worst(**worst | {"verdict": Verdict(**worst["verdict"])}) for worst in state["worst"]]
 
     def _state(self) -> Mapping[str, Any]:

@@ -99,15 +99,15 @@ def judged(group: Group, required: Sequence[Requirement]) -> Judged:
     UnknownColumnError
         See `Wanted.find`.
     """
-    (one, *_), found = required, []
+    (one, *_), pairs = required, []
     limits = zip(*(bounds_of(requirement) for requirement in required), strict=True)
     for own in limits:
         goal = own[0]
         terms = _terms(group, goal.column, dict(goal.where))
         values = goal.judge(group.result, len(group.ends)).values
         beyond = values - np.array([terms.bound(goal.bound) for goal in own])
-        found.append((values, -beyond if goal.smallest else beyond))
-    values, margins = (np.stack(part) for part in zip(*found, strict=True))
+        pairs.append((values, -beyond if goal.smallest else beyond))
+    values, margins = (np.stack(part) for part in zip(*pairs, strict=True))
     nearer = np.where(np.isnan(margins), -np.inf, margins).argmin(axis=0)[None]
     worst, margin = (np.take_along_axis(part, nearer, axis=0)[0] for part in (values, margins))
     partly = group.missing if any(part.table.scope for part in terms.parts) and one.unassembled is None else False

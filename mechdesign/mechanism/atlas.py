@@ -73,14 +73,14 @@ class Atlas:
 
     `held` are the values of the plan's coordinates after the point's x and y. `signs` are the signs of the determinants
     of the groups without a closed form, shape (groups, 1); other signs mean another assembly. `origin` is the point in
-    the sketch, and `known` has the poses by dimensions.
+    the sketch, and `poses` has the poses by dimensions.
     """
 
     plan: Plan
     held: tuple[float, ...]
     signs: Floats
     origin: complex
-    known: dict[bytes, _Poses] = field(default_factory=dict)
+    poses: dict[bytes, _Poses] = field(default_factory=dict)
 
     @staticmethod
     def of(plan: Plan, held: tuple[float, ...]) -> Atlas:
@@ -113,13 +113,13 @@ class Atlas:
                 (poses,) = between._grown({}, np.zeros(len(lattice), dtype=np.intp), lattice, table)
                 lattice, table = poses.lattice, poses.table
             atlas = replace(between, held=held)
-        (atlas.known[b""],) = atlas._grown({}, np.zeros(len(lattice), dtype=np.intp), lattice, table)
+        (atlas.poses[b""],) = atlas._grown({}, np.zeros(len(lattice), dtype=np.intp), lattice, table)
         return atlas
 
     @property
     def empty(self) -> bool:
         """Whether no pose with the held values was reached."""
-        return not self.known[b""].tree.n
+        return not self.poses[b""].tree.n
 
     @property
     def spacing(self) -> float:
@@ -233,28 +233,28 @@ class Atlas:
     def _nearest(self, z: Complexes, sizes: Sizes) -> tuple[Complexes, Floats, Floats]:
         """Places of the nearest solved poses, nan where there are none, with their unknowns and slopes."""
         if not sizes or self.empty:
-            return _pick(self.known[b""], z)
+            return _pick(self.poses[b""], z)
         rows, which = np.unique(np.stack(list(sizes.values()), axis=-1), axis=0, return_inverse=True)
         which = which.ravel()
         keys = [",".join(sizes).encode() + row.tobytes() for row in rows]
-        new = [k for k, key in enumerate(keys) if key not in self.known]
+        new = [k for k, key in enumerate(keys) if key not in self.poses]
         if new:
             fresh = self._designs({name: rows[new, k] for k, name in enumerate(sizes)}, len(new))
-            self.known.update({keys[k]: poses for k, poses in zip(new, fresh, strict=True)})
-        count = len(self.known[b""].table)
+            self.poses.update({keys[k]: poses for k, poses in zip(new, fresh, strict=True)})
+        count = len(self.poses[b""].table)
         near = np.empty(z.shape, dtype=complex)
         table, slopes = np.empty((count, len(z))), np.empty((2, count, len(z)))
         order = np.argsort(which, kind="stable")
         for key, lanes in zip(keys, np.split(order, np.cumsum(np.bincount(which))[:-1]), strict=True):
-            near[lanes], table[:, lanes], slopes[:, :, lanes] = _pick(self.known[key], z[lanes])
-        if sum(poses.tree.n for poses in self.known.values()) > KEPT_POSES:
-            for key in self.known.keys() - {b"", *keys}:
-                del self.known[key]
+            near[lanes], table[:, lanes], slopes[:, :, lanes] = _pick(self.poses[key], z[lanes])
+        if sum(poses.tree.n for poses in self.poses.values()) > KEPT_POSES:
+            for key in self.poses.keys() - {b"", *keys}:
+                del self.poses[key]
         return near, table, slopes
 
     def _designs(self, sizes: Sizes, count: int) -> list[_Poses]:
         """Poses of several designs: some nominal ones are continued to their dimensions and grow from there."""
-        nominal = self.known[b""]
+        nominal = self.poses[b""]
         coarse = np.flatnonzero((nominal.lattice.real % SEED_EVERY == 0) & (nominal.lattice.imag % SEED_EVERY == 0))
         design, seed = np.repeat(np.arange(count), len(coarse)), np.tile(coarse, count)
         table, lattice = nominal.table[:, seed], nominal.lattice[seed]
@@ -273,7 +273,7 @@ class Atlas:
     def _grown(self, sizes: Sizes, design: Ints, lattice: Complexes, table: Floats) -> list[_Poses]:
         """Poses of several designs, grown from solved ones to neighbours on the lattice until no more are reached."""
         count = max((len(value) for value in sizes.values()), default=1)
-        seen = set(zip(design.tolist(), lattice.tolist(), strict=True))
+        visited = set(zip(design.tolist(), lattice.tolist(), strict=True))
         layers = [(design[:0], lattice[:0], table[:, :0])]
         # Number of spacings since the last pose within the limits.
         outside = np.zeros(len(design), dtype=int)
@@ -290,11 +290,11 @@ class Atlas:
             steps = (lattice[closed, None] + NEIGHBOURS).ravel().tolist()
             parents = np.repeat(closed, len(NEIGHBOURS)).tolist()
             for k, owner, step in zip(parents, design[parents].tolist(), steps, strict=True):
-                if (owner, step) not in seen:
+                if (owner, step) not in visited:
                     fresh.setdefault((owner, step), k)
-            if len(seen) + len(fresh) > MAX_POSES * count:
+            if len(visited) + len(fresh) > MAX_POSES * count:
                 break
-            seen.update(fresh)
+            visited.update(fresh)
             parent = np.array(list(fresh.values()), dtype=np.intp)
             design = design[parent]
             lattice = np.array([step for _, step in fresh], dtype=complex)

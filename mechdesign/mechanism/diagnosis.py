@@ -172,10 +172,10 @@ def over_constrained(
     if idle:
         links = [name for name in idle if name in description.links]
         where = f"mechanism.{'links' if idle[0] in description.links else 'joints'}.{idle[0]}"
-        what = "link" if len(links) == len(idle) else "joint" if not links else "part"
+        noun = "link" if len(links) == len(idle) else "joint" if not links else "part"
         one = len(idle) == 1
         mend = (
-            f"{what}{'' if one else 's'} {listed(idle)} repeat{'s' if one else ''} what the other links impose: leave "
+            f"{noun}{'' if one else 's'} {listed(idle)} repeat{'s' if one else ''} what the other links impose: leave "
             f"{'it' if one else 'them'} out, the motion stays the same"
         )
         if links:
@@ -203,11 +203,11 @@ def undetermined(
         real, x = (0, x) if x is None else equations.mobility(x)
         if x is not None and real > len(given):
             return over_constrained(description, equations, x, len(given), real, len(given))
-    what = "the drives" if driven else ", ".join(coordinate.name for coordinate in given)
+    subject = "the drives" if driven else ", ".join(coordinate.name for coordinate in given)
     verb = "does" if len(given) == 1 and not driven else "do"
     why = _twice_and_free(equations, given, driven) or reason
     where = DRIVES if driven else "poses"
-    return MechanismError(f"{what} {verb} not determine the mechanism: {why}", where)
+    return MechanismError(f"{subject} {verb} not determine the mechanism: {why}", where)
 
 
 def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: bool) -> str:
@@ -301,8 +301,8 @@ def _motion(graph: Graph, motion: Floats) -> tuple[str, str | None, str | None]:
         text = f"{_links(turning)} turn{'s' if len(turning) == 1 else ''} freely about '{pivots[0][1]}'"
         return text, turning[0] if len(turning) == 1 else None, drive
     if len(sliding) == 1 and not turning:
-        what = "leg" if sliding[0] in legs else "joint"
-        return f"{what} '{sliding[0]}' slides freely", None, drive
+        noun = "leg" if sliding[0] in legs else "joint"
+        return f"{noun} '{sliding[0]}' slides freely", None, drive
     slide = f"{listed(sliding)} slide{'s' if len(sliding) == 1 else ''}" if sliding else ""
     move = f"{_links(turning)} move{'s' if len(turning) == 1 else ''}" if turning else ""
     return " and ".join(part for part in (move, slide) if part) or "points move", None, drive

@@ -240,9 +240,9 @@ class _Bodies:
                 self.frames[block] = self.frames[carrier]
                 self._slide(carrier, block, name, edges)
                 hold(block, graph.node(joint.point))
-        for node, those in holders.items():
-            for k, one in enumerate(those):
-                self.joints += [(one, other, Joint(graph.nodes[node], node=node)) for other in those[k + 1 :]]
+        for node, bodies in holders.items():
+            for k, one in enumerate(bodies):
+                self.joints += [(one, other, Joint(graph.nodes[node], node=node)) for other in bodies[k + 1 :]]
 
     def _slide(self, one: str, other: str, name: str, edges: Mapping[int, int]) -> None:
         slide = self.mechanism.graph.slides.index(name)

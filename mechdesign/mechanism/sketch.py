@@ -45,8 +45,8 @@ class Sketch(Loops):
         }
         if missing:
             names, one = ", ".join(f"'{self.graph.nodes[node]}'" for node in sorted(missing)), len(missing) == 1
-            what, them = (f"point {names} is", "it") if one else (f"points {names} are", "them")
-            raise MechanismError(f"{what} needed to choose the assembly; add {them} to the sketch", SKETCH)
+            subject, them = (f"point {names} is", "it") if one else (f"points {names} are", "them")
+            raise MechanismError(f"{subject} needed to choose the assembly; add {them} to the sketch", SKETCH)
         return tuple(self._mode(structure, group) for group in structure.groups)
 
     def _mode(self, structure: Structure, group: Group) -> int:

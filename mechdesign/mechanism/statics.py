@@ -202,17 +202,20 @@ class Joints:
     @cached_property
     def guides(self) -> dict[int, tuple[str, str | None]]:
         """By slide, the body that carries its line, and its slider; None for the pin of a slot."""
-        found: dict[int, tuple[str, str | None]] = {}
+        guides: dict[int, tuple[str, str | None]] = {}
         for slide, name in enumerate(self.graph.slides):
             if slide in self.graph.telescopic:
-                found[slide] = name, rod_of(name)
+                guides[slide] = name, rod_of(name)
                 continue
             joint = self.description.joints[name]
             assert isinstance(joint, Prismatic | Slot)
             line = joint.line
             guide = self.graph.holder(line.link, line.through or origin_of(line.link))
-            found[slide] = guide, self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
-        return found
+            guides[slide] = (
+                guide,
+                self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None,
+            )
+        return guides
 
     def _slides(self) -> list[Contact]:
         contacts = []
@@ -375,7 +378,7 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         moment = turning.get(body, 0.0)
         moments[name] = -1.0 * moment if body == other else moment
         turn(one if body == other else other, moment)
-    found = []
+    contact_reactions = []
     for contact, force in zip(joints.contacts, forces, strict=True):
         normal: Value = np.nan
         if contact.slides:
@@ -383,5 +386,5 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         moment = 0.0 if contact.turns else moments[contact.joint]
         if contact.joint in joints.ties and contact.on == joints.ties[contact.joint][0]:
             moment = -1.0 * moment
-        found.append(Reaction(force, moment, normal))
-    return found
+        contact_reactions.append(Reaction(force, moment, normal))
+    return contact_reactions

@@ -38,17 +38,17 @@ class Loading:
         """Add the loads to forces."""
         configuration = forces.configuration
         for load in self.loads:
-            given = [self._value(part, forces, moving) for _, part, _ in load.numbers]
+            values = [self._value(part, forces, moving) for _, part, _ in load.numbers]
             if load.at is not None:
-                force = given[0] + 1j * given[1]
+                force = values[0] + 1j * values[1]
                 if load.in_ is not None:
                     force = force * configuration.body_rotation(load.in_)
                 forces.at(load.at, force)
             elif load.between is not None:
                 span = forces.span(load.between)
-                forces.pull(load.between, given[0] * span / np.sqrt(norm2(span)))
+                forces.pull(load.between, values[0] * span / np.sqrt(norm2(span)))
             if load.link is not None:
-                forces.on_body(load.link, 0.0, given[-1])
+                forces.on_body(load.link, 0.0, values[-1])
 
     def _value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
         if isinstance(quantity, Expression):

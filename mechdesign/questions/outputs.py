@@ -27,8 +27,8 @@ def expand_outputs(study: Study, names: tuple[str, ...]) -> list[Coordinate]:
         For a name that is neither.
     """
     mechanism = study.mechanism
-    found = []
+    coordinates = []
     for name in names:
         parts = [f"{name}.x", f"{name}.y"] if mechanism.graph.is_point(name) else [name]
-        found += [mechanism.coordinate(part) for part in parts]
-    return found
+        coordinates += [mechanism.coordinate(part) for part in parts]
+    return coordinates

@@ -45,7 +45,7 @@ class SolvedPoses:
     """Poses that give the same coordinates, solved: their rows in the study's order, and the names given."""
 
     rows: Ints
-    given: tuple[str, ...]
+    names: tuple[str, ...]
     configuration: Configuration
 
 
@@ -60,14 +60,14 @@ def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
         Where nothing sensible can be assumed.
     """
     for name in dict.fromkeys((section, "kinematics")):
-        asked: PoseSection | None = getattr(study, name)
-        if asked is not None and asked.at_nodes:
+        owner: PoseSection | None = getattr(study, name)
+        if owner is not None and owner.at_nodes:
             # Here, for regions need SciPy, which is slow to import.
             from mechdesign.region.curves import workspace_nodes
 
             return workspace_nodes(study)
-        if asked is not None:
-            poses = expand(asked, study.folder, numbers)
+        if owner is not None:
+            poses = expand(owner, study.folder, numbers)
             if poses is not None:
                 return poses
     return default(study.mechanism.description, numbers)
@@ -75,12 +75,12 @@ def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
 
 def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
-    asked = next((each for name in dict.fromkeys((section, "kinematics"))
-                  if (each := getattr(designs.study, name)) is not None and each.source is not None), None)  # fmt: skip
+    sections = (getattr(designs.study, name) for name in dict.fromkeys((section, "kinematics")))
+    owner = next((part for part in sections if part is not None and part.source is not None), None)
     counts = (
         np.zeros((len(rows), 0))
-        if asked is None
-        else number_of_poses(asked, designs.study.folder, designs.take(rows).numbers)
+        if owner is None
+        else number_of_poses(owner, designs.study.folder, designs.take(rows).numbers)
     )
     kinds, which = np.unique(counts, axis=0, return_inverse=True)
     for kind in range(len(kinds)):
@@ -104,12 +104,12 @@ def in_study_units(study: Study, coordinate: Coordinate, value: Value) -> Value:
 
 
 def solve_poses(
-    study: Study, poses: Poses, wanted: Sequence[Coordinate] = (), jobs: int | None = 1, curve: Curve | None = None
+    study: Study, poses: Poses, coordinates: Sequence[Coordinate] = (), jobs: int | None = 1, curve: Curve | None = None
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     """Solve each group of poses with the plan of its coordinates, at most `POSES_AT_ONCE` poses at a time.
 
     What a pose gives keeps its turns. Drives that are found lie within their limits. Where the poses are those of a
-    motion or a grid, the other angles of the wanted coordinates and of the study's limits, in expressions too, are
+    motion or a grid, the other angles of the `coordinates` and of the study's limits, in expressions too, are
     followed along it from a first value in (-180, 180] deg, a drive's from the sketch's; of listed poses each is in
     (-180, 180] deg. The result is the same for any number of threads, `jobs`. `curve` is the motion of the poses, with
     these angles, where it is there already.
@@ -120,17 +120,18 @@ def solve_poses(
         Where the coordinates of a pose do not determine the mechanism.
     """
     for group in poses.groups:
-        yield from _solve_group(study, poses, group, wanted, jobs, curve)
+        yield from _solve_group(study, poses, group, coordinates, jobs, curve)
 
 
 def _solve_group(
-    study: Study, poses: Poses, group: PoseGroup, wanted: Sequence[Coordinate], jobs: int | None, curve: Curve | None
+    study: Study, poses: Poses, group: PoseGroup, coordinates: Sequence[Coordinate], jobs: int | None,
+    curve: Curve | None,
 ) -> Iterator[SolvedPoses]:  # fmt: skip
     mechanism: Mechanism = study.mechanism
     plan = mechanism.plan(group.names)
     jobs = min(worker_count(jobs), _MOST_SOLVERS)
     pieces = [slice(begin, begin + POSES_AT_ONCE) for begin in range(0, len(group.rows), POSES_AT_ONCE)]
-    angles = [] if poses.listed else followed_angles(mechanism, plan, wanted)
+    angles = [] if poses.listed else followed_angles(mechanism, plan, coordinates)
     if angles and curve is None:
         curve = Curve(study, poses, angles)
 
@@ -138,9 +139,9 @@ def _solve_group(
         """Poses of some rows, not yet judged by the limits."""
         rows = group.rows[piece]
         columns = zip(plan.structure.given, group.columns(), strict=True)
-        given = [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
+        values = [np.asarray(radians(study, c, v[piece]), dtype=float) for c, v in columns]
         start = starts(mechanism, poses, rows) if plan.iterative else None
-        return plan.solve(given, dimensions(poses, rows), start=start, limits=False)
+        return plan.solve(values, dimensions(poses, rows), start=start, limits=False)
 
     turns = _Turns(study, poses, angles, curve)
     for piece, configuration in zip(pieces, map_chunks(at, pieces, jobs), strict=True):
@@ -152,11 +153,11 @@ def _solve_group(
         yield SolvedPoses(group.rows[piece], group.names, configuration)
 
 
-def followed_angles(mechanism: Mechanism, plan: Plan, wanted: Sequence[Coordinate]) -> list[Coordinate]:
+def followed_angles(mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
     """Angles whose turns only the motion gives: not those given, nor drives whose limits leave them one turn."""
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
-    angles = angles_of([*wanted, *mechanism.counting])
+    angles = angles_of([*coordinates, *mechanism.counting])
     return [angle for name, angle in angles.items() if name not in plan.counted | settled]
 
 
@@ -207,9 +208,9 @@ class _Turns:
                         block -= angle.turn * np.round(jump / angle.turn).sum()
             if angle.name in mechanism.drives:
                 lines = values.reshape(poses.designs, -1)
-                known = np.isfinite(lines)
-                begin = np.take_along_axis(lines, known.argmax(axis=1)[:, None], axis=1)[:, 0]
-                least, most = (f(np.where(known, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
+                finite = np.isfinite(lines)
+                begin = np.take_along_axis(lines, finite.argmax(axis=1)[:, None], axis=1)[:, 0]
+                least, most = (f(np.where(finite, lines, begin[:, None]), axis=1) for f in (np.min, np.max))
                 sizes = {name: place[:: lines.shape[1]] for name, place in poses.places.items()}
                 turns = np.nan_to_num(drive_turns(mechanism, angle.name, begin, least, most, sizes))
                 values += TURN * np.repeat(turns, lines.shape[1])
@@ -225,9 +226,9 @@ def starts(mechanism: Mechanism, poses: Poses, rows: Ints) -> Configuration | No
     """Where poses of other designs without a closed form start, see `begun`; shape of `rows`."""
     if not poses.places:
         return None
-    each = poses.count // poses.designs
-    designs, which = np.unique(rows // each, return_inverse=True)
-    return begun(mechanism, dimensions(poses, designs * each)).take(which.reshape(rows.shape))
+    per_design = poses.count // poses.designs
+    designs, which = np.unique(rows // per_design, return_inverse=True)
+    return begun(mechanism, dimensions(poses, designs * per_design)).take(which.reshape(rows.shape))
 
 
 def pose_columns(study: Study, poses: Poses, rows: Ints | slice = slice(None)) -> list[Column]:
@@ -357,8 +358,8 @@ def solve_rows(study: Study, poses: Poses, rows: Ints) -> Configuration:
     """
     names = next(group.names for group in poses.groups if rows[0] in group.rows)
     plan = study.mechanism.plan(names)
-    given = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
-    return plan.solve(given)
+    values = [radians(study, c, poses.values[name][rows]) for c, name in zip(plan.structure.given, names, strict=True)]
+    return plan.solve(values)
 
 
 def _rows(poses: Poses, most: int) -> Ints:

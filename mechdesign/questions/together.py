@@ -77,8 +77,10 @@ class Group:
 
     def _of(self, table: Table, k: int, end: End) -> Table:
         counts = self.uneven.get(table.name)
-        each = len(table) // len(self.ends)
-        begin, number = (k * each, each) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
+        per_design = len(table) // len(self.ends)
+        begin, number = (
+            (k * per_design, per_design) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
+        )
         columns = tuple(
             Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
         )
@@ -92,8 +94,8 @@ def _course_of(scope: Scope, design: int) -> Callable[[Asked], Course | None] | 
     if together is None:
         return None
 
-    def own(asked: Asked) -> Course | None:
-        course = together(asked)
+    def own(request: Asked) -> Course | None:
+        course = together(request)
         return None if course is None else course.of(design)
 
     return own
@@ -115,7 +117,7 @@ class Answers(Sequence[Result | Exception]):
     def __getitem__(self, k: slice) -> list[Result | Exception]: ...
     def __getitem__(self, k: int | slice) -> Result | Exception | list[Result | Exception]:
         if isinstance(k, slice):
-            return [self[each] for each in range(*k.indices(len(self)))]
+            return [self[number] for number in range(*k.indices(len(self)))]
         if k not in self._places:
             raise IndexError(k)
         group, own = self._places[k]

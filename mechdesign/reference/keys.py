@@ -66,10 +66,10 @@ def entries() -> Iterator[Entry]:
         about = " Or: ".join(dict.fromkeys(model.said_of_all() for model, _ in inner))
         # Local indices have entries of their own: `mechdesign.reference.sources.indices`.
         for read in reads:
-            for word, each in (read.words or {}).items() if read.words is not INDEX_NAMES else ():
-                before = chosen[read.what, word].where if (read.what, word) in chosen else ()
-                text = getattr(each, "detail", "") or meaning(each)
-                chosen[read.what, word] = Entry(word, read.what, text, where=(*before, key.path.replace(".*", "")))
+            for word, declared in (read.words or {}).items() if read.words is not INDEX_NAMES else ():
+                before = chosen[read.title, word].where if (read.title, word) in chosen else ()
+                text = getattr(declared, "detail", "") or meaning(declared)
+                chosen[read.title, word] = Entry(word, read.title, text, where=(*before, key.path.replace(".*", "")))
         yield Entry(
             word=key.path,
             kind=KIND,
@@ -86,7 +86,7 @@ def entries() -> Iterator[Entry]:
 
 def _words(reads: Iterable[Read]) -> list[tuple[str, str, str]]:
     """The choices of values: what they are, the word and its meaning."""
-    return [(read.what, word, meaning(each)) for read in reads for word, each in (read.words or {}).items()]
+    return [(read.title, word, meaning(declared)) for read in reads for word, declared in (read.words or {}).items()]
 
 
 def _within(models: Iterable[tuple[type[Model], str]]) -> Iterator[tuple[str, str, str]]:
@@ -118,10 +118,10 @@ def _default(field: FieldInfo) -> str:
 
 def place(path: str) -> str:
     """The key of the format at a path of a study, without ``*``; else the nearest key above it."""
-    known = {key.path: key.path.replace(".*", "") for key in keys()}
+    patterns = {key.path: key.path.replace(".*", "") for key in keys()}
     while path:
-        for each, plain in known.items():
-            if fnmatchcase(path, each):
+        for pattern, plain in patterns.items():
+            if fnmatchcase(path, pattern):
                 return plain
         path = path.rpartition(".")[0]
     return ""

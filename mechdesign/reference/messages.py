@@ -63,39 +63,41 @@ class Message(NamedTuple):
 @cache
 def messages() -> tuple[Message, ...]:
     """Every message of the package, page by page, in the order of the source."""
-    found: dict[tuple[str, str], Message] = {}
+    by_text: dict[tuple[str, str], Message] = {}
     for page, tree in _modules(files("mechdesign")):
         for message in _read(page, tree):
-            known = found.get((page, message.text))
-            if known is None or known.code == PART:
-                found[page, message.text] = message
-    return tuple(sorted(found.values(), key=lambda each: (not each.page.startswith("reference/"), each.page)))
+            earlier = by_text.get((page, message.text))
+            if earlier is None or earlier.code == PART:
+                by_text[page, message.text] = message
+    return tuple(
+        sorted(by_text.values(), key=lambda message: (not message.page.startswith("reference/"), message.page))
+    )
 
 
 def find_messages(words: str) -> list[Entry]:
     """Entries of messages that contain these words or are these words, and of reasons why a pose fails."""
-    found = [
+    matches = [
         Entry(message.text, KIND, f"{message.meaning}; see the page {message.page} of the documentation")
         for message in messages() if message.holds(words)
     ]  # fmt: skip
     reasons = [
         Entry(reason, KIND, f"why a pose fails: {cure}")
-        for reason, cure in REASONS.items() if words == reason or (reason in words and not found)
+        for reason, cure in REASONS.items() if words == reason or (reason in words and not matches)
     ]  # fmt: skip
-    return [*reasons, *found]
+    return [*reasons, *matches]
 
 
 def _modules(folder: Traversable, page: str = "") -> Iterator[tuple[str, ast.Module]]:
     """Every module below a folder, with its page."""
     inside = sorted(folder.iterdir(), key=lambda item: item.name)
-    trees = {each.name: ast.parse(each.read_text(encoding="utf-8")) for each in inside if each.name.endswith(".py")}
+    trees = {child.name: ast.parse(child.read_text(encoding="utf-8")) for child in inside if child.name.endswith(".py")}
     if "__init__.py" in trees:
         page = _help_page(trees["__init__.py"]) or page
     for tree in trees.values():
         yield _help_page(tree) or page, tree
-    for each in inside:
-        if each.is_dir():
-            yield from _modules(each, page)
+    for child in inside:
+        if child.is_dir():
+            yield from _modules(child, page)
 
 
 def _help_page(tree: ast.Module) -> str:
@@ -115,7 +117,7 @@ def _read(page: str, tree: ast.Module) -> Iterator[Message]:
                 if isinstance(call, ast.Call):
                     code, kind, arguments = _made(call)
                     for argument in arguments:
-                        inside = {_name(each) for each in ast.walk(argument)}
+                        inside = {_name(part) for part in ast.walk(argument)}
                         for value in (argument, *(value for name in inside for value in names.get(name, ()))):
                             yield from _sentences(value, page, code, kind)
             for statement in node.body if page else ():
@@ -145,7 +147,7 @@ def _name(node: ast.AST) -> str:
 
 def _given(nodes: Iterable[ast.AST]) -> Mapping[str, list[ast.expr]]:
     """What names are given among some statements."""
-    found: dict[str, list[ast.expr]] = {}
+    values: dict[str, list[ast.expr]] = {}
     for node in nodes:
         pairs: list[tuple[ast.expr, ast.expr]] = []
         if isinstance(node, ast.Assign):
@@ -157,9 +159,9 @@ def _given(nodes: Iterable[ast.AST]) -> Mapping[str, list[ast.expr]]:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "append":
             pairs = [(node.func.value, node.args[0])]
         for target, value in pairs:
-            for each in target.elts if isinstance(target, ast.Tuple) else [target]:
-                found.setdefault(_name(each), []).append(value)
-    return found
+            for name_node in target.elts if isinstance(target, ast.Tuple) else [target]:
+                values.setdefault(_name(name_node), []).append(value)
+    return values
 
 
 def _sentences(node: ast.AST, page: str, code: int | None, kind: str = "") -> Iterator[Message]:
@@ -176,5 +178,5 @@ def _sentences(node: ast.AST, page: str, code: int | None, kind: str = "") -> It
         inner = [part.value for part in node.values if isinstance(part, ast.FormattedValue)]
     if _SENTENCE.search(text.replace(PLACE, "")):
         yield Message(" ".join(text.split()).strip(" ;,:"), page, code, kind)
-    for each in inner:
-        yield from _sentences(each, page, code, kind)
+    for child in inner:
+        yield from _sentences(child, page, code, kind)

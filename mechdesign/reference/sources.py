@@ -65,7 +65,7 @@ def units() -> Iterator[Entry]:
     for name, (meaning, others) in listed().items():
         kind = "prefix of units" if name.endswith("-") else "unit"
         for written in (name, *others):
-            also = [each for each in (name, *others) if each != written]
+            also = [spelling for spelling in (name, *others) if spelling != written]
             text = f"{meaning.strip('[]')}; also written {', '.join(also)}" if also else meaning
             yield Entry(written, kind, text, where=("units",) if meaning.startswith("[") else ())
 

@@ -69,17 +69,17 @@ class Field:
         are smooth and have a sign outside the region as well.
         """
         held = [places.get(f"{HELD}{k}", value) for k, value in enumerate(self.held)]
-        given: list[Value] = [z.real, z.imag, *held]
+        coordinates: list[Value] = [z.real, z.imag, *held]
         if self.plan.iterative:
             return self._poses(z, places)[0]
         drawn_angles = self._drawn(places)
         vectors = self.mechanism.geometry.vectors(places)
-        state = self.plan.run(given, vectors, None)
+        state = self.plan.run(coordinates, vectors, None)
         graph = self.mechanism.graph
         return Configuration(
             graph, vectors, z.shape, state.nodes, state.rotations[: graph.classes], state.slides, state.closures,
             np.zeros((), dtype=np.int8), places,
-            self.plan.near_sketch(given, places) | drawn_angles,
+            self.plan.near_sketch(coordinates, places) | drawn_angles,
         )  # fmt: skip
 
     def _drawn(self, places: Places) -> dict[str, Value]:

@@ -197,13 +197,13 @@ def compose(
     result: Result,
     verdicts: Sequence[Verdict],
     files: Mapping[str, str],
-    asked: Extras,
+    output: Extras,
 ) -> bytes:
     """The manifest of a result in a folder, whose files have these SHA-256."""
     content = (
         computed_from(study, result.command)
         | _way_to_inputs(study, directory)
-        | asdict(asked)
+        | asdict(output)
         | {
             "counts": plain(dict(result.counts)),
             "warnings": [warning.as_data() for warning in (*study.cautions, *result.warnings)],
@@ -253,7 +253,7 @@ def own(directory: Path) -> set[str]:
     return unsettled(directory).union(listed, [NAME] if listed else [])
 
 
-def check_folder(directory: Path, study: Study, command: str, asked: Extras, before: Study | None = None) -> None:
+def check_folder(directory: Path, study: Study, command: str, output: Extras, before: Study | None = None) -> None:
     """Check before a long computation that its results can be written into a folder; creates nothing.
 
     Raises
@@ -264,29 +264,29 @@ def check_folder(directory: Path, study: Study, command: str, asked: Extras, bef
         If the folder takes no files.
     """
     check_writable(directory)
-    ours, suffixes = own(directory), tuple(f".{kind}" for kind in asked.formats.split(","))
+    ours, suffixes = own(directory), tuple(f".{kind}" for kind in output.formats.split(","))
     # Pictures are named only where one of them may replace a file of others: that imports Matplotlib.
-    others = asked.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
-    written = [NAME, *names(command, asked.formats if others else "", animate=asked.animate)]
+    others = output.plots and any(name.endswith(suffixes) for name in file_names(directory) if name not in ours)
+    written = [NAME, *names(command, output.formats if others else "", animate=output.animate)]
     studies = [study] if before is None else [study, before]
-    read = [file for each in studies for _, file, _ in each.inputs()]
-    read += [each.path for each in studies if each.path is not None]
-    check_own(directory, [*written, pages.SECTION] if asked.report else written, ours, read)
+    read = [file for read_study in studies for _, file, _ in read_study.inputs()]
+    read += [read_study.path for read_study in studies if read_study.path is not None]
+    check_own(directory, [*written, pages.SECTION] if output.report else written, ours, read)
 
 
-def is_current(directory: Path, study: Study, command: str, asked: Extras) -> dict[str, Any] | None:
+def is_current(directory: Path, study: Study, command: str, output: Extras) -> dict[str, Any] | None:
     """The manifest of a folder that completely holds what this study would give, or more pictures; else None."""
     try:
         content = whole(directory)
     except StudyError:
         return None
-    expected = computed_from(study, command) | asdict(asked)
+    expected = computed_from(study, command) | asdict(output)
     without = [name for name in ("plots", "animate", "report") if not expected[name]]
-    for name in (*without, *(("formats", "style") if not asked.plots else ())):
+    for name in (*without, *(("formats", "style") if not output.plots else ())):
         expected[name] = content.get(name)
     if "interrupted" in content or any(content.get(key) != value for key, value in expected.items()):
         return None
-    return content if all(digest(directory / name) == known for name, known in content["files"].items()) else None
+    return content if all(digest(directory / name) == sha256 for name, sha256 in content["files"].items()) else None
 
 
 def digest(path: Path) -> str:

@@ -245,7 +245,9 @@ def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
 
 
 def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Bounds:
-    low, high = (None if each is None else chosen.bound(each) for each in (requirement.at_least, requirement.at_most))
+    low, high = (
+        None if limit is None else chosen.bound(limit) for limit in (requirement.at_least, requirement.at_most)
+    )
     return low, high
 
 
@@ -261,7 +263,7 @@ def _over_motion(verdict: Verdict, chosen: Chosen, requirement: Requirement) -> 
     course = chosen.course
     for sign in signs if course is not None else ():
         assert course is not None
-        value, place = (float(each[0]) for each in course.worst(sign, absolute=requirement.abs))
+        value, place = (float(end[0]) for end in course.worst(sign, absolute=requirement.abs))
         if np.isfinite(place):
             between = _verdict(requirement, bounds, value, course.shown(place), verdict.unit)
             verdict = between if not between.margin >= verdict.margin else verdict
@@ -317,9 +319,9 @@ def _margin(bounds: Bounds, value: float) -> float:
 def in_words(requirement: Requirement) -> str:
     """A requirement in words: the result, the rows that count, the bounds."""
     value = f"|{requirement.result}|" if requirement.abs else requirement.result
-    where = ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items())
-    given = (("at least", requirement.at_least), ("at most", requirement.at_most))
-    bounds = [f"{words} {written(bound)}" for words, bound in given if bound is not None]
+    where = ", ".join(f"{column} {cell}" for column, cell in requirement.where.items())
+    limits = (("at least", requirement.at_least), ("at most", requirement.at_most))
+    bounds = [f"{words} {written(bound)}" for words, bound in limits if bound is not None]
     return f"{value}{f' ({where})' if where else ''} {' and '.join(bounds)}"
 
 

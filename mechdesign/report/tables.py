@@ -93,7 +93,9 @@ def from_csv(text: str, name: str, columns: Sequence[Mapping[str, Any]], meaning
     _, *rows = csv.reader(io.StringIO(text))
     texts = zip(*rows, strict=True) if rows else [()] * len(columns)
     return Table(
-        name, tuple(Column(**each, values=_values(cells)) for each, cells in zip(columns, texts, strict=True)), meaning
+        name,
+        tuple(Column(**column, values=_values(cells)) for column, cells in zip(columns, texts, strict=True)),
+        meaning,
     )
 
 

@@ -42,7 +42,7 @@ def write(
     study: Study,
     result: Result,
     verdicts: Sequence[Verdict],
-    asked: Extras,
+    output: Extras,
     jobs: int | None = None,
     progress: Progress = NULL,
     before: Before | None = None,
@@ -63,29 +63,29 @@ def write(
         f"{table.name}.csv": _encoded(table, progress) for table in result.tables.values()
     }
     files |= {name: (text.encode(),) for name, text in result.files.items()}
-    own, more = manifest.own(directory), (asked.plots or asked.report) and not result.interrupted
+    own, more = manifest.own(directory), (output.plots or output.report) and not result.interrupted
     pages.remove(directory / pages.REPORT)
     pages.remove(directory / pages.PRINTED)
     warnings: tuple[Caution, ...] = ()
     try:
         directory.mkdir(parents=True, exist_ok=True)
         _check_room(directory, result)
-        tables = dataclasses.replace(asked, plots=False, animate=False, report=False)
+        tables = dataclasses.replace(output, plots=False, animate=False, report=False)
         begun = dataclasses.replace(result, warnings=(*result.warnings, _UNDRAWN)) if more else result
         with Transaction(directory) as written:
             digests = {name: written.stage(name, blocks) for name, blocks in files.items()}
             written.stage(manifest.NAME, [manifest.compose(directory, study, begun, verdicts, digests, tables)])
             written.commit(own, voucher=manifest.NAME)
         drawn: dict[str, bytes] = {}
-        plots = asked.plots and not result.interrupted
+        plots = output.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, asked, jobs, before)
-        if asked.report:
+            drawn, warnings = pictures(study, result, output, jobs, before)
+        if output.report:
             from mechdesign.report.page import section
 
             inline = {name: drawn.pop(f"{name}{INLINE}").decode() for name in _inline(drawn)}
             mechanism = inline.pop(MECHANISM, "")
-            part, warnings = section.section(study, result, inline, mechanism, warnings, before, plots=asked.plots)
+            part, warnings = section.section(study, result, inline, mechanism, warnings, before, plots=output.plots)
             drawn[pages.SECTION] = section.encoded(part)
         if drawn or more:
             final = dataclasses.replace(result, warnings=(*result.warnings, *warnings))
@@ -93,7 +93,7 @@ def write(
             own = {*digests, manifest.NAME}
             with Transaction(directory) as written:
                 digests |= {name: written.stage(name, [data]) for name, data in drawn.items()}
-                written.stage(manifest.NAME, [manifest.compose(directory, study, final, verdicts, digests, asked)])
+                written.stage(manifest.NAME, [manifest.compose(directory, study, final, verdicts, digests, output)])
                 written.commit(own, own, voucher=manifest.NAME)
     except OSError as error:
         raise OutputError(f"{directory}: results could not be written: {error.strerror or error}") from error
@@ -145,7 +145,7 @@ def write_file(path: Path, data: bytes, mark: bytes = b"") -> None:
         raise OutputError(f"{path}: could not be written: {error.strerror or error}") from error
 
 
-def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
+def write_sketch(directory: Path, study: Study, output: Extras) -> str:
     """Draw the sketch as it is understood into a directory, as ``mechanism`` and ``dimensions``; says what is there.
 
     Raises
@@ -158,16 +158,16 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
     from mechdesign.report.figures.dimensions import dimensions_figure
     from mechdesign.report.figures.mechanism import sketch_figure
 
-    kinds, messages = asked.formats.split(","), []
+    kinds, messages = output.formats.split(","), []
     for name in (MECHANISM, DIMENSIONS):
         for kind in kinds:
             check_marked(directory / f"{name}.{kind}", CREATOR.encode())
     drawings = ((MECHANISM, "the sketch as understood is", sketch_figure),
                 (DIMENSIONS, "its dimensions are", dimensions_figure))  # fmt: skip
-    for name, what, make in drawings:
+    for name, sentence, make in drawings:
         paths = [directory / f"{name}.{kind}" for kind in kinds]
         try:
-            with style.context(asked.style):
+            with style.context(output.style):
                 figure = make(study)
                 drawn = {path: style.encoded(figure, path.suffix[1:], CREATOR) for path in paths}
         except Exception as error:
@@ -175,7 +175,7 @@ def write_sketch(directory: Path, study: Study, asked: Extras) -> str:
             continue
         for path, data in drawn.items():
             write_file(path, data, CREATOR.encode())
-        messages.append(f"{what} in {', '.join(map(str, paths))}")
+        messages.append(f"{sentence} in {', '.join(map(str, paths))}")
     return "; ".join(messages)
 
 
@@ -189,7 +189,7 @@ def sketch(study: Study) -> bytes:
 
 
 def pictures(
-    study: Study, result: Result, asked: Extras, jobs: int | None = None, before: Before | None = None
+    study: Study, result: Result, output: Extras, jobs: int | None = None, before: Before | None = None
 ) -> tuple[dict[str, bytes], tuple[Caution, ...]]:
     """Pictures of a result by their file names (of its command, the mechanism, the motion as a GIF), and warnings.
 
@@ -201,15 +201,15 @@ def pictures(
     from mechdesign.report.figures.rendering import Drawing, render
     from mechdesign.report.page import vector
 
-    formats = asked.formats.split(",")
+    formats = output.formats.split(",")
     result = result.seen
-    with style.context(asked.style):
+    with style.context(output.style):
         gallery = figures(study, result, before)
 
         def files(name: str, make: Callable[[], Figure]) -> dict[str, bytes]:
             figure = make()
             drawn = {f"{name}.{kind}": style.encoded(figure, kind) for kind in formats}
-            if asked.report:
+            if output.report:
                 alt = f"{name.replace('_', ' ')}: {vector.described(figure)}"
                 html = vector.picture(figure, f"{result.command}-{name}", alt, drawn.get(f"{name}.png"))
                 drawn[f"{name}{INLINE}"] = html.encode()
@@ -219,7 +219,7 @@ def pictures(
             f"{name}.{formats[0]}": partial(files, name, partial(gallery.__getitem__, name)) for name in gallery
         }
         drawings[f"{MECHANISM}.{formats[0]}"] = partial(files, MECHANISM, partial(mechanism_figure, study, result))
-        if asked.animate:
+        if output.animate:
             from mechdesign.questions.kinematics.drawn import DrawnMotion
             from mechdesign.questions.kinematics.figures.animation import animation
 

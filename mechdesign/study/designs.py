@@ -193,8 +193,8 @@ def variant(study: Study, changed: Mapping[str, float]) -> Study:
     StudyError
         If a name is neither a parameter nor a place, or the values make no study.
     """
-    known = study.parameters.known()
-    unknown = [name for name in changed if name not in known]
+    names = study.parameters.names()
+    unknown = [name for name in changed if name not in names]
     if unknown:
         file = str(study.path or "")
         raise StudyError([Problem("is neither a parameter nor a dimension", name, file) for name in unknown])
@@ -205,6 +205,6 @@ def _retabled(target: Target, number: Callable[[Amount], Amount]) -> Target:
     """A target whose table has other numbers where they follow parameters."""
     if not target.rows:
         return target
-    rows = [[number(each) if isinstance(each, Amount) and each.expression else each for each in row]
+    rows = [[number(cell) if isinstance(cell, Amount) and cell.expression else cell for cell in row]
             for row in target.rows]  # fmt: skip
     return replace(target, rows=rows, table=np.array(rows, dtype=float))

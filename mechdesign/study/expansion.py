@@ -116,9 +116,9 @@ def expand(section: PoseSection, folder: Folder, numbers: Numbers = OWN) -> Pose
 
 def of_designs(poses: Poses, numbers: Numbers) -> Poses:
     """The poses of some designs with the dimensions and parameters in which these differ."""
-    each = poses.count // numbers.count
+    per_design = poses.count // numbers.count
     places, parameters = (
-        {name: np.repeat(values, each) for name, values in part.items()}
+        {name: np.repeat(values, per_design) for name, values in part.items()}
         for part in (numbers.places, numbers.parameters)
     )
     return replace(
@@ -161,12 +161,12 @@ def _path(path: Mapping[str, PathSection], folder: Folder, numbers: Numbers) -> 
         raise StudyError("an empty path; give its points, [[x, y], ...]")
     columns: dict[str, Floats] = {}
     points: dict[str, PointPath] = {}
-    for name, given in path.items():
-        course = point_paths.course(name, given, folder, numbers.of)
+    for name, section in path.items():
+        course = point_paths.course(name, section, folder, numbers.of)
         if isinstance(course, PointPath):
             points[name] = course
-            each = np.repeat(np.arange(numbers.count), course.count)
-            places = course.at(each, np.tile(np.arange(course.count, dtype=float), numbers.count))
+            design = np.repeat(np.arange(numbers.count), course.count)
+            places = course.at(design, np.tile(np.arange(course.count, dtype=float), numbers.count))
             places = places.reshape(numbers.count, -1)
             columns[f"{name}.x"], columns[f"{name}.y"] = places.real, places.imag
         else:

@@ -280,7 +280,7 @@ def _load_changed(
 
 def same_sketch(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Whether the data of two studies have the same sketch, in the same units."""
-    mechanisms = [each["mechanism"] if isinstance(each.get("mechanism"), dict) else {} for each in (one, other)]
+    mechanisms = [data["mechanism"] if isinstance(data.get("mechanism"), dict) else {} for data in (one, other)]
     return one.get("units") == other.get("units") and mechanisms[0].get("sketch") == mechanisms[1].get("sketch")
 
 
@@ -293,23 +293,23 @@ def _texts(overrides: Sequence[str] | Mapping[str, Any]) -> tuple[str, ...]:
     return (overrides,) if isinstance(overrides, str) else tuple(overrides)
 
 
-def _plain_data(value: Any, what: str) -> Any:
+def _plain_data(value: Any, name: str) -> Any:
     """Data of mappings, lists, texts and numbers only."""
 
-    def plainly(each: Any) -> Any:
-        if isinstance(each, Mapping):
-            return dict(each)
-        if hasattr(each, "tolist"):
-            return each.tolist()
-        if isinstance(each, os.PathLike):
-            return os.fspath(each)
-        raise TypeError(f"it holds {type(each).__name__!r}")
+    def plainly(item: Any) -> Any:
+        if isinstance(item, Mapping):
+            return dict(item)
+        if hasattr(item, "tolist"):
+            return item.tolist()
+        if isinstance(item, os.PathLike):
+            return os.fspath(item)
+        raise TypeError(f"it holds {type(item).__name__!r}")
 
     try:
         return json.loads(json.dumps(value, default=plainly))
     except (TypeError, ValueError, RecursionError) as error:
         raise StudyError(
-            f"{what} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
+            f"{name} is not plain data (mappings, lists, texts, numbers; an array becomes a list by .tolist()): {error}"
         ) from None
 
 
@@ -453,20 +453,20 @@ def _checked(checker: Checker) -> dict[str, Any]:
     """Check the validated sections and the targets; returns them with wildcards and defaults filled in."""
     if "optimize" in checker.parts:
         checker.parts["optimize"] = check_variables(checker.parts["optimize"], checker)
-    found = dict(checker.parts)
+    sections = dict(checker.parts)
     for name in checker.parameters.kinds:
         for kind in checker.parameters.needed(name, checker.places):
             checker.kind(("mechanism", "parameters", name), kind)
-    found |= {command: found[command].checked(checker) for command in COMMANDS if command in found}
-    for index, requirement in enumerate(found["requirements"]):
+    sections |= {command: sections[command].checked(checker) for command in COMMANDS if command in sections}
+    for index, requirement in enumerate(sections["requirements"]):
         check_result(checker, requirement.result, ("requirements", index, "result"), required=True)
-    if "matrix" in found:
-        found["matrix"].checked(checker)
-        check_varied(found["matrix"], checker)
-    if "sensitivities" in found:
-        found["sensitivities"].checked(checker)
-    found["targets"] = targets.check(checker, checker.mechanism.targets)
-    return found
+    if "matrix" in sections:
+        sections["matrix"].checked(checker)
+        check_varied(sections["matrix"], checker)
+    if "sensitivities" in sections:
+        sections["sensitivities"].checked(checker)
+    sections["targets"] = targets.check(checker, checker.mechanism.targets)
+    return sections
 
 
 def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Reporter, folder: Folder) -> None:
@@ -475,20 +475,20 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
     """
     for command in COMMANDS:
         section = parts.get(command)
-        found: Poses | None = None
+        poses: Poses | None = None
         if isinstance(section, PoseSection) and (key := section.source) is not None:
             try:
-                found = expansion.expand(section, folder)
+                poses = expansion.expand(section, folder)
             except StudyError as error:
                 reporter.report((command, key), str(error))
                 continue
-            for group in found.groups if found is not None else ():
+            for group in poses.groups if poses is not None else ():
                 try:
                     mechanism.plan(group.names)
                 except MechanismError as error:
                     place: KeyPath = (command, key, int(group.rows[0])) if key == "poses" else (command, key)
                     reporter.report(place, str(error))
-            if found is not None and not found.slopes and getattr(section, "speed", None) is not None:
+            if poses is not None and not poses.slopes and getattr(section, "speed", None) is not None:
                 reporter.report(
                     (command, "speed"),
                     "the path's point does not move: it has no direction; give two different places",
@@ -496,7 +496,7 @@ def _check_poses(parts: Mapping[str, Any], mechanism: Mechanism, reporter: Repor
                 )
         if command == "kinematics" and parts["targets"]:
             try:
-                assumed = found or expansion.default(mechanism.description)
+                assumed = poses or expansion.default(mechanism.description)
             except StudyError:
                 continue
             targets.check_poses(parts["targets"], mechanism, assumed, reporter)

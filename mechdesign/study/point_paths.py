@@ -72,7 +72,7 @@ class PointPath(ABC):
     def lengths(self, designs: int) -> Floats:
         """Length of the path between the poses and up to where it closes, shape (designs, rows)."""
         rows = np.arange(self.count + self.closed, dtype=float)
-        line, s = (each.ravel() for each in np.meshgrid(np.arange(designs), rows, indexing="ij"))
+        line, s = (grid.ravel() for grid in np.meshgrid(np.arange(designs), rows, indexing="ij"))
         return np.diff(self.way(line, s).reshape(designs, -1), axis=1)
 
 
@@ -127,9 +127,9 @@ class Polyline(PointPath):
 
     def course(self, line: Ints, s: Floats) -> tuple[Complexes, Complexes, Floats]:
         row = np.clip(np.floor(s), 0, self.count - 1).astype(np.intp)
-        each = np.arange(len(s))
-        units, lengths = _of(self._units, line)[each, row], _of(self._lengths, line)
-        return units, np.zeros(len(s), dtype=complex), lengths[each, np.minimum(row, self.count - 2)]
+        lane = np.arange(len(s))
+        units, lengths = _of(self._units, line)[lane, row], _of(self._lengths, line)
+        return units, np.zeros(len(s), dtype=complex), lengths[lane, np.minimum(row, self.count - 2)]
 
     def way(self, line: Ints, s: Floats) -> Floats:
         ways = np.concatenate([np.zeros((len(self._lengths), 1)), np.cumsum(self._lengths, axis=1)], axis=1)

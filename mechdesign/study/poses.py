@@ -200,8 +200,8 @@ class Poses:
     @property
     def moving(self) -> list[str]:
         """Coordinates that change from pose to pose of a design."""
-        each = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
-        return [name for name, values in each.items() if (np.ptp(values, axis=1) > 0).any()]
+        columns = {name: values.reshape(self.designs, -1) for name, values in self.values.items()}
+        return [name for name, values in columns.items() if (np.ptp(values, axis=1) > 0).any()]
 
     def pace(self, line: Ints, s: Floats) -> Floats:
         """How fast a motion passes places, shape (n,): change of time, of a path's length or of what is swept, a row.
@@ -227,9 +227,9 @@ class Poses:
 
     def some(self, designs: Ints) -> Poses:
         """The poses of some designs."""
-        each = self.count // self.designs
-        rows = (each * designs[:, None] + np.arange(each)).ravel()
-        first = each * np.arange(len(designs))[:, None]
+        per_design = self.count // self.designs
+        rows = (per_design * designs[:, None] + np.arange(per_design)).ravel()
+        first = per_design * np.arange(len(designs))[:, None]
         groups = []
         for group in self.groups:
             values = {name: v.reshape(self.designs, -1)[designs].ravel() for name, v in group.values.items()}

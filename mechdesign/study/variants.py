@@ -104,11 +104,11 @@ def _drawing(study: Study) -> set[str]:
         joint = joints.get(place.rpartition(".")[0])
         owners.update(joint.links if isinstance(joint, Fixed) else (place.partition(".")[0],))
     points = {point for name in owners for point in (*links[name].points, *(links[name].ends or ()))}
-    found = {f"{name}.length" for name in owners if len(links[name].points) > 2}
+    lengths = {f"{name}.length" for name in owners if len(links[name].points) > 2}
     # The numbers of the ground place its points in the sketch.
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
-    return found | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
+    return lengths | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
 
 
 def _mentions(data: Any, names: Collection[str]) -> bool:
@@ -159,9 +159,9 @@ def _points(study: Study, links: dict[str, Any], name: str) -> dict[str, list[An
     described, numbers = study.mechanism.description.links[name], study.mechanism.nominal
     raw = dict(zip(LINK_KEYS, links[name], strict=False)) if isinstance(links[name], list) else dict(links[name])
     given = raw.get("points") if any(key in raw for key in LINK_KEYS) else raw
-    known = given if isinstance(given, dict) else {}
+    written = given if isinstance(given, dict) else {}
     points = {
-        point: known.get(point) or [numbers[term] if isinstance(term, str) else term for term in terms]
+        point: written.get(point) or [numbers[term] if isinstance(term, str) else term for term in terms]
         for point, terms in described.points.items()
         if point not in (described.ends or ())
     }
@@ -199,12 +199,12 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         return None
     text, document = study.text.decode("utf-8-sig"), read(study.text, "")
     written = document.data
-    wanted = {key: value for key, value in data.items() if key in written}
+    target = {key: value for key, value in data.items() if key in written}
     # The loader fills in all units; the text may name only some.
     if "units" in written:
-        wanted["units"] = written["units"]
+        target["units"] = written["units"]
     edits = []
-    for keys, entries in _replaced(written, wanted, ()):
+    for keys, entries in _replaced(written, target, ()):
         if not entries:
             edits.append(_removal(text, document, keys))
             continue
@@ -215,16 +215,16 @@ def _edited(study: Study, data: Mapping[str, Any]) -> str | None:
         between = ", " if inside_flow else "\n" + " " * (name.column - 1)
         edits.append((name.start, value.end, between.join(_in_one_line(*entry) for entry in entries.items())))
     now = dict(leaves(written))
-    for keys, new in leaves(wanted):
+    for keys, new in leaves(target):
         if keys in now and new != now[keys]:
             edits.append((document.values[keys].start, document.values[keys].end, in_yaml(new)))
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
     if "seed" not in written and data["seed"]:
-        wanted["seed"] = data["seed"]
+        target["seed"] = data["seed"]
         text = f"seed: {data['seed']}\n{text}"
     try:
-        return text if read(text.encode(), "").data == wanted else None
+        return text if read(text.encode(), "").data == target else None
     except StudyError:
         return None
 

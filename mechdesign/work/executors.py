@@ -62,7 +62,7 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
     # A module in the working directory is found, as with `python -m`.
     sys.path.insert(0, os.getcwd())
     try:
-        found = getattr(importlib.import_module(module), factory)
+        make = getattr(importlib.import_module(module), factory)
     except (ImportError, AttributeError) as error:
         raise StudyError(f"--executor {name}: {error}") from None
     except Exception as error:
@@ -72,7 +72,7 @@ def _of_module(name: str, module: str, factory: str, jobs: int | None) -> Pool:
 
     def open_() -> Executor:
         try:
-            executor = found()
+            executor = make()
         except (Exception, SystemExit) as error:
             raise StudyError(f"--executor {name}: {type(error).__name__}: {error}") from None
         if not isinstance(executor, Executor):

@@ -32,10 +32,10 @@ _MIN_RATIO = 20.0
 
 def digest(columns: Sequence[Floats]) -> bytes:
     """The key of a batch: a digest of its designs, bit by bit."""
-    found = hashlib.blake2b(digest_size=16)
+    state = hashlib.blake2b(digest_size=16)
     for column in columns:
-        found.update(np.ascontiguousarray(column).tobytes())
-    return found.digest()
+        state.update(np.ascontiguousarray(column).tobytes())
+    return state.digest()
 
 
 class Journal:
@@ -50,7 +50,7 @@ class Journal:
         self._origin = json.dumps(origin, sort_keys=True)
         self._digests: list[bytes] = []
         self._rows: list[Floats] = []
-        self._found: list[tuple[bytes, Floats]] = []
+        self._stored: list[tuple[bytes, Floats]] = []
         self.words: list[str] = []
         self._written = time.monotonic()
         self._patience = _INTERVAL
@@ -66,17 +66,17 @@ class Journal:
         except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
             return False
         blocks = np.split(rows, np.cumsum(counts)[:-1])
-        self._found = [(key.tobytes(), block) for key, block in zip(digests, blocks, strict=True)]
-        self._found.reverse()
-        return bool(self._found)
+        self._stored = [(key.tobytes(), block) for key, block in zip(digests, blocks, strict=True)]
+        self._stored.reverse()
+        return bool(self._stored)
 
     def recall(self, key: bytes) -> Floats | None:
         """The result of the next batch if it was finished; if another batch was next, the rest of the file is void."""
-        if not self._found:
+        if not self._stored:
             return None
-        known, rows = self._found.pop()
-        if known != key:
-            self._found.clear()
+        stored, rows = self._stored.pop()
+        if stored != key:
+            self._stored.clear()
             return None
         return rows
 
@@ -99,8 +99,8 @@ class Journal:
             If it cannot be written.
         """
         begun = self._written = time.monotonic()
-        digests = [*self._digests, *(key for key, _ in reversed(self._found))]
-        rows = [*self._rows, *(block for _, block in reversed(self._found))]
+        digests = [*self._digests, *(key for key, _ in reversed(self._stored))]
+        rows = [*self._rows, *(block for _, block in reversed(self._stored))]
         if not rows:
             return
         stream = io.BytesIO()

@@ -169,10 +169,10 @@ class ChunkMap(Generic[Item, Value]):
             raise LostWorkerError(f"the executor takes no work: {type(error).__name__}: {error}") from error
 
     def _values(self, task: _Task) -> list[Value]:
-        found = self._pool.outcome(task.future)
-        if not isinstance(found, tuple) or len(found) != 2 or len(found[0]) != len(task.items):
+        outcome = self._pool.outcome(task.future)
+        if not isinstance(outcome, tuple) or len(outcome) != 2 or len(outcome[0]) != len(task.items):
             raise LostWorkerError("the executor gives something else than the values of the work that it took")
-        values, seconds = found
+        values, seconds = outcome
         if not self._pool.threads:
             self._chunks = max(1, min(int(_SECONDS * len(values) / max(seconds, 1e-9)), _GROWTH * self._chunks))
         return cast(list[Value], values)

@@ -51,10 +51,10 @@ class Shard:
         StudyError
             If it is something else.
         """
-        found = _SHARD.fullmatch(text.strip())
-        if found is None or int(found[1]) > int(found[2]):
+        match = _SHARD.fullmatch(text.strip())
+        if match is None or int(match[1]) > int(match[2]):
             raise StudyError(f"--shard takes I/N, the shard and how many there are, e.g. 1/4 to 4/4, not {text!r}")
-        return cls(int(found[1]), int(found[2]))
+        return cls(int(match[1]), int(match[2]))
 
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
@@ -151,7 +151,7 @@ def _numbered(name: str, names: Counter[str]) -> str:
     return f"{name} {names[name]}"
 
 
-def found(directory: Path) -> list[Path]:
+def files_in(directory: Path) -> list[Path]:
     """Files of the shards in a folder."""
     return sorted(directory.glob(f"shard_*_of_*/{FILE}"))
 
@@ -177,7 +177,7 @@ def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:
     """
     parts: dict[int, Mapping[str, Kept]] = {}
     counts: dict[int, Path] = {}
-    for path in found(directory):
+    for path in files_in(directory):
         head, content = _read(path)
         other = [key for key in origin.keys() | head["origin"].keys() if origin.get(key) != head["origin"].get(key)]
         if other:
@@ -194,8 +194,8 @@ def merge(directory: Path, origin: Mapping[str, Any]) -> Merged:
         raise missing(directory)
     lost = [f"{k}/{count}" for k in range(1, count + 1) if k not in parts]
     if lost:
-        each = ", ".join(lost)
-        raise StudyError(f"{directory}: shards are missing: {each}; compute them, e.g. with --shard {lost[0]}")
+        listed = ", ".join(lost)
+        raise StudyError(f"{directory}: shards are missing: {listed}; compute them, e.g. with --shard {lost[0]}")
     merged = [parts[k] for k in sorted(parts)]
     for name, kept in merged[0].items():
         sizes = [len(part[name].values) if name in part else -1 for part in merged]
@@ -211,7 +211,7 @@ def missing(directory: Path) -> StudyError:
 
 def remove(directory: Path) -> None:
     """Remove the shards in a folder, once they are merged."""
-    for path in found(directory):
+    for path in files_in(directory):
         path.unlink()
         path.parent.rmdir()
 

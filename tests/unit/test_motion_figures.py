@@ -248,7 +248,7 @@ def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
 @pytest.mark.slow
 def test_a_limit_of_motion_is_a_special_pose_without_rates():
     poses = mechdesign.kinematics(study_of(ROCKER)).drawn.special
-    limits = [each for each in poses.shown if each.what.startswith("limit of motion: dead centre")]
+    limits = [each for each in poses.shown if each.event.startswith("limit of motion: dead centre")]
     assert len(limits) == 2
     for each in limits:
         rod, rocker = (each.configuration.rotation(link)[each.index] for link in ("rod", "rocker"))
@@ -268,7 +268,7 @@ kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10
 """
     study = study_of(arm)
     poses = mechdesign.kinematics(study).drawn.special
-    singular = [each for each in poses.shown if each.what == "singular: det_J is 0"]
+    singular = [each for each in poses.shown if each.event == "singular: det_J is 0"]
     assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
     assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
 
@@ -279,7 +279,7 @@ def test_special_poses_of_one_configuration_are_shown_once():
         "  drives:", "  joints: {guide: {prismatic: [ground, rocker]}}\n  drives:"
     )
     poses = mechdesign.kinematics(study_of(slider.replace("B: [75, 55]", "B: [85, 0]"))).drawn.special
-    assert [each.place for each in poses.shown if each.what] == pytest.approx([0, 180])
+    assert [each.place for each in poses.shown if each.event] == pytest.approx([0, 180])
 
 
 @pytest.mark.nightly

@@ -148,7 +148,7 @@ def test_an_interrupt_keeps_the_poses_that_are_finished(method: str) -> None:
     class Impatient:
         reports = 0
 
-        def start(self, total: int, what: str) -> None:
+        def start(self, total: int, stage: str) -> None:
             pass
 
         def update(self, n: int) -> None:

@@ -122,10 +122,10 @@ class Values(fields.Model):
 
 
 def _named(raw: Any, context: Context) -> str:
-    found = read_result(raw, context)
-    if isinstance(found, Expression):
+    result = read_result(raw, context)
+    if isinstance(result, Expression):
         raise failure(f"{shown(raw)} is of parameters alone; name the result of a command, as in kinematics.mu.min")
-    return found
+    return result
 
 
 class Named(Chosen):
@@ -247,14 +247,14 @@ class MatrixSection(fields.Model):
     def _row(self, number: int, names: Sequence[str], row: Sequence[str]) -> tuple[Any, ...]:
         if len(row) != len(names):
             raise StudyError(f"{self.cases}:{number}: {len(row)} values for {len(names)} names")
-        found: list[Any] = []
+        values: list[Any] = []
         for name, cell in zip(names, row, strict=True):
             if decimal := _DECIMAL.fullmatch(cell):
-                found.append(plainly(float(cell)) if decimal[1] else int(cell))
+                values.append(plainly(float(cell)) if decimal[1] else int(cell))
                 continue
             try:
                 value = read(cell.encode(), "").data
-                found.append(plainly(read_number(value, Context())) if isinstance(value, float) else value)
+                values.append(plainly(read_number(value, Context())) if isinstance(value, float) else value)
             except (StudyError, PydanticCustomError):
                 raise StudyError(f"{self.cases}:{number}: {name}: expected a value, not {shown(cell)}") from None
-        return tuple(found)
+        return tuple(values)

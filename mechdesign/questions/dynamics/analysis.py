@@ -18,7 +18,7 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import force_question
-from mechdesign.questions.dynamics.tables import asked_of, dynamics_table, extremes_table, joint_table
+from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import follow
 from mechdesign.questions.kinematics.motion import Motion
@@ -68,38 +68,38 @@ def answers(study: Study, poses: Poses) -> Answers:
 
 def _marks(motion: Motion) -> Mapping[str, Flags]:
     """Poses of which something is to be said: where the drives hold the mechanism no longer, or a load is nan."""
-    (effort, *_) = (static.name for static in asked_of(motion).statics)
+    (effort, *_) = (static.name for static in question_of(motion).statics)
     unknown = ~np.isfinite(sum(motion.arrays[name] for name in (effort, "shaking", "shaking_moment")))
     regular = motion.arrays["conditioning"] >= STALLED
     return {"singular": motion.valid & unknown & ~regular, "undefined": motion.valid & unknown & regular}
 
 
 def tables(
-    motion: Motion, question: MotionQuestion, wanted: Collection[str], outputs: Collection[str] | None = None,
-    asked: Collection[Asked] = (),
+    motion: Motion, question: MotionQuestion, chosen: Collection[str], outputs: Collection[str] | None = None,
+    requests: Collection[Asked] = (),
 ) -> tuple[dict[str, Table], Along | None]:  # fmt: skip
     """Some tables of a motion, and the motion between its poses, which is that of the question.
 
-    Of the extremes those of some `outputs`, or all; columns that are `asked` are followed besides.
+    Of the extremes those of some `outputs`, or all; the columns of `requests` are followed besides.
     """
-    names = [static.name for static in asked_of(motion).statics if outputs is None or static.name in outputs]
-    integrals = [Asked(name, integral=True) for name in names] if "extremes" in wanted else []
-    along = along_of(question, names, asked=[*asked, *integrals])
-    found = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in wanted}
-    if "extremes" in wanted:
-        found["extremes"] = extremes_table(motion, along, names)
-    return found, along
+    names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
+    integrals = [Asked(name, integral=True) for name in names] if "extremes" in chosen else []
+    along = along_of(question, names, requests=[*requests, *integrals])
+    parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
+    if "extremes" in chosen:
+        parts["extremes"] = extremes_table(motion, along, names)
+    return parts, along
 
 
 def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
-    found, along = tables(passage.motion, question, TABLES)
+    answers, along = tables(passage.motion, question, TABLES)
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
     a_pose = replace(whole, course=cache(partial(follow, question)))
-    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in found.items()}
+    scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends
@@ -129,7 +129,7 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
-    if chains := ", ".join(sorted(asked_of(passage.motion).joints.open)):
+    if chains := ", ".join(sorted(question_of(passage.motion).joints.open)):
         message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)

@@ -12,7 +12,7 @@ from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.statics import PIN, Contact
-from mechdesign.questions.dynamics.tables import asked_of
+from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.rates import drive_rates
 from mechdesign.questions.loads import Loading
@@ -58,12 +58,12 @@ class _Pose:
     """One pose with its rates."""
 
     def __init__(self, motion: Motion, shown: Shown, index: int) -> None:
-        self.motion, self.asked = motion, asked_of(motion)
-        self.study, self.poses = self.asked.study, motion.question.poses
+        self.motion, self.question = motion, question_of(motion)
+        self.study, self.poses = self.question.study, motion.question.poses
         self.rows = shown.rows[index : index + 1]
         self.configuration = shown.configuration.take(np.array([index]))
         self.moving = Moving()
-        if self.asked.moves:
+        if self.question.moves:
             linear = self.study.mechanism.linearize(self.configuration)
             solved = SolvedPoses(self.rows, self.poses.groups[0].names, self.configuration)
             rates = drive_rates(self.study, motion.question.section, self.poses, solved, linear)
@@ -82,7 +82,7 @@ class _Pose:
         return _pick(self.configuration, self.configuration.nodes[node])
 
     def _joints(self) -> Iterator[Action]:
-        for name, contact in zip(self.asked.forces, self.asked.joints.contacts, strict=True):
+        for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self._value(f"{name}.{part}") for part in ("fx", "fy", "moment"))
             place, sides = self._place(contact.node), _sides(contact)
             if sides[0] != sides[1]:
@@ -93,7 +93,7 @@ class _Pose:
         return float(np.nan_to_num(self.motion.arrays[name][self.rows[0]]))
 
     def _masses(self) -> Iterator[Action]:
-        mechanism, section = self.study.mechanism, self.poses.section(self.asked.section, self.rows)
+        mechanism, section = self.study.mechanism, self.poses.section(self.question.section, self.rows)
         factor, still = self.study.units.inertia_factor, Moving()
         for body, mass in mechanism.description.masses.items():
             place = mass_centers(self.study, self.configuration, 0)[body]
@@ -106,7 +106,7 @@ class _Pose:
                 yield Action(kind, kind, _link(body), place, force, turning)
 
     def _loads(self) -> Iterator[Action]:
-        for load in self.asked.section.loads:
+        for load in self.question.section.loads:
             forces = Forces(self.configuration)
             Loading(self.study, [load], self.poses, self.rows).add(forces, self.moving)
             ends = (load.at,) if load.at is not None else load.between or ()
@@ -134,7 +134,7 @@ class _Pose:
             node, link = graph.node(end), end.rpartition(".")[0]
             body = link if link in forces.bodies or not link else rod_of(link)
             force = forces.bodies[body][0] if link else forces.nodes[node]
-            owner = _link(body) if link else _link(self.asked.joints.sole.get(node, ""))
+            owner = _link(body) if link else _link(self.question.joints.sole.get(node, ""))
             yield Action(kind, name, owner, self._place(node), _pick(self.configuration, force))
 
     def _efforts(self) -> Iterator[Action]:

@@ -169,9 +169,9 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     pace = section if section.moves else own
     rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
-    asked = motion_question(replace(study, kinematics=motion, targets={}), poses)
+    question = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
-        asked, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, pace.rated, asked.tempo),
+        question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
+        borne=ForceQuestion(study, section, pace.rated, question.tempo),
     )  # fmt: skip

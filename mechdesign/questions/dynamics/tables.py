@@ -22,19 +22,19 @@ from mechdesign.results import Table
 STILL = 1e-12
 
 
-def asked_of(motion: Motion) -> ForceQuestion:
-    """What was asked of the forces of a motion."""
-    asked = motion.question.borne
-    assert isinstance(asked, ForceQuestion)
-    return asked
+def question_of(motion: Motion) -> ForceQuestion:
+    """The question about the forces of a motion."""
+    question = motion.question.borne
+    assert isinstance(question, ForceQuestion)
+    return question
 
 
 def dynamics_table(motion: Motion) -> Table:
     """``dynamics.csv``: efforts, powers, shaking forces and energies of every pose."""
-    asked = asked_of(motion)
-    hidden, labels = {"shaking", *asked.forces}, motion.question.study.units.labels
+    question = question_of(motion)
+    hidden, labels = {"shaking", *question.forces}, motion.question.study.units.labels
     columns = []
-    for static in asked.statics:
+    for static in question.statics:
         if static.name not in hidden:
             values = {static.kind: motion.arrays[static.name]}
             columns += DYNAMICS.columns({**labels, **static.words, "force or moment": static.unit}, **values)
@@ -43,20 +43,21 @@ def dynamics_table(motion: Motion) -> Table:
 
 def joint_table(motion: Motion) -> Table:
     """``joint_forces.csv``: what every joint bears, a row a pose and joint."""
-    asked, contacts = asked_of(motion), asked_of(motion).joints.contacts
+    question = question_of(motion)
+    contacts = question.joints.contacts
     count, joints = len(motion.reason), len(contacts)
 
-    def each(values: NDArray[Any]) -> NDArray[Any]:
+    def per_joint(values: NDArray[Any]) -> NDArray[Any]:
         return np.repeat(values, joints)
 
-    words = {part: np.array([[motion.arrays[f"{name}.{part}"]] for name in asked.forces]) for part in PARTS}
+    words = {part: np.array([[motion.arrays[f"{name}.{part}"]] for name in question.forces]) for part in PARTS}
     table = {part: values.reshape(joints, count).T.ravel() for part, values in words.items()}
     names = {
         key: np.tile(np.array([getattr(c, key) for c in contacts], dtype=str), count) for key in ("joint", "on", "by")
     }
-    given = [replace(column, values=each(column.values)) for column in motion.pose_columns()]
+    pose_columns = [replace(column, values=per_joint(column.values)) for column in motion.pose_columns()]
     columns = JOINT_FORCES.columns(motion.question.study.units.labels, **names, **table)
-    return JOINT_FORCES.table([*given, *columns, VALID.column(each(motion.valid))])
+    return JOINT_FORCES.table([*pose_columns, *columns, VALID.column(per_joint(motion.valid))])
 
 
 @quiet
@@ -66,7 +67,7 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
     Along a motion they are those of all of it, between its poses too; elsewhere those of the valid poses.
     """
     question, poses = motion.question, motion.question.poses
-    statics, swept = [static for static in asked_of(motion).statics if static.name in names], poses.swept
+    statics, swept = [static for static in question_of(motion).statics if static.name in names], poses.swept
     at = poses.abscissa.reshape(poses.designs, -1)
     valid = motion.valid.reshape(poses.designs, -1)
     numbers = np.full((len(statics), poses.designs, 8), np.nan)
@@ -86,14 +87,14 @@ def extremes_table(motion: Motion, along: Along | None, names: Collection[str]) 
 
 def _of_poses(values: Floats, at: Floats) -> Floats:
     """Numbers of each design's valid poses, shape (designs, 8)."""
-    lanes, known = np.arange(len(values)), np.isfinite(values)
-    low, high, peak = (np.where(known, judged, -np.inf).argmax(axis=1) for judged in (-values, values, np.abs(values)))
-    count, safe = np.maximum(known.sum(axis=1), 1), np.where(known, values, 0.0)
+    lanes, finite = np.arange(len(values)), np.isfinite(values)
+    low, high, peak = (np.where(finite, judged, -np.inf).argmax(axis=1) for judged in (-values, values, np.abs(values)))
+    count, safe = np.maximum(finite.sum(axis=1), 1), np.where(finite, values, 0.0)
     numbers = [
         values[lanes, low], at[lanes, low], values[lanes, high], at[lanes, high], np.abs(values[lanes, peak]),
         at[lanes, peak], safe.sum(axis=1) / count, np.sqrt((safe**2).sum(axis=1) / count),
     ]  # fmt: skip
-    some = np.asarray(known.any(axis=1))
+    some = np.asarray(finite.any(axis=1))
     return np.where(some[:, None], np.stack(numbers, axis=1), np.nan)
 
 

@@ -1,4 +1,4 @@
-"""Columns of a motion as functions along its curve: what they are between the poses."""
+"""Columns of a motion as functions along its curve, so between the poses as well."""
 
 from __future__ import annotations
 
@@ -31,11 +31,13 @@ from mechdesign.study import Study
 # Names of functions that no column has: products that are zero where the drives hold the mechanism no longer, and where
 # they cannot move what the poses give in every direction; and how fast the motion passes its places.
 FORWARD, INVERSE, _PACE = "forward singularity", "inverse singularity", "pace"
-# In front of the name of a function with poles: the same without them, of which the means are asked.
+# Prefix of the quotient of a function with poles, from which its mean is taken.
 _MEAN_OF = "mean of "
-# Places this near to a pose (in rows) or to zero (as a part of the range of what is swept) are at it; so near to a pose
-# a zero that is only touched may be at it.
-AT_ROW, AT_GIVEN_PLACE = 1e-9, 1e-12
+# A place within this many rows of a pose is that pose.
+AT_ROW = 1e-9
+# A swept value within this part of its range from a pose's value, or from zero, is that value.
+AT_GIVEN_PLACE = 1e-12
+# A zero that a column only touches is at a pose within this many rows.
 NEAR_ROW = 1e-5
 # A gap shorter than this part of the motion is rounding.
 GAP = 1e-11
@@ -57,7 +59,7 @@ class Along:
 
     def __init__(
         self, question: MotionQuestion, curve: Curve, names: Collection[str] | None = None,
-        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), asked: Collection[Asked] = (),
+        loops: Sequence[FourBar] = (), *, also: Collection[str] = (), requests: Collection[Asked] = (),
         toggles: bool = False, passages: bool = False,
     ) -> None:  # fmt: skip
         self.question, self.curve = question, curve
@@ -66,20 +68,22 @@ class Along:
         columns = {output.name: sizes.get(output.quantity, 0.0) for output in question.outputs}
         columns |= {name: sizes.get(quantity, 0.0) for name, quantity in question.errors.items()}
         columns |= {static.name: static.size for static in question.statics}
-        self._asked, self._within = asked, dict[Part, Along]()
-        whole = [each for each in asked if not each.part]
+        self._requests, self._within = requests, dict[Part, Along]()
+        whole = [request for request in requests if not request.part]
         shown = {*((*columns, *question.rates) if names is None else names), *also}
-        judged = dict.fromkeys([*also, *(each.column for each in whole)])
-        wanted = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
-        self._others = [name for name in wanted if name not in columns]
-        columns = {name: size for name, size in columns.items() if name in wanted}
+        judged = dict.fromkeys([*also, *(request.column for request in whole)])
+        followed = dict.fromkeys([*((*columns, *question.rates) if names is None else names), *judged])
+        self._others = [name for name in followed if name not in columns]
+        columns = {name: size for name, size in columns.items() if name in followed}
         columns |= dict.fromkeys(self._others, 0.0) | {
             name: sizes.get(quantity, 0.0) * question.tempo**order
             for name, (quantity, order) in question.orders.items()
-            if name in wanted
+            if name in followed
         }
         self.columns = tuple(columns)
-        ends = {name: {each.end for each in whole if each.column == name} for name in columns if name not in shown}
+        ends = {
+            name: {request.end for request in whole if request.column == name} for name in columns if name not in shown
+        }
         drives = set(mechanism.drives)
         self._groups = []
         if passages and set(question.poses.names) != drives:
@@ -87,18 +91,18 @@ class Along:
             self._groups = [k for k, group in enumerate(structure.groups) if group.solved]
         self._errors = any(name.endswith("_error") for name in columns)
         self._advantages = {
-            f"{output}_advantage": (output, given)
-            for output, given in question.section.mechanical_advantage.items()
+            f"{output}_advantage": (output, input_name)
+            for output, input_name in question.section.mechanical_advantage.items()
             if f"{output}_advantage" in columns
         }
         self._chains: dict[str, tuple[int, ...]] = {}
         divisors = self._divisors()
-        # Of the question only what the columns need is computed.
-        self._lean = question.lean({*columns, *(name for each in asked for name in each.columns)})
+        # The part of the question that the columns need.
+        self._lean = question.lean({*columns, *(name for request in requests for name in request.columns)})
         angles = {angle.name for angle in curve.angles}
         self._turning = not angles.isdisjoint(angles_of(self._lean.watched))
         below = {name for powers in divisors.values() for name, _ in powers}
-        integrals = {each.column for each in whole if each.integral}
+        integrals = {request.column for request in whole if request.integral}
         functions = columns | {name: 1.0 for name in (FORWARD, INVERSE, *self._chains) if name in below}
         functions |= {_PACE: 0.0} if self._errors or integrals else {}
         functions |= {f"rate of {name}": 0.0 for name in self._advantages}
@@ -115,7 +119,7 @@ class Along:
         self._follow = partial(
             Functions, curve, self._names, self._evaluated, list(functions.values()), divisors,
             extremes=[*columns, *lines], means=means, zeros=zeros,
-            ends={name: next(iter(asked_for)) for name, asked_for in ends.items() if len(asked_for) == 1},
+            ends={name: next(iter(sides)) for name, sides in ends.items() if len(sides) == 1},
         )  # fmt: skip
 
     @cached_property
@@ -131,15 +135,15 @@ class Along:
     def _divisors(self) -> dict[str, list[tuple[str, int]]]:
         """What functions with poles are divided by, and how often."""
         question = self.question
-        rates = INVERSE if question.of_given else FORWARD
+        rates = INVERSE if question.inverse else FORWARD
         divisors = {static.name: [(FORWARD, 1)] for static in question.statics}
         divisors |= {name: [(f"rate of {name}", 1)] for name in self._advantages}
         for name in self._others:
             output, _, order = name.rpartition("_")
-            if output in question.study.mechanism.drives and not question.of_given:
+            if output in question.study.mechanism.drives and not question.inverse:
                 continue  # of their own rates, which have no poles
             if order in (powers := {"velocity": 1, "acceleration": 3}):
-                divisors[name] = [(rates if question.of_given else self._chain(output), powers[order])]
+                divisors[name] = [(rates if question.inverse else self._chain(output), powers[order])]
         divisors |= {name: [(FORWARD, 1)] for name in self._others if name == "det_J" or "_by_" in name}
         return {name: divisor for name, divisor in divisors.items() if name in self.columns}
 
@@ -177,13 +181,13 @@ class Along:
             outputs = [mechanism.coordinate(name) for name in whole.groups[0].names]
             matrix = unitless(mechanism, linear, outputs)[1]
             arrays[INVERSE] = np.asarray(np.linalg.det(np.nan_to_num(matrix))) * forward
-        for name, (output, given) in self._advantages.items():
-            arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, given)[0] * forward
+        for name, (output, input_name) in self._advantages.items():
+            arrays[f"rate of {name}"] = rates_of_advantage(self.question, linear, output, input_name)[0] * forward
         for k, loop in enumerate(self._loops):
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)
         arrays |= {name: column for name, column in poses.named.items() if name not in arrays}
-        self._known = arrays.keys()
+        self._evaluated_names = arrays.keys()
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
@@ -221,15 +225,15 @@ class Along:
     def shown(self, line: Ints, s: Floats) -> Floats:
         """Places as tables have them: what is swept (study's unit), else in rows from 0; nan where there is none."""
         poses = self.question.poses
-        known = np.isfinite(s)
-        places = self.snapped(np.where(known, s, 0.0))
+        finite = np.isfinite(s)
+        places = self.snapped(np.where(finite, s, 0.0))
         if poses.swept is not None:
-            given = poses.abscissa.reshape(-1, poses.line)
+            swept_values = poses.abscissa.reshape(-1, poses.line)
             values = poses.along(line, places).named[poses.swept]
-            near = AT_GIVEN_PLACE * np.ptp(given)
-            row = given[line, np.clip(np.round(places), 0, poses.line - 1).astype(np.intp)]
+            near = AT_GIVEN_PLACE * np.ptp(swept_values)
+            row = swept_values[line, np.clip(np.round(places), 0, poses.line - 1).astype(np.intp)]
             places = np.where(np.abs(values - row) <= near, row, np.where(np.abs(values) <= near, 0.0, values))
-        return np.where(known, places, np.nan)
+        return np.where(finite, places, np.nan)
 
     def place_columns(self, table: TableKind, line: Ints, places: Floats) -> list[Column]:
         """Places of motions as columns of a table: what is swept, or the row, and all other coordinates that move."""
@@ -311,7 +315,7 @@ class Along:
         if not len(pieces.line):
             return False
         self._evaluated(pieces.line[:1], pieces.nodes[0, :1])
-        return self._known >= {*names}
+        return self._evaluated_names >= {*names}
 
     def part(self, part: Part) -> Along:
         """The same over the part of the motion in which columns lie in intervals, whose ends are found on the curve."""
@@ -324,8 +328,8 @@ class Along:
                 return table[rows], conditioning
 
             curve = within(self.curve, [interval for _, interval in part], values)
-            asked = [each._replace(part=()) for each in self._asked if each.part == part]
-            self._within[part] = Along(self.question, curve, (), asked=asked)
+            requests = [request._replace(part=()) for request in self._requests if request.part == part]
+            self._within[part] = Along(self.question, curve, (), requests=requests)
         return self._within[part]
 
     def at_ends(self, ends: Sequence[End], names: Sequence[str]) -> Floats:
@@ -349,13 +353,13 @@ class Along:
 
 def along_of(
     question: MotionQuestion, names: Collection[str] | None = None, loops: Sequence[FourBar] = (), *,
-    also: Collection[str] = (), asked: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
+    also: Collection[str] = (), requests: Collection[Asked] = (), toggles: bool = False, passages: bool = False,
 ) -> Along | None:  # fmt: skip
     """The motions of a question between their poses; None of listed poses and grids, and where none can be followed."""
     curve = question.curve
     if curve is None or curve.spent.all():
         return None
-    return Along(question, curve, names, loops, also=also, asked=asked, toggles=toggles, passages=passages)
+    return Along(question, curve, names, loops, also=also, requests=requests, toggles=toggles, passages=passages)
 
 
 def over(along: Along | None, names: Sequence[str]) -> dict[str, str]:

@@ -102,8 +102,8 @@ def _modes(
     ]
     table = dataclasses.replace(parts[0], columns=tuple(columns))
     if drawn.long:
-        each = [partial(passage.blocks, partial(_mode, label), jobs) for label, passage in passages.items()]
-        table = LongTable(table, len(each) * poses.count, lambda: chain.from_iterable(blocks() for blocks in each))
+        pieces = [partial(passage.blocks, partial(_mode, label), jobs) for label, passage in passages.items()]
+        table = LongTable(table, len(pieces) * poses.count, lambda: chain.from_iterable(blocks() for blocks in pieces))
     return table, warnings, len(parts), pictured
 
 

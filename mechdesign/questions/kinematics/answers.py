@@ -1,4 +1,4 @@
-"""What is known of motions after a pass over their poses: tables, warnings and counts, of many designs at once."""
+"""Results of motions from a pass over their poses: tables, warnings and counts, of many designs at once."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def _in_groups(question: MotionQuestion, kinds: Sequence[tuple[object, ...]]) ->
     for kind in dict.fromkeys(kinds):
         some = np.array([k for k, own in enumerate(kinds) if own == kind])
         part = replace(question, poses=question.poses.some(some))
-        groups += [replace(each, rows=some[each.rows]) for each in answers_of(pass_over(part, marks_of, NULL, 1))]
+        groups += [replace(group, rows=some[group.rows]) for group in answers_of(pass_over(part, marks_of, NULL, 1))]
     return groups
 
 

@@ -12,18 +12,18 @@ from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.statistics import Asked
 
 
-def course_of(along: Along, asked: Asked) -> Followed | None:
-    """A column over motions or a part of them that was asked for; None where it is not known between the poses."""
-    if not along.knows(asked.columns):
+def course_of(along: Along, request: Asked) -> Followed | None:
+    """A column along motions or a part of them; None where it has no values between the poses."""
+    if not along.knows(request.columns):
         return None
-    along = along.part(asked.part) if asked.part else along
-    return Followed(along, asked.column) if asked.column in along.columns else None
+    along = along.part(request.part) if request.part else along
+    return Followed(along, request.column) if request.column in along.columns else None
 
 
-def follow(question: MotionQuestion, asked: Asked) -> Followed | None:
+def follow(question: MotionQuestion, request: Asked) -> Followed | None:
     """A column along the motions of all designs; it is followed once for all of them."""
-    along = along_of(question, (), asked=[asked])
-    return None if along is None else course_of(along, asked)
+    along = along_of(question, (), requests=[request])
+    return None if along is None else course_of(along, request)
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +66,8 @@ class Followed:
 
     def shown(self, place: float) -> str:
         """A place of the motion of the first design in words."""
-        swept, given = self.along.question.poses.swept, self.pose(place)
-        return ", ".join(f"{name} {given[name]:.6g}" for name in (given if swept is None else [swept]))
+        swept, coordinates = self.along.question.poses.swept, self.pose(place)
+        return ", ".join(f"{name} {coordinates[name]:.6g}" for name in (coordinates if swept is None else [swept]))
 
     def end(self, sign: int) -> Floats:
         """The largest value, or with the sign -1 the smallest."""

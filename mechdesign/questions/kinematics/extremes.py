@@ -1,4 +1,4 @@
-"""What a motion comes to: extremes of outputs, errors and efforts, the times between them, means of errors."""
+"""Extremes of outputs, errors and efforts over a motion, the times between them, and means of errors."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     part of a full turn of the swept angle between the two extremes, for a drive of constant speed; nan elsewhere.
     `min_at` is what is swept, or the place in rows where nothing or more than one coordinate is.
 
-    Those of `names` are wanted, or all.
+    They are those of the columns `names`, or of all.
     """
     question = motion.question
     study, poses, mechanism = question.study, question.poses, question.study.mechanism
     sizes, label = question.sizes, study.units.label
     turn = sizes["angle"]
-    # By name what rounding is judged by, and the unit.
+    # Of each column, the size that rounding is compared with, and the unit.
     curves = {output.name: (sizes.get(output.quantity, 0.0), label(output.quantity)) for output in question.outputs}
     curves |= {error.name: (sizes.get(error.quantity, 0.0), label(error.quantity)) for error in motion.errors}
     curves |= {static.name: (0.0, static.unit) for static in question.statics}
@@ -41,14 +41,14 @@ def extremes(motion: Motion, along: Along | None, names: Collection[str] | None 
     arrays = motion.arrays | {error.name: error.values for error in motion.errors}
     units = [unit for _, unit in curves.values()]
     swept = poses.swept
-    # By curve and design; of both ends the value and its place.
+    # Values by column, design and pose; `ends` will have value and place of both extremes.
     table = np.array([arrays[name] for name in curves]).reshape(len(curves), poses.designs, -1)
     places = poses.abscissa.reshape(poses.designs, -1)
     counted = motion.valid.reshape(poses.designs, -1) & ~np.isnan(table)
     row = np.stack([np.where(counted, sign * table, np.inf).argmin(axis=2) for sign in (1, -1)])
     low, high = (np.take_along_axis(table, index[..., None], axis=2)[..., 0] for index in row)
     finite = np.where(counted & np.isfinite(table), np.abs(table), 0.0).max(axis=2, initial=0.0)
-    size = np.array([each for each, _ in curves.values()])[:, None]
+    size = np.array([scale for scale, _ in curves.values()])[:, None]
     still = STILL * np.maximum(finite, size)
     with np.errstate(invalid="ignore"):
         moving = high - low > still

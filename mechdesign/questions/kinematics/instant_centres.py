@@ -20,11 +20,11 @@ from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.outputs import Rates
 from mechdesign.numerics.arrays import Complexes, Ints
 
-# A centre more than so many sizes of the mechanism away is at infinity.
+# A centre farther away than this many sizes of the mechanism is at infinity.
 FARTHEST = 1e9
 # Links whose relative motion is below this part of the whole mechanism's do not move against each other.
 AT_REST = 1e-11
-# How one link moves against the other, by its number: nothing is known of 0.
+# Relative motion of two links by its number in the column; 0 where it was not computed.
 MOTIONS = ("", "rotation", "translation", "rest")
 ROTATION, TRANSLATION, REST = 1, 2, 3
 INFINITY = complex(np.inf, np.inf)

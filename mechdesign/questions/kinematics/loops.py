@@ -39,11 +39,11 @@ def measured(
     if not poses.places:
         return [loops] * poses.designs
     loops_of, missing = [loops] * poses.designs, np.ones(poses.designs, dtype=bool)
-    for each in solved:
-        valid = np.flatnonzero(each.configuration.valid)
-        designs, first = np.unique(each.rows[valid] // (poses.count // poses.designs), return_index=True)
+    for part in solved:
+        valid = np.flatnonzero(part.configuration.valid)
+        designs, first = np.unique(part.rows[valid] // (poses.count // poses.designs), return_index=True)
         new = missing[designs]
-        one = each.configuration.take(valid[first[new]])
+        one = part.configuration.take(valid[first[new]])
         lengths = zip(*(loop.measured(one, mechanism.size) for loop in loops), strict=True)
         for design, own in zip(designs[new].tolist(), lengths, strict=False):
             loops_of[design], missing[design] = own, False
@@ -91,12 +91,12 @@ def _at_poses(study: Study, poses: Poses, loops: Sequence[FourBar]) -> list[tupl
         valid = solved.configuration.valid
         for row, loop in zip(angle, loops, strict=True):
             row[solved.rows] = np.where(valid, loop.transmission(solved.configuration), np.nan)
-    each = angle.reshape(len(loops), poses.designs, -1)
+    angles = angle.reshape(len(loops), poses.designs, -1)
     ends = []
     for sign in (1, -1):
-        values = np.where(np.isnan(each), np.inf, sign * each)
+        values = np.where(np.isnan(angles), np.inf, sign * angles)
         best = (values <= values.min(axis=2, keepdims=True) + SAME_ANGLE).argmax(axis=2)
-        value = np.take_along_axis(each, best[..., None], axis=2)[..., 0]
+        value = np.take_along_axis(angles, best[..., None], axis=2)[..., 0]
         ends.append((value, np.where(np.isnan(value), np.nan, best)))
     return ends
 

@@ -70,12 +70,11 @@ class Motion:
     def fill(self, solved: SolvedPoses) -> Linearization:
         """Take up poses that give the same coordinates; returns their loop equations."""
         study, rows, configuration = self.question.study, solved.rows, solved.configuration
-        given = self.question.poses.values
         self.reason[rows] = configuration.reason
         for coordinate in self.question.watched:
-            if coordinate.name in solved.given:
+            if coordinate.name in solved.names:
                 # As the study gives it, not there and back through radians; also where the pose fails.
-                self.put(coordinate.name, rows, given[coordinate.name][rows])
+                self.put(coordinate.name, rows, self.question.poses.values[coordinate.name][rows])
             else:
                 self.put(coordinate.name, rows, in_study_units(study, coordinate, configuration.value(coordinate)))
         linear = study.mechanism.linearize(configuration)
@@ -103,10 +102,10 @@ class Motion:
         assert velocity is not None
         for centre in self.question.centres:
             place, motion = centre.at(self.question.study.mechanism, linear.configuration, velocity)
-            known = np.isfinite(self.arrays["conditioning"][rows]) & (self.arrays["conditioning"][rows] >= STALLED)
-            self.put(f"{centre.name}.x", rows, np.where(known, place.real, np.nan))
-            self.put(f"{centre.name}.y", rows, np.where(known, place.imag, np.nan))
-            self.put(f"{centre.name}.motion", rows, np.where(known, motion, 0))
+            regular = np.isfinite(self.arrays["conditioning"][rows]) & (self.arrays["conditioning"][rows] >= STALLED)
+            self.put(f"{centre.name}.x", rows, np.where(regular, place.real, np.nan))
+            self.put(f"{centre.name}.y", rows, np.where(regular, place.imag, np.nan))
+            self.put(f"{centre.name}.motion", rows, np.where(regular, motion, 0))
 
     def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Moving:
         drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
@@ -174,14 +173,14 @@ class Motion:
     def pose_columns(self) -> list[Column]:
         """The drives, and the coordinates that the study gives."""
         question, units = self.question, self.question.study.units
-        given = [
+        columns = [
             replace(column, values=self.arrays.get(column.name, column.values))
             for column in pose_columns(question.study, question.poses)
         ]
         drives = [DRIVE.column(self.arrays[c.name], units.label(c.quantity), drive=c.name) for c in question.drives]
         named = {column.name for column in drives}
-        timed = given[:1] if question.poses.times is not None else []
-        return [*timed, *drives, *(column for column in given[len(timed) :] if column.name not in named)]
+        timed = columns[:1] if question.poses.times is not None else []
+        return [*timed, *drives, *(column for column in columns[len(timed) :] if column.name not in named)]
 
     def _error(self, error: Error) -> Column:
         study = self.question.study
@@ -203,26 +202,28 @@ def statics(question: MotionQuestion, linear: Linearization, rows: Ints, moving:
         Loading(question.study, section.loads, question.poses, rows).add(forces, moving)
         efforts = balance(linear, forces).efforts
         columns = {f"{drive.name}_effort": effort for drive, effort in zip(question.drives, efforts, strict=True)}
-    for name, given in section.mechanical_advantage.items():
-        columns[f"{name}_advantage"] = _advantage(question, linear, name, given)
+    for name, input_name in section.mechanical_advantage.items():
+        columns[f"{name}_advantage"] = _advantage(question, linear, name, input_name)
     return columns
 
 
 @quiet
-def rates_of_advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> tuple[Value, Value]:
+def rates_of_advantage(
+    question: MotionQuestion, linear: Linearization, output: str, input_name: str
+) -> tuple[Value, Value]:
     """Rates of an output and of the input of its mechanical advantage, by a drive that moves the input."""
     mechanism, drives = question.study.mechanism, [drive.name for drive in question.drives]
-    rows = Jacobian.of(linear, [mechanism.coordinate(name) for name in (output, given)]).entries
-    k = drives.index(given) if given in drives else 0
+    rows = Jacobian.of(linear, [mechanism.coordinate(name) for name in (output, input_name)]).entries
+    k = drives.index(input_name) if input_name in drives else 0
     return rows[0][k], rows[1][k]
 
 
 @quiet
-def _advantage(question: MotionQuestion, linear: Linearization, output: str, given: str) -> Value:
+def _advantage(question: MotionQuestion, linear: Linearization, output: str, input_name: str) -> Value:
     """Force of an output over that at its input: by virtual work the input's rate over the output's."""
     mechanism = question.study.mechanism
-    given_out, put_in = rates_of_advantage(question, linear, output, given)
-    sizes = [mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in (output, given)]
+    given_out, put_in = rates_of_advantage(question, linear, output, input_name)
+    sizes = [mechanism.size if mechanism.quantity(name) == "length" else 1.0 for name in (output, input_name)]
     still = np.abs(given_out) / sizes[0] <= STANDS_STILL * np.maximum(np.abs(put_in) / sizes[1], STANDS_STILL)
     return np.where(still & (put_in != 0), np.inf, put_in / given_out)
 
@@ -292,7 +293,7 @@ def _through_change_points(motion: Motion) -> None:
     steps = in_study_units(study, coordinate, scale * STENCIL)
     values = (group.values[name][rows][:, None] + steps).ravel()
     slopes, bends = (
-        {given: np.repeat(column[rows], len(STENCIL)) for given, column in part.items()}
+        {key: np.repeat(column[rows], len(STENCIL)) for key, column in part.items()}
         for part in (question.poses.slopes, question.poses.bends)
     )
     beside = Poses(
@@ -300,9 +301,9 @@ def _through_change_points(motion: Motion) -> None:
         bends=bends,
     )  # fmt: skip
     around = Motion(replace(question, poses=beside), reason=np.zeros(len(values), dtype=np.int8))
-    each = np.repeat(rows, len(STENCIL))
+    row_of_lane = np.repeat(rows, len(STENCIL))
     for solved in solve_poses(study, beside):
-        near = {angle: radians(study, c, motion.arrays[angle][each[solved.rows]])
+        near = {angle: radians(study, c, motion.arrays[angle][row_of_lane[solved.rows]])
                 for angle, c in angles_of(question.watched).items() if angle != name}  # fmt: skip
         configuration = replace(solved.configuration, near={**solved.configuration.near, **near})
         around.fill(replace(solved, configuration=configuration))

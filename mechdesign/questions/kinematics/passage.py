@@ -1,4 +1,4 @@
-"""One pass over all poses of a motion: of a long one, what stays in memory are those poses that matter."""
+"""One pass over all poses of a motion; of a long one only the poses that tables and pictures need stay in memory."""
 
 from __future__ import annotations
 
@@ -93,28 +93,28 @@ def pass_over(question: MotionQuestion, marks: Marks, progress: Progress, jobs: 
         counts = [{name: _mark(where[k], 0) for name, where in flags.items()} for k in range(poses.designs)]
         return Passage(question, motion, keeper.shown, motion.reason, counts, solved)
     picked = Picked(question, keeper.rows)
-    reason, known = np.empty(poses.count, dtype=np.int8), dict[str, Mark]()
+    reason, totals = np.empty(poses.count, dtype=np.int8), dict[str, Mark]()
     for part, motion in pieces(question, jobs):
         reason[part.rows] = motion.reason
         begin = int(part.rows[0])
         for name, where in marks(motion).items():
-            new, old = _mark(where, begin), known.get(name, Mark(0, -1))
-            known[name] = Mark(old.number + new.number, old.first if old.number else new.first)
+            new, old = _mark(where, begin), totals.get(name, Mark(0, -1))
+            totals[name] = Mark(old.number + new.number, old.first if old.number else new.first)
         picked.add(begin, motion)
         keeper.keep(part)
         progress.update(len(part.rows))
     motion, shown = picked.motion(), keeper.shown
     assert motion.question.poses.rows is not None
     rows = np.searchsorted(motion.question.poses.rows, shown.rows)
-    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, [known], [])
+    return Passage(question, motion, replace(shown, poses=motion.question.poses, rows=rows), reason, [totals], [])
 
 
 def _is_long(question: MotionQuestion) -> bool:
     """Whether poses are too many to be held with all their columns, and all of one kind and one design."""
     poses = question.poses
-    each = any(t.table is not None and len(t.table) == poses.count for t in question.study.targets.values())
+    per_pose = any(t.table is not None and len(t.table) == poses.count for t in question.study.targets.values())
     single = len(poses.groups) == 1 and poses.designs == 1 and not poses.regions
-    return poses.count > POSES_AT_ONCE and single and not poses.listed and not each
+    return poses.count > POSES_AT_ONCE and single and not poses.listed and not per_pose
 
 
 def _mark(where: Flags, begin: int) -> Mark:

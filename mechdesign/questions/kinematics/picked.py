@@ -31,10 +31,10 @@ class Picked:
         some[1:] |= changes
         some[:-1] |= changes
         for values in [*motion.arrays.values(), *(error.values for error in motion.errors)]:
-            known = motion.valid & np.isfinite(values)
-            if known.any():
-                low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
-                some[[low.argmin(), high.argmax(), known.argmax()]] = True
+            finite = motion.valid & np.isfinite(values)
+            if finite.any():
+                low, high = np.where(finite, values, np.inf), np.where(finite, values, -np.inf)
+                some[[low.argmin(), high.argmax(), finite.argmax()]] = True
         kept = np.flatnonzero(some)
         errors = [Error(error.output, error.quantity, error.values[kept]) for error in motion.errors]
         arrays = {name: values[kept] for name, values in motion.arrays.items()}

@@ -18,7 +18,6 @@ from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.model import Quantity
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.kinematics.instant_centres import Centre
-from mechdesign.questions.kinematics.rates import of_given
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.kinematics.targets import followed, needed
 from mechdesign.questions.loads import coordinates_in
@@ -75,7 +74,7 @@ class MotionQuestion:
     watched : list of Coordinate
         All coordinates whose values are needed: drives, outputs, those that targets depend on, and the angles in
         expressions of these and of limits.
-    of_given : bool
+    inverse : bool
         Whether rates and accelerations are those of the given coordinates rather than of the drives.
     targeted : tuple of str
         Coordinates whose values the errors need.
@@ -92,7 +91,7 @@ class MotionQuestion:
     listed: list[Coordinate]
     square: bool
     watched: list[Coordinate]
-    of_given: bool
+    inverse: bool
     targeted: tuple[str, ...]
     errors: Mapping[str, Quantity]
     borne: Borne | None = None
@@ -119,18 +118,18 @@ class MotionQuestion:
         for drive in self.drives if self.section.loads else ():
             unit = label("moment" if drive.quantity == "angle" else "force")
             statics.append(Static(f"{drive.name}_effort", unit, "<drive>_effort", {"drive": drive.name}))
-        for name, given in self.section.mechanical_advantage.items():
+        for name, input_name in self.section.mechanical_advantage.items():
             units = {"length": label("length"), "angle": ""}
-            above, below = (units[self.study.mechanism.quantity(each)] for each in (given, name))
+            above, below = (units[self.study.mechanism.quantity(coordinate)] for coordinate in (input_name, name))
             unit = "" if above == below else above or f"1/{below}"
-            words = {"output": name, "input": given}
+            words = {"output": name, "input": input_name}
             statics.append(Static(f"{name}_advantage", unit, "<output>_advantage", words))
         return [*statics, *(self.borne.statics if self.borne is not None else ())]
 
     @property
     def rated(self) -> dict[str, Coordinate]:
         """What has velocities and accelerations, where rates are asked: outputs, and drives whose rates change."""
-        drives = self.drives if self.of_given or self.section.motion is not None else []
+        drives = self.drives if self.inverse or self.section.motion is not None else []
         return {output.name: output for output in [*drives, *self.outputs]}
 
     @property
@@ -196,7 +195,7 @@ class MotionQuestion:
         return replace(
             self, section=section.model_copy(update={**unasked, "instant_centres": tuple(centres)}), square=square,
             watched=[coordinate for coordinate in self.watched if borne is not None or coordinate.name in values],
-            of_given=self.of_given and (rates or borne is not None), borne=borne,
+            inverse=self.inverse and (rates or borne is not None), borne=borne,
         )  # fmt: skip
 
     @property
@@ -213,13 +212,15 @@ class MotionQuestion:
         study, drives = self.study, self.study.mechanism.drives
         # One point, then angles; of outputs that are left out the last, as the end of a chain.
         named, others = self.section.outputs or (), default_outputs(study.mechanism)[::-1]
-        known = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
-        node = next((c.node for c in known.values() if c.kind in ("x", "y")), -1)
-        picked = sorted(known, key=lambda name: (known[name].node != node, known[name].kind != "angle"))[: len(drives)]
+        candidates = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
+        node = next((c.node for c in candidates.values() if c.kind in ("x", "y")), -1)
+        picked = sorted(candidates, key=lambda name: (candidates[name].node != node, candidates[name].kind != "angle"))[
+            : len(drives)
+        ]
         points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
         rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
-        given = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
-        words = f"{given} for {counted(len(drives), 'drive')}; name as many"
+        listing = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"
+        words = f"{listing} for {counted(len(drives), 'drive')}; name as many"
         if not named:
             words = f"no outputs are named; name as many as there are drives, {len(drives)},"
         words += f" by kinematics.jacobian: [{', '.join(rows)}]"
@@ -252,7 +253,7 @@ def motion_question(study: Study, poses: Poses) -> MotionQuestion:
         listed,
         (section.outputs or section.jacobian) is not None and len(listed) == len(mechanism.drives),
         list((watched | angles_of([*watched.values(), *mechanism.counting])).values()),
-        of_given(study, section),
+        section.inverse(study.mechanism.drives),
         targeted,
         between,
     )

@@ -34,11 +34,6 @@ class DriveRates:
         ))  # fmt: skip
 
 
-def of_given(study: Study, section: MotionSection) -> bool:
-    """Whether a section's rates are those of the coordinates that the poses give rather than of the drives."""
-    return section.of_given(study.mechanism.drives)
-
-
 def drive_rates(
     study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses,
     linear: Linearization,
@@ -51,8 +46,8 @@ def drive_rates(
     `linear` is the mechanism at the solved poses.
     """
     section = poses.section(section, solved.rows)
-    inverse = of_given(study, section)
-    names = solved.given if inverse else study.mechanism.drives
+    inverse = section.inverse(study.mechanism.drives)
+    names = solved.names if inverse else study.mechanism.drives
     coordinates = [study.mechanism.coordinate(name) for name in names]
     if section.speed is None and section.motion is None:
         rates = constant_rates(study, section, names)
@@ -60,8 +55,8 @@ def drive_rates(
         pace = 1.0 if section.speed is None else section.speed
         nowhere = np.full(poses.count, np.nan)
         rates = DriveRates(*(
-            [radians(study, c, known.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
-            for order, known in ((1, poses.slopes), (2, poses.bends))
+            [radians(study, c, derivatives.get(c.name, nowhere)[solved.rows] * pace**order) for c in coordinates]
+            for order, derivatives in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
     return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
 
@@ -70,44 +65,44 @@ def constant_rates(study: Study, section: MotionSection, names: Sequence[str]) -
     """Rates of some coordinates, as a section gives them in numbers."""
     coordinates = [study.mechanism.coordinate(name) for name in names]
     return DriveRates(*(
-        [radians(study, c, known.get(c.name, 0.0)) for c in coordinates]
-        for known in (section.rates, section.accelerations)
+        [radians(study, c, numbers.get(c.name, 0.0)) for c in coordinates]
+        for numbers in (section.rates, section.accelerations)
     ))  # fmt: skip
 
 
 def inverse_rates(
-    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate], rates: DriveRates
+    mechanism: Mechanism, linear: Linearization, coordinates: Sequence[Coordinate], rates: DriveRates
 ) -> DriveRates:
     """Drive rates that give as many coordinates their velocities v and accelerations a, at a flat batch.
 
     With J the derivatives of the coordinates by the drives q, J q' = v and J q'' = a - b, where b is what the
     coordinates accelerate by while q'' = 0. Where J is singular there are none.
     """
-    matrix, good = _inverted(mechanism, linear, given)
+    matrix, good = _inverted(mechanism, linear, coordinates)
     speeds = _solve(matrix, good, rates.velocities)
     velocity = linear.velocity(speeds)
-    coasting = linear.acceleration(velocity, [0.0] * len(given))
-    own = [second(linear.configuration, coordinate, velocity, velocity, coasting) for coordinate in given]
+    coasting = linear.acceleration(velocity, [0.0] * len(coordinates))
+    own = [second(linear.configuration, coordinate, velocity, velocity, coasting) for coordinate in coordinates]
     return DriveRates(speeds, _solve(matrix, good, [a - b for a, b in zip(rates.accelerations, own, strict=True)]))
 
 
-def _inverted(mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]) -> tuple[Floats, Flags]:
+def _inverted(mechanism: Mechanism, linear: Linearization, coordinates: Sequence[Coordinate]) -> tuple[Floats, Flags]:
     """J of the given coordinates, and where it is regular.
 
     It is so by its determinant over the lengths of its rows (at least 1), all without units.
     """
-    matrix, pure = unitless(mechanism, linear, given)
+    matrix, pure = unitless(mechanism, linear, coordinates)
     lengths = np.maximum(np.sqrt(np.einsum("...ij,...ij->...i", pure, pure)), 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
         return matrix, np.abs(np.linalg.det(np.nan_to_num(pure / lengths[..., None]))) >= STALLED
 
 
 def unitless(
-    mechanism: Mechanism, linear: Linearization, given: Sequence[Coordinate]
+    mechanism: Mechanism, linear: Linearization, coordinates: Sequence[Coordinate]
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Jacobian of some coordinates by the drives, and the same with lengths in sizes of the mechanism."""
-    matrix, size = Jacobian.of(linear, given).matrix, mechanism.size
-    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in given])
+    matrix, size = Jacobian.of(linear, coordinates).matrix, mechanism.size
+    rows = np.array([1 / size if c.quantity == "length" else 1.0 for c in coordinates])
     columns = np.array([size if mechanism.quantity(name) == "length" else 1.0 for name in mechanism.drives])
     return matrix, matrix * rows[:, None] * columns
 

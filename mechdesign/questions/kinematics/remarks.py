@@ -1,4 +1,4 @@
-"""What is to be known of a motion as its poses show it: poses that stall, miss a target, or lie on a corner."""
+"""Warnings about poses of a motion: those that stall, miss a target, or lie on a corner."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mechdesign.questions.poses import POSES_AT_ONCE, pose_in_words
 from mechdesign.study.motion_program import MotionProgram
 from mechdesign.study.poses import Poses
 
-# Below this inverse condition the determinant and what is solved with it have lost about half of their digits.
+# Below this inverse condition the determinant and the rates solved with it have lost about half of their digits.
 SINGULAR = 1e-8
 _TABLE = "motion"  # whose rows are the poses
 # Poses that warnings are about.
@@ -49,10 +49,10 @@ def unfollowed(poses: Poses) -> list[Caution]:
     """A warning of a motion that cannot be followed between its poses."""
     if not poses.followed:
         return []
-    what = f"the steps of {'the motion' if poses.program is not None else poses.swept or 'the path'} are"
+    subject = f"the steps of {'the motion' if poses.program is not None else poses.swept or 'the path'} are"
     return [Caution(
         "incomplete",
-        f"{what} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
+        f"{subject} too long for the motion between the poses to be followed, or too many: extremes are of the asked "
         "poses only, and limits of motion, singularities and links in line are not looked for; sweep fewer turns",
     )]  # fmt: skip
 
@@ -93,7 +93,7 @@ def marks_of(motion: Motion) -> dict[str, Flags]:
     steady = arrays["conditioning"] >= STALLED
     stalled = valid & ~motion.smooth & ~steady
     marks = {_STALLED: stalled}
-    if question.of_given:
+    if question.inverse:
         marks[_LOST] = valid & ~stalled & np.isnan(arrays[f"{question.study.mechanism.drives[0]}_velocity"])
     if "inverse_condition" in arrays:
         marks[_REGULAR] = valid & steady
@@ -144,8 +144,8 @@ def _astray(question: MotionQuestion) -> list[Caution]:
         return []
     sizes = {"length": study.mechanism.size, "angle": 1 / study.units.angle_factor}
     unit = [1 / sizes.get(study.mechanism.quantity(name), 1.0) for name in poses.names]
-    given = poses.section(section, slice(1)).rates
-    rates = np.array([np.sum(given.get(name, 0.0)) * u for name, u in zip(poses.names, unit, strict=True)])
+    constant = poses.section(section, slice(1)).rates
+    rates = np.array([np.sum(constant.get(name, 0.0)) * u for name, u in zip(poses.names, unit, strict=True)])
     if not rates.any():
         return []
     ahead, values, off = rates / np.linalg.norm(rates), poses.values, 0

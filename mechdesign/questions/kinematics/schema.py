@@ -64,22 +64,24 @@ class KinematicsSection(MotionSection):
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
         rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
-            what = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
-            checker.report(("kinematics", "jacobian"), f"{what}; a Jacobian has as many outputs as drives", at_key=True)
+            counts = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
+            checker.report(
+                ("kinematics", "jacobian"), f"{counts}; a Jacobian has as many outputs as drives", at_key=True
+            )
         check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 
     def _check_centres(self, checker: Checker) -> None:
-        links, seen = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
+        links, pairs = [*checker.mechanism.moving, GROUND], set[frozenset[str]]()
         for index, pair in enumerate(self.instant_centres):
             path: KeyPath = ("kinematics", "instant_centres", index)
             for k, name in enumerate(pair):
-                checker.known(name, links, "link", (*path, k))
+                checker.check_name(name, links, "link", (*path, k))
             if pair[0] == pair[1]:
                 checker.report(path, f"{pair[0]!r} has an instant centre with another link, not with itself")
-            elif frozenset(pair) in seen:
+            elif frozenset(pair) in pairs:
                 checker.report(path, f"{' and '.join(pair)} are listed twice")
-            seen.add(frozenset(pair))
+            pairs.add(frozenset(pair))
         drives = len(checker.mechanism.drives)
         moved = any(self.rates.values()) or self.speed is not None or self.motion is not None
         if self.instant_centres and drives > 1 and not moved:
@@ -91,14 +93,14 @@ class KinematicsSection(MotionSection):
 
     def _check_advantage(self, checker: Checker) -> None:
         drives = checker.mechanism.drives
-        for output, given in self.mechanical_advantage.items():
+        for output, input_name in self.mechanical_advantage.items():
             path: KeyPath = ("kinematics", "mechanical_advantage", output)
-            quantities = checker.coordinate(output, path, at_key=True), checker.coordinate(given, path)
-            if output == given or (output in drives and given in drives):
-                checker.report(path, f"{output!r} is not moved by {given!r}: give an output, and its input")
+            quantities = checker.coordinate(output, path, at_key=True), checker.coordinate(input_name, path)
+            if output == input_name or (output in drives and input_name in drives):
+                checker.report(path, f"{output!r} is not moved by {input_name!r}: give an output, and its input")
             elif "none" in quantities:
-                name = output if quantities[0] == "none" else given
+                name = output if quantities[0] == "none" else input_name
                 checker.report(path, f"{name!r} is neither a length nor an angle: no force or moment acts along it")
-            elif given not in drives and len(drives) > 1:
+            elif input_name not in drives and len(drives) > 1:
                 message = f"with {len(drives)} drives the input is one of them, {', '.join(drives)}; others are held"
                 checker.report(path, message)

@@ -1,4 +1,4 @@
-"""Poses of a motion that a picture shows one by one: its limits, links that come into line, a few between."""
+"""Poses of a motion that a picture shows one by one: its limits, links in line, and a few between."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from mechdesign.study.poses import Poses
 # Poses that are shown at most, and at least along a motion.
 MOST = 6
 FEW = 4
-# Limits and toggles of a motion that are compared, whether a turn of the drive brought them back.
+# Limits and toggles that are compared, to leave out those that a turn of the drive repeats.
 COMPARED = 200
-# Places nearer than this part of the sweep's range are one, and so are poses whose points are nearer than this part of
-# the mechanism's size.
+# Places nearer than this part of the sweep's range are one place; poses whose points are nearer than this part of the
+# mechanism's size are one pose.
 SAME = 1e-6
 DIGITS = 4
 LIMIT = "limit of motion"
@@ -52,7 +52,7 @@ class SpecialPose:
     row: float  # place along the motion, in rows
     place: float  # what is swept there, in the study's units; else the row
     where: str  # ``crank = 40 deg``
-    what: str  # what is special about it; empty of a pose without anything special
+    event: str  # limit, toggle or singularity there; empty of a pose without one
     configuration: Configuration  # a batch, of which it is pose `index`
     index: int
     velocities: Mapping[str, complex]
@@ -71,7 +71,7 @@ class SpecialPoses:
     @property
     def special(self) -> bool:
         """Whether limits and toggles of the motion are among them."""
-        return any(each.what for each in self.shown)
+        return any(pose.event for pose in self.shown)
 
 
 def special_poses(
@@ -93,7 +93,7 @@ def special_poses(
     valid = np.flatnonzero(kept.configuration.valid)
     some, left_out = valid[:MOST], max(len(valid), len(special)) - MOST
     if poses.motion:
-        some, left_out = _spread(motion, kept, [each.row for each in special]), len(special) + more - MOST
+        some, left_out = _spread(motion, kept, [pose.row for pose in special]), len(special) + more - MOST
     configuration = kept.configuration.take(some)
     words = [
         (float(poses.numbers[k]), float(poses.abscissa[k]), pose_in_words(kept.study, poses, k, DIGITS), "")
@@ -101,7 +101,7 @@ def special_poses(
     ]
     solved = SolvedPoses(kept.rows[some], poses.groups[0].names, configuration)
     special += _moving(motion.question, poses, solved, words)
-    special.sort(key=lambda each: each.row)
+    special.sort(key=lambda pose: pose.row)
     return SpecialPoses(special[:MOST], max(left_out, 0), rates)
 
 
@@ -133,8 +133,8 @@ def _events(along: Along, limits: Sequence[Limit], toggles: Sequence[Toggle]) ->
     events = []
     for limit in limits:
         where = f" at {limit.cause.joint}" if limit.cause.joint else ""
-        what = PASSED if limit.end is None else f"{LIMIT}: {limit.cause.kind}"
-        events.append(Event(limit.place, (f"{what}{where}",)))
+        kind = PASSED if limit.end is None else f"{LIMIT}: {limit.cause.kind}"
+        events.append(Event(limit.place, (f"{kind}{where}",)))
     for toggle in toggles:
         names = toggle.loop.split(" (")[0].split("-")
         pair = next(f"{one} and {two}" for one, two in pairwise(names) if f"{one} {two}" == toggle.links)
@@ -180,14 +180,14 @@ def _at_events(along: Along, events: Sequence[Event]) -> list[SpecialPose]:
     return special
 
 
-def _distinct(motion: Motion, found: Iterable[SpecialPose]) -> list[SpecialPose]:
+def _distinct(motion: Motion, poses: Iterable[SpecialPose]) -> list[SpecialPose]:
     """Poses without those that a full turn of the drive brings back."""
     size, kept = motion.question.study.mechanism.size, list[tuple[dict[str, complex], SpecialPose]]()
-    for each in found:
-        places = {point: complex(each.configuration.point(point)[each.index]) for point in _points(motion)}
-        if not any(_same(places, other, size) and each.what == one.what for other, one in kept):
-            kept.append((places, each))
-    return [each for _, each in kept]
+    for pose in poses:
+        places = {point: complex(pose.configuration.point(point)[pose.index]) for point in _points(motion)}
+        if not any(_same(places, other, size) and pose.event == one.event for other, one in kept):
+            kept.append((places, pose))
+    return [pose for _, pose in kept]
 
 
 def _same(one: Mapping[str, complex], other: Mapping[str, complex], size: float) -> bool:

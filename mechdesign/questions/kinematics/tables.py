@@ -36,7 +36,7 @@ def centres_table(motion: Motion) -> Table:
     columns = motion.pose_columns()
     for centre in motion.question.centres:
         words = motion.question.study.units.labels | {"a": centre.one, "b": centre.other}
-        x, y, number = (motion.arrays[f"{centre.name}.{what}"] for what in ("x", "y", "motion"))
+        x, y, number = (motion.arrays[f"{centre.name}.{part}"] for part in ("x", "y", "motion"))
         motions = np.array(MOTIONS)[np.nan_to_num(number).round().astype(int)]
         values = {"<a>.<b>.x": x, "<a>.<b>.y": y, "<a>.<b>.motion": motions}
         columns += INSTANT_CENTRES.columns(words, **values)
@@ -57,8 +57,8 @@ def _per(study: Study, output: Coordinate, drive: Coordinate) -> str:
 A_ROW_A_POSE = {"motion": motion_table, "jacobian": jacobian_table, "instant_centres": centres_table}
 
 
-def pose_tables(motion: Motion, wanted: Collection[str] = A_ROW_A_POSE) -> dict[str, Table]:
-    """Those of them that a question has, of some that are wanted."""
+def pose_tables(motion: Motion, names: Collection[str] = A_ROW_A_POSE) -> dict[str, Table]:
+    """The tables of a question with a row a pose, of some names."""
     question = motion.question
-    known = {"motion": True, "jacobian": question.square, "instant_centres": bool(question.centres)}
-    return {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in wanted and known[name]}
+    available = {"motion": True, "jacobian": question.square, "instant_centres": bool(question.centres)}
+    return {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in names and available[name]}

@@ -81,11 +81,11 @@ def errors(
     """
     turn = 2 * np.pi / study.units.angle_factor
     for target in study.targets.values():
-        wanted = _wanted(study, target, poses, values, rows, between)
-        if wanted is None:
+        goals = _goals(study, target, poses, values, rows, between)
+        if goals is None:
             continue
         parts = []
-        for name, should in zip(target.coordinates, wanted, strict=True):
+        for name, should in zip(target.coordinates, goals, strict=True):
             quantity = study.mechanism.quantity(name)
             gap = values[name] - should
             if quantity == "angle":
@@ -96,7 +96,7 @@ def errors(
             yield Error(target.owner, "length", np.hypot(*parts))
 
 
-def _wanted(
+def _goals(
     study: Study, target: Target, poses: Poses, values: Mapping[str, Floats], rows: Ints, between: bool
 ) -> Sequence[Floats] | None:
     """What each coordinate of a target should be; None where that is not known between the poses."""
@@ -110,12 +110,12 @@ def _wanted(
     if len(tables) == 1:
         return _by_table(study, target, tables[0], poses, values, rows)
     design = rows // (poses.count // poses.designs)
-    wanted = np.empty((len(target.coordinates), len(rows)))
+    goals = np.empty((len(target.coordinates), len(rows)))
     for k in np.unique(design).tolist():
         some = np.flatnonzero(design == k)
         own = {name: column[some] for name, column in values.items()}
-        wanted[:, some] = _by_table(study, target, tables[k], poses, own, rows[some])
-    return list(wanted)
+        goals[:, some] = _by_table(study, target, tables[k], poses, own, rows[some])
+    return list(goals)
 
 
 def _tables(target: Target, poses: Poses) -> Floats:
@@ -177,17 +177,17 @@ def nearest(points: Complexes, corners: Complexes) -> Complexes:
     return nearest_feet
 
 
-def totals(found: Sequence[Error], designs: int, valid: Flags) -> Floats:
+def totals(errors: Sequence[Error], designs: int, valid: Flags) -> Floats:
     """Number, sum, and sum of the squares of each design's errors at valid poses, shape (3, designs, errors)."""
-    sums = np.zeros((3, designs, len(found)))
-    for k, error in enumerate(found):
-        known = (valid & np.isfinite(error.values)).reshape(designs, -1)
-        values = np.where(known, error.values.reshape(known.shape), 0.0)
-        sums[:, :, k] = known.sum(axis=1), values.sum(axis=1), (values**2).sum(axis=1)
+    sums = np.zeros((3, designs, len(errors)))
+    for k, error in enumerate(errors):
+        counted = (valid & np.isfinite(error.values)).reshape(designs, -1)
+        values = np.where(counted, error.values.reshape(counted.shape), 0.0)
+        sums[:, :, k] = counted.sum(axis=1), values.sum(axis=1), (values**2).sum(axis=1)
     return sums
 
 
-def untargeted(study: Study, found: Sequence[Error], valid: Flags) -> dict[str, Flags]:
+def untargeted(study: Study, errors: Sequence[Error], valid: Flags) -> dict[str, Flags]:
     """By outputs, the valid poses where their target has no value."""
     parts = {f"{owner}.{axis}" for owner in study.targets for axis in "xy"}
-    return {error.output: valid & ~np.isfinite(error.values) for error in found if error.output not in parts}
+    return {error.output: valid & ~np.isfinite(error.values) for error in errors if error.output not in parts}

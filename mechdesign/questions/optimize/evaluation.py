@@ -80,7 +80,7 @@ class Evaluator:
     def _forms_study(self, name: str) -> bool:
         """Whether a variable decides the structure of the study: an entry, or a whole number that is read once."""
         parameters = self.study.parameters
-        return name not in parameters.known() or not parameters.moved([name]).isdisjoint(self.study.fixed)
+        return name not in parameters.names() or not parameters.moved([name]).isdisjoint(self.study.fixed)
 
     def _of(self, values: Mapping[str, float]) -> Evaluator:
         """The evaluator of the same goals for the study with these values of entries."""

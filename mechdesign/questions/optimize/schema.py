@@ -435,7 +435,7 @@ def check_result(checker: Checker, name: str, path: KeyPath, *, required: bool =
     command, _, rest = name.partition(".")
     known = _known()
     if rest:
-        checker.known(command, COMMANDS, "command", path)
+        checker.check_name(command, COMMANDS, "command", path)
     elif required or name not in known:
         names = known if required else (*known, *checker.parameters.nominal)
         hint = suggestion(name, names) or f"; a result is one of {', '.join(REGIONAL)} or <command>.<column>"

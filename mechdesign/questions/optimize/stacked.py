@@ -132,7 +132,7 @@ def tables(
         question, absent = motion.question, motion.question.absent
         loops = four_bars(study.mechanism) if "loops" in wanted else ()
         errors = question.errors if "targets" in wanted else ()
-        along = along_of(question, outputs, loops, also=errors, asked=asked)
+        along = along_of(question, outputs, loops, also=errors, requests=asked)
         scope = Scope(course=partial(course_of, along)) if along is not None else None
         found = {name: replace(table, scope=scope) for name, table in pose_tables(motion, wanted).items()}
         if "extremes" in wanted:
@@ -177,7 +177,7 @@ def _margins(mechanism: Mechanism, solved: SolvedPoses) -> Floats:
     """Margins of some poses, shape (poses, margins)."""
     configuration, size = solved.configuration, mechanism.size
     found: list[Value] = [closure / size**2 for closure in configuration.closures]
-    if mechanism.plan(solved.given).iterative:
+    if mechanism.plan(solved.names).iterative:
         assembled = (configuration.reason == Reason.OK) | (configuration.reason == Reason.LIMIT)
         found.append(np.where(assembled, 1.0, -1.0))
     found += [configuration.slides[slide] / size for slide in sorted(mechanism.graph.telescopic)]

@@ -171,7 +171,7 @@ def shown(study: Study, name: str, values: Floats) -> NDArray[Any]:
 
 def unit_of(study: Study, name: str) -> str:
     """Unit of a variable, where it is known; none of words."""
-    if name in study.parameters.known():
+    if name in study.parameters.names():
         return study.unit_of(name) or ""
     return entry_unit(study, name) if variables_of(study)[name].numeric else ""
 
@@ -197,7 +197,7 @@ def parted(study: Study, design: Design) -> tuple[Study, dict[str, float]]:
     StudyError
         If the entries make no study.
     """
-    known = study.parameters.known()
+    known = study.parameters.names()
     changes = [entry_of(study, name, value) for name, value in design.items() if name not in known]
     numbers = {name: float(value) for name, value in design.items() if name in known}
     return with_entries(study, changes) if changes else study, numbers
@@ -214,7 +214,7 @@ def choice_problems(study: Study) -> Iterator[Problem]:
     A mistake that needs several choices makes a design infeasible.
     """
     for name, variable in variables_of(study).items():
-        if variable.choices is not None and name not in study.parameters.known():
+        if variable.choices is not None and name not in study.parameters.names():
             # Choices are tried as they are written: the units must fit the entry.
             choices = study.resolved["optimize"]["variables"][name]["choices"]
             for k, message in faults(study, name, choices):

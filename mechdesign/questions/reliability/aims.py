@@ -50,9 +50,9 @@ class Simulated(NamedTuple):
 
 @dataclass(frozen=True)
 class Reliable:
-    """A reliability of all limits together; the measure is the probability of failure, `asked` that of the target."""
+    """A reliability of all limits together; the measure is the probability of failure, `goal` that of the target."""
 
-    asked: float
+    goal: float
     noun: ClassVar[str] = "reliability"
 
     def level(self, measure: Number) -> Floats:
@@ -85,7 +85,7 @@ class Reliable:
 
     def method(self, task: Task, section: ReliabilitySection) -> str:
         """The simulation method that confirms the target."""
-        return "auto" if "auto" in section.methods or task.samples * self.asked < _ENOUGH_FAILURES else "monte_carlo"
+        return "auto" if "auto" in section.methods or task.samples * self.goal < _ENOUGH_FAILURES else "monte_carlo"
 
     def simulate(self, task: Task, method: str) -> Simulated:
         """Measures at the settings of a task by a simulation method."""
@@ -97,9 +97,9 @@ class Reliable:
     def safe(self, simulated: Simulated) -> Floats:
         """Measures no better than the simulated ones, from which the model's target is corrected."""
         # With few failures, or none, the end of the interval is used.
-        few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.asked)
-        seen = np.where(few, simulated.worst, simulated.value)
-        return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.asked), seen)
+        few = (2.0 * simulated.best < simulated.worst) & (simulated.worst < self.goal)
+        measure = np.where(few, simulated.worst, simulated.value)
+        return np.where(simulated.unseen, np.minimum(simulated.worst, _UNSEEN * self.goal), measure)
 
     def widest(self, low: Floats, high: Floats, level: Floats) -> Floats:
         """Largest standard deviation of an error of mean 0 that reaches `level` within [low, high]; 0 where none does.
@@ -123,7 +123,7 @@ class Reliable:
 class Capable:
     """A Cpk of each limit by itself [ISO 22514]; methods are those of `Reliable`."""
 
-    asked: float
+    goal: float
     noun: ClassVar[str] = "Cpk"
 
     def level(self, measure: Number) -> Floats:

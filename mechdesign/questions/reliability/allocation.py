@@ -50,21 +50,21 @@ _NARROWEST = 1e-100
 class _Round:
     """Tolerances, and the measures (see `Aim`) that they reach by the model and by simulation, shape (limits, poses).
 
-    `wanted` are the levels that the model had to reach. `bound` is a lower bound of the cost of any grades that reach
+    `targets` are the levels that the model had to reach. `bound` is a lower bound of the cost of any grades that reach
     them, infinite where tolerances are no grades.
     """
 
     model: ToleranceModel
     scales: Floats
     bound: float
-    wanted: Floats
+    targets: Floats
     analytic: Floats
     simulated: Simulated
     method: str
 
     def missed(self) -> Flags:
         """Where the target is missed beyond chance; for grades also where simulation and model both miss it."""
-        aim, target = self.model.aim, self.model.aim.level(self.model.aim.asked)
+        aim, target = self.model.aim, self.model.aim.level(self.model.aim.goal)
         missed = aim.level(self.simulated.best) < target
         if self.model.steps:
             missed |= (aim.level(self.simulated.value) < target) & (aim.level(self.analytic) < target)
@@ -76,16 +76,16 @@ class _Round:
         For grades wherever the model is pessimistic: a coarser grade may do.
         """
         aim = self.model.aim
-        more = (aim.level(self.simulated.worst) > aim.level(aim.asked)) | self.simulated.unseen
+        more = (aim.level(self.simulated.worst) > aim.level(aim.goal)) | self.simulated.unseen
         level = aim.level(self.analytic)
         if self.model.steps:
             return np.asarray(more & ((aim.level(self.simulated.worst) > level) | self.simulated.unseen))
-        return np.asarray(more & (level < self.wanted + _ACTIVE))
+        return np.asarray(more & (level < self.targets + _ACTIVE))
 
     def levels(self) -> tuple[Floats, Floats]:
         """Levels by the model, and the excess of the simulated levels over the target's."""
         aim = self.model.aim
-        return aim.level(self.analytic), aim.level(aim.safe(self.simulated)) - aim.level(aim.asked)
+        return aim.level(self.analytic), aim.level(aim.safe(self.simulated)) - aim.level(aim.goal)
 
     def worst(self) -> tuple[str, str, str]:
         """In words: the worst pose, the model's measure there, and the simulated one with its interval."""
@@ -115,28 +115,30 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if section.allocate is None or not task.settings:
         return Result("allocation", {})
     study, aim = task.study, aim_of(section.allocate)
-    given = tolerances(study, task.sources)
-    free = np.array([k for k, tolerance in enumerate(given) if tolerance.cost is not None], dtype=np.intp)
+    originals = tolerances(study, task.sources)
+    free = np.array([k for k, tolerance in enumerate(originals) if tolerance.cost is not None], dtype=np.intp)
     task = replace(task, settings=[replace(setting, scale=None, followed=False) for setting in task.settings])
     if section.precision is None:
         task = replace(task, precision=Precision(relative=_PRECISION))
-    model = ToleranceModel(task, aim, given, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST))
+    model = ToleranceModel(
+        task, aim, originals, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST)
+    )
     rounds = _rounds(model, aim.method(task, section))
     confirmed = [candidate for candidate in rounds if not candidate.missed().any()]
     if not confirmed and rounds[-1].tightest():
         return Result("allocation", {}, failed=_unreachable(rounds[-1]))
     last = min(confirmed, key=_Round.cost) if confirmed else rounds[-1]
     where, by_model, by_simulation = last.worst()
-    asked, failed = _asked(last), ""
+    goal, failed = _goal(last), ""
     if not confirmed:
         failed = (
-            f"allocate: the {aim.noun} asked, {asked.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
+            f"allocate: the {aim.noun} asked, {goal.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
             f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}; ask for a little less"
         )
-    before = sum(given[k].price(given[k].given) for k in free.tolist())
+    before = sum(originals[k].price(originals[k].given) for k in free.tolist())
     notes = [Caution(
         "allocated",
-        f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {asked}, and at "
+        f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {goal}, and at "
         f"{where}, the worst pose, it is {by_model} by the analytic model and {by_simulation} by {last.method}",
         "confirmation", pose=where,
     )]  # fmt: skip
@@ -151,7 +153,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
     text, others = rewritten(
-        study, allocated_data(study, given, last.scales), f"Tolerances of {study.name}, the cheapest for a {asked}"
+        study, allocated_data(study, originals, last.scales), f"Tolerances of {study.name}, the cheapest for a {goal}"
     )
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))
@@ -163,22 +165,22 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
     free, aim, rounds = model.free, model.aim, list[_Round]()
     settings = range(len(model.task.settings))
     limits = len(model.reached(np.ones(len(model.tolerances)), settings))
-    wanted = np.full((limits, len(settings)), aim.level(aim.asked))
+    targets = np.full((limits, len(settings)), aim.level(aim.goal))
     for _ in range(_MAX_ROUNDS):
         if model.steps:
-            scales, bound = graded(model, wanted)
+            scales, bound = graded(model, targets)
         else:
-            scales, bound = cheapest(model, wanted), np.inf
+            scales, bound = cheapest(model, targets), np.inf
             scales[free] = [model.tolerances[k].rounded(float(scales[k])) for k in free.tolist()]
         again = next((past for past in rounds if model.steps and (scales == past.scales).all()), None)
         if again is not None and any(past.missed().any() for past in rounds):
             break
         if again is None:
             simulated = _simulated(model, scales, method)
-            last = _Round(model, scales, bound, wanted, model.reached(scales, settings), simulated, method)
+            last = _Round(model, scales, bound, targets, model.reached(scales, settings), simulated, method)
             rounds.append(last)
         else:
-            last = replace(again, wanted=wanted)
+            last = replace(again, targets=targets)
         missed = last.missed()
         if missed.any() and last.tightest():
             break
@@ -190,15 +192,15 @@ def _rounds(model: ToleranceModel, method: str) -> list[_Round]:
         wrong = missed | last.idle()
         if not wrong.any():
             break
-        corrected = wanted - np.minimum(last.levels()[1], _LEVEL_STEP) if model.steps else _corrected(rounds)
-        wanted = np.where(wrong, corrected, wanted)
+        corrected = targets - np.minimum(last.levels()[1], _LEVEL_STEP) if model.steps else _corrected(rounds)
+        targets = np.where(wrong, corrected, targets)
     return rounds
 
 
-def _asked(last: _Round) -> str:
+def _goal(last: _Round) -> str:
     """The target in words."""
     aim = last.model.aim
-    return f"{aim.noun} of {float(aim.shown(np.array(aim.asked))):.15g}"
+    return f"{aim.noun} of {float(aim.shown(np.array(aim.goal))):.15g}"
 
 
 def _corrected(rounds: Sequence[_Round]) -> Floats:
@@ -208,16 +210,16 @@ def _corrected(rounds: Sequence[_Round]) -> Floats:
     there are both, the difference between simulation and model is taken to be constant.
     """
     levels, excess = (np.stack(part) for part in zip(*(past.levels() for past in rounds), strict=True))
-    wanted = levels[-1] - excess[-1]
-    for place in np.ndindex(wanted.shape):
+    targets = levels[-1] - excess[-1]
+    for place in np.ndindex(targets.shape):
         model, beyond = levels[:, *place], excess[:, *place]
         kept, broken = model[beyond >= 0], model[beyond < 0]
         if len(kept) and len(broken) and kept.min() > broken.max():
             high, low = kept.min(), broken.max()
             above, below = beyond[model == high][-1], beyond[model == low][-1]
             part = np.clip(below / (below - above), _BRACKET_PART, 1.0 - _BRACKET_PART)
-            wanted[place] = low + part * (high - low)
-    return np.asarray(wanted)
+            targets[place] = low + part * (high - low)
+    return np.asarray(targets)
 
 
 def _simulated(model: ToleranceModel, scales: Floats, method: str) -> Simulated:
@@ -246,14 +248,14 @@ def _shares(model: ToleranceModel, scales: Floats) -> Floats:
 
 def _allocation(last: _Round) -> Table:
     rows = last.model.tolerances
-    given = [tolerance.given for tolerance in rows]
+    before = [tolerance.given for tolerance in rows]
     sizes = [tolerance.size(scale) for tolerance, scale in zip(rows, last.scales.tolist(), strict=True)]
     prices = [np.array([tolerance.price(size) for tolerance, size in zip(rows, widths, strict=True)])
-              for widths in (given, sizes)]  # fmt: skip
+              for widths in (before, sizes)]  # fmt: skip
     names = np.array([tolerance.grade(scale) for tolerance, scale in zip(rows, last.scales.tolist(), strict=True)])
     return ALLOCATION.table(ALLOCATION.columns(
         {}, source=np.array([tolerance.name for tolerance in rows]),
-        kind=np.array([tolerance.kind for tolerance in rows]), given=np.array(given), allocated=np.array(sizes),
+        kind=np.array([tolerance.kind for tolerance in rows]), given=np.array(before), allocated=np.array(sizes),
         unit=np.array([tolerance.unit for tolerance in rows]), **({"grade": names} if last.model.steps else {}),
         cost_given=prices[0], cost_allocated=prices[1],
         share=_shares(last.model, last.scales)[_worst(last.model.aim.level(last.analytic))[1]],
@@ -266,11 +268,11 @@ def _confirmation(last: _Round) -> Table:
     place = np.argmin(aim.level(simulated.value), axis=0), np.arange(len(task.settings))
     value, worst, best, analytic, target = (
         aim.shown(part[place])
-        for part in (simulated.value, simulated.worst, simulated.best, last.analytic, aim.measure(last.wanted))
+        for part in (simulated.value, simulated.worst, simulated.best, last.analytic, aim.measure(last.targets))
     )
     poses = at_poses(task, np.array([setting.pose for setting in task.settings]))
     return CONFIRMATION.table(poses + CONFIRMATION.columns(
-        {}, asked=aim.shown(np.full(len(value), aim.asked)), target=target, analytic=analytic, simulated=value,
+        {}, asked=aim.shown(np.full(len(value), aim.goal)), target=target, analytic=analytic, simulated=value,
         low=worst, high=best, method=np.full(len(value), last.method), evaluations=simulated.evaluations,
         met=np.logical_not(last.missed().any(axis=0)),
     ))  # fmt: skip
@@ -283,21 +285,21 @@ def _ends(last: _Round) -> list[Caution]:
     tight, wide = (f"{factor:g} times the given tolerance" for factor in (TIGHTEST, WIDEST))
     widest = [float(steps[-1]) for steps in model.steps] or model.widest.tolist()
     for place, k in enumerate(free):
-        scale, most, what = float(last.scales[k]), widest[place], ""
+        scale, most, text = float(last.scales[k]), widest[place], ""
         grade = model.tolerances[k].grade(scale)
         if scale < model.tightest[place] * 1.001:
-            what = f"is {f'in the finest grade, {grade}' if grade else f'as tight as allowed, {tight}'}"
+            text = f"is {f'in the finest grade, {grade}' if grade else f'as tight as allowed, {tight}'}"
         elif model.widest[place] == 1.0:
             kept = f"gets a grade within the given tolerance, {grade}" if grade else "keeps the given tolerance"
-            what = "has no influence on the limited errors to the first order, but a wider one breaks the limits; it "
-            what += kept
+            text = "has no influence on the limited errors to the first order, but a wider one breaks the limits; it "
+            text += kept
         elif idle[place]:
             kept = f"the coarsest grade, {grade}" if grade else f"{wide}, the widest allowed"
-            what = f"has no influence on the limited errors; it gets {kept}"
+            text = f"has no influence on the limited errors; it gets {kept}"
         elif scale > most * 0.999:
-            what = f"is {f'in the coarsest grade, {grade}' if grade else f'as wide as allowed, {wide}'}"
-        if what:
-            notes.append(Caution("allocated", f"allocated: '{model.tolerances[k].name}' {what}", "allocation", k))
+            text = f"is {f'in the coarsest grade, {grade}' if grade else f'as wide as allowed, {wide}'}"
+        if text:
+            notes.append(Caution("allocated", f"allocated: '{model.tolerances[k].name}' {text}", "allocation", k))
     held = [t.name for k, t in enumerate(model.tolerances) if model.steps and k not in free]
     if held:
         words = f"allocated: held as given, for grades are of lengths with a tolerance: {', '.join(held)}"
@@ -322,7 +324,7 @@ def _unreachable(last: _Round) -> str:
     held = [k for k, tolerance in enumerate(model.tolerances) if tolerance.cost is None and share[k] > _HELD_SHARE]
     if not question.kept(np.zeros((len(question.channels), 1))).all():
         reason = "the nominal value lies outside its limits"
-    elif linear.shift().any() and (aim.level(centred) >= aim.level(aim.asked)).all():
+    elif linear.shift().any() and (aim.level(centred) >= aim.level(aim.goal)).all():
         reason = "the mean errors, which the width of no tolerance changes, break the limits by themselves"
     elif held:
         held.sort(key=lambda k: -share[k])
@@ -335,7 +337,7 @@ def _unreachable(last: _Round) -> str:
     with_what = "in their finest grades" if model.steps else f"at {TIGHTEST:g} times the given ones"
     reached = f"{aim.in_words(float(last.simulated.value[limit, worst]))} by {last.method} and by the analytic model "
     return (
-        f"allocate: a {aim.noun} of {aim.in_words(aim.asked)} cannot be reached at {model.task.where(pose)}: with all "
+        f"allocate: a {aim.noun} of {aim.in_words(aim.goal)} cannot be reached at {model.task.where(pose)}: with all "
         f"tolerances {with_what} it is {reached}{aim.in_words(float(last.analytic[limit, worst]))}; {reason}"
     )
 
@@ -350,7 +352,7 @@ def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst:
     scales = tightest.copy()
     scales[free] = TIGHTEST
     aim = model.aim
-    if not free or model.steps or (aim.level(model.reached(scales, [worst])) < aim.level(aim.asked)).any():
+    if not free or model.steps or (aim.level(model.reached(scales, [worst])) < aim.level(aim.goal)).any():
         return ""
     instead = f", with 'radial' in place of the fit of {', '.join(fits)}" if fits else ""
     return f"; name {', '.join(names)} in 'cost' to have it allocated too{instead}"

@@ -59,7 +59,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     )  # fmt: skip
     if section.precision is not None:
         task = replace(task, precision=section.precision)
-    found: list[MethodResult] = []
+    results: list[MethodResult] = []
     left: list[Divided] = []
     interrupted = ""
     indices: dict[int, SobolIndices] = {}
@@ -67,44 +67,44 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     try:
         for method in section.methods:
             with apart(left):
-                found.append(with_cycle(methods.run(method, task), task, found))
+                results.append(with_cycle(methods.run(method, task), task, results))
         with apart(left):
             indices = sobol.indices(task, section)
         if left:
             raise left[0]
         allocated = allocate(task, section)
     except Partial as partial:
-        found.append(partial.result)
+        results.append(partial.result)
         interrupted = "interrupted: "
     except KeyboardInterrupt:
-        if not found:
+        if not results:
             raise
         interrupted = "interrupted: "
     counts = {"poses": poses.count}
-    done = [sums for result in found for sums in result.sums.values()]
+    done = [sums for result in results for sums in result.sums.values()]
     if done:
         counts["samples"] = sum(sums.samples for sums in done)
         counts["invalid"] = sum(sums.samples - sums.valid for sums in done)
         if counts["invalid"]:
             words = f"{counts['invalid']} of {counts['samples']} samples cannot be assembled; they count as failures"
             failures.append(Caution("unassembled", words))
-    cycles = [part.cycle.samples for part in found if part.cycle is not None and part.cycle.samples]
+    cycles = [part.cycle.samples for part in results if part.cycle is not None and part.cycle.samples]
     if cycles:
         counts["cycles"] = cycles[0]
     if interrupted:
         interrupted += f"{counts.get('samples', 0)} samples, "
         interrupted += f"{counts['cycles']} whole cycles, " if cycles else ""
-        interrupted += f"{', '.join(part.method for part in found)}"
-    built = [tables.moments(task, found)]
+        interrupted += f"{', '.join(part.method for part in results)}"
+    built = [tables.moments(task, results)]
     if task.question.limited:
-        built += [tables.success(task, found), tables.capability(task, found)]
+        built += [tables.success(task, results), tables.capability(task, results)]
     built += [tables.contributions(task, indices)]
     # Samples of the first method that samples the errors.
-    sampled = next((part.sums for part in found if part.sums), {})
+    sampled = next((part.sums for part in results if part.sums), {})
     built += tables.of_drawn(task, sampled)
     result = Result(
         "reliability", of_poses(built, task.reason) | dict(allocated.tables),
-        [*warnings, *method_warnings(found, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
+        [*warnings, *method_warnings(results, task), *sobol.doubts(task, indices), *failures, *allocated.warnings],
         counts, "; ".join(filter(None, (failed, allocated.failed))), allocated.files, interrupted,
         tables.DrawnErrors(poses, tables.drawn_samples(task, sampled)), reached=bool(failed) or not allocated.failed,
     )  # fmt: skip
@@ -114,9 +114,9 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
 
 
 def first_order_tables(
-    study: Study, poses: Poses, wanted: Collection[str]
+    study: Study, poses: Poses, names: Collection[str]
 ) -> tuple[dict[str, Table], NDArray[np.int8], list[SolvedPoses]]:
-    """The `wanted` tables of the first-order analysis at poses of one or several designs.
+    """The tables `names` of the first-order analysis at poses of one or several designs.
 
     Returns them, why poses fail, and the solved poses.
 
@@ -127,14 +127,14 @@ def first_order_tables(
     """
     task, groups, _ = _first_order(study, poses, find_sources(study, poses)[0])
     results = [MethodResult(normal=(task.linear.shift(), task.linear.covariance()), method="analytic")]
-    if "reliability" in wanted:
+    if "reliability" in names:
         results = [with_cycle(methods.run("analytic", task), task, ())]
-    built = [tables.moments(task, results)] if "moments" in wanted else []
-    if "reliability" in wanted and task.question.limited:
+    built = [tables.moments(task, results)] if "moments" in names else []
+    if "reliability" in names and task.question.limited:
         built.append(tables.success(task, results))
-    if "capability" in wanted and task.question.limited:
+    if "capability" in names and task.question.limited:
         built.append(tables.capability(task, results))
-    if "contributions" in wanted:
+    if "contributions" in names:
         built.append(tables.contributions(task, {}))
     return {table.name: table for table in built}, task.reason, [solved for solved, _ in groups]
 
@@ -204,7 +204,7 @@ def _settings(task: Task, groups: _Groups) -> list[Setting]:
     followed, forces = _followed(task), force_model(task.study, task.poses)
     settings = []
     for solved, rates in groups:
-        by_drives = set(solved.given) == set(mechanism.drives)
+        by_drives = set(solved.names) == set(mechanism.drives)
         for k, row in enumerate(solved.rows.tolist()):
             if not task.assembled[row]:
                 continue

@@ -165,8 +165,8 @@ class ToleranceModel:
         return float(prices.sum()), -np.array([t.cost.exponent for t in free if t.cost is not None]) * prices
 
 
-def cheapest(model: ToleranceModel, wanted: Floats) -> Floats:
-    """Factors of the cheapest tolerances that reach the levels `wanted`, shape (limits, poses); else the tightest."""
+def cheapest(model: ToleranceModel, targets: Floats) -> Floats:
+    """Factors of the cheapest tolerances that reach the levels `targets`, shape (limits, poses); else the tightest."""
     from scipy.optimize import minimize
 
     count = len(model.free)
@@ -174,7 +174,7 @@ def cheapest(model: ToleranceModel, wanted: Floats) -> Floats:
     every = range(len(model.task.settings))
 
     def margins(x: Floats, which: Sequence[int]) -> Floats:
-        return model.aim.level(model.reached(model.scales(x), which)) - wanted[:, list(which)]
+        return model.aim.level(model.reached(model.scales(x), which)) - targets[:, list(which)]
 
     def flat(x: Floats, which: Sequence[int]) -> Floats:
         return margins(x, which).ravel()

@@ -81,7 +81,7 @@ class Elasticity:
     """
 
     mechanism: Mechanism
-    asked: Body
+    question: Body
     load: Floats
     ends: Mapping[tuple[str, int], str]
     pins: Mapping[int, tuple[str, ...]]
@@ -111,21 +111,21 @@ class Elasticity:
         flexibility = np.zeros((len(channels), 3, *configuration.shape))
         deflected = [(k, channel.coordinate) for k, channel in enumerate(channels)
                      if isinstance(channel, CoordinateChannel) and self.knows(channel)]  # fmt: skip
-        assembled = np.flatnonzero(np.isfinite(configuration.point(self.asked.given.at)))
+        assembled = np.flatnonzero(np.isfinite(configuration.point(self.question.given.at)))
         flexibility[:, :, np.setdiff1d(np.arange(configuration.shape[0]), assembled)] = np.nan
         if len(assembled):
             part = configuration.take(assembled)
-            rates, held = self._rates(part, self.asked if poses is None else self.asked.take(poses[assembled]))
+            rates, held = self._rates(part, self.question if poses is None else self.question.take(poses[assembled]))
             for k, coordinate in deflected:
-                moved = np.broadcast_to(first(part, coordinate, rates), (self.asked.size, len(assembled)))
-                flexibility[k, : self.asked.size, assembled] = np.where(held, moved, np.nan).T
+                moved = np.broadcast_to(first(part, coordinate, rates), (self.question.size, len(assembled)))
+                flexibility[k, : self.question.size, assembled] = np.where(held, moved, np.nan).T
         return Elastic(flexibility, self.load if poses is None else _of_poses(self.load, poses))
 
-    def _rates(self, configuration: Configuration, asked: Body) -> tuple[Rates, Flags]:
+    def _rates(self, configuration: Configuration, question: Body) -> tuple[Rates, Flags]:
         """Displacements by unit loads, which are the leading axis, and whether poses hold them."""
-        loaded = by_forces(asked, configuration)
+        loaded = by_forces(question, configuration)
         moved, held = loaded.displacements, np.asarray(np.isfinite(loaded.held.compliance).all(axis=(1, 2)))
-        origin = configuration.point(asked.given.at)
+        origin = configuration.point(question.given.at)
         graph, places = self.mechanism.graph, configuration.nodes
 
         def shift(node: int, vertex: str) -> Value:
@@ -166,8 +166,8 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
-    asked, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
-    network, graph, links = asked.network, mechanism.graph, mechanism.description.links
+    question, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
+    network, graph, links = question.network, mechanism.graph, mechanism.description.links
     ends = {(GROUND, graph.node(point)): "" for point in links[GROUND].points}
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
     for link, points in network.points.items():
@@ -182,11 +182,11 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     pins: dict[int, tuple[str, ...]] = {node: (vertex,) for (_, node), vertex in reversed(ends.items())}
     if stiffness.at == stiffness.point:
         pins[graph.node(stiffness.at)] = (network.asked,)
-    for point, meant in links_meant(section, stiffness, graph).items():
+    for point, owners in links_meant(section, stiffness, graph).items():
         node = graph.node(point)
-        if point in stiffness.bearings and (len(meant) == 1 or point != stiffness.at):
-            pins[node] = (ends[meant[0], node],) if len(meant) == 1 else network.pin(point) or pins[node]
-    return Elasticity(mechanism, asked, load, ends, pins, bodies, lines), notes
+        if point in stiffness.bearings and (len(owners) == 1 or point != stiffness.at):
+            pins[node] = (ends[owners[0], node],) if len(owners) == 1 else network.pin(point) or pins[node]
+    return Elasticity(mechanism, question, load, ends, pins, bodies, lines), notes
 
 
 def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> list[Caution]:
@@ -200,7 +200,7 @@ def cautions(study: Study, loaded: Elasticity, channels: Sequence[Channel]) -> l
             f"the deflection under the load is not known of {', '.join(lost)}: their errors are those of the unloaded "
             "mechanism",
         ))  # fmt: skip
-    graph, section = loaded.mechanism.graph, loaded.asked.given
+    graph, section = loaded.mechanism.graph, loaded.question.given
     for point, links in links_meant(study.reliability, section, graph).items():
         about = [channel.name for channel in positions if ("", graph.node(point)) in channel.coordinate.ends]
         if about and len(links) > 1 and point in section.bearings and point != section.at:

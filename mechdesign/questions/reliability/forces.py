@@ -45,8 +45,8 @@ def kinds_of_forces(study: Study) -> dict[str, str]:
         return {}
     kinds = column_kinds(mechanism, study.dynamics.joints(mechanism), moving=True)
     names = dict.fromkeys([*(section.outputs or ()), *section.limits])
-    known = {*mechanism.coordinates, *mechanism.points}
-    return {name: kinds[name] for name in names if name in kinds and name not in known}
+    coordinates = {*mechanism.coordinates, *mechanism.points}
+    return {name: kinds[name] for name in names if name in kinds and name not in coordinates}
 
 
 def pace(study: Study) -> MotionSection:
@@ -103,13 +103,13 @@ class ForceModel:
         """The model of made mechanisms, from deviations of parameters by their `FOLLOWED` names."""
         if not deviations:
             return self
-        known, parameters = self.question.study.parameters.nominal, self.question.study.parameters
-        given: dict[str, Number] = {name: self.parameters[name] for name in self.changed if name in self.parameters}
+        nominal, parameters = self.question.study.parameters.nominal, self.question.study.parameters
+        changed: dict[str, Number] = {name: self.parameters[name] for name in self.changed if name in self.parameters}
         for key, deviation in deviations.items():
             name = key.removeprefix(FOLLOWED)
-            given[name] = self.parameters.get(name, known[name]) + deviation
-        values = parameters.values(given)
-        moved = {name: np.asarray(values[name]) for name in parameters.moved(given)}
+            changed[name] = self.parameters.get(name, nominal[name]) + deviation
+        values = parameters.values(changed)
+        moved = {name: np.asarray(values[name]) for name in parameters.moved(changed)}
         return replace(self, parameters={**self.parameters, **moved})
 
     def values(self, names: Sequence[str], linear: Linearization, rates: DriveRates) -> list[Value]:
@@ -121,8 +121,8 @@ class ForceModel:
         nominal = self.question.study.parameters.nominal
         poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
-        found = self.question.values(names, poses, linear, slice(None), moving)
-        return [np.where(held, value, np.nan) for value in found]
+        columns = self.question.values(names, poses, linear, slice(None), moving)
+        return [np.where(held, value, np.nan) for value in columns]
 
     @quiet
     def slopes(

@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 
 
 class Graded(NamedTuple):
-    """Factors of all tolerances, and a lower bound of the cost of any choice that reaches the wanted levels."""
+    """Factors of all tolerances, and a lower bound of the cost of any choice that reaches the target levels."""
 
     scales: Floats
     bound: float
@@ -40,8 +40,8 @@ class Graded(NamedTuple):
 class _Choices:
     """Choices of grades, shape (choices, free): for each free tolerance the index of its grade, 0 for the finest."""
 
-    def __init__(self, model: ToleranceModel, wanted: Floats) -> None:
-        self.model, self.wanted = model, wanted
+    def __init__(self, model: ToleranceModel, targets: Floats) -> None:
+        self.model, self.targets = model, targets
         free = [model.tolerances[k] for k in model.free]
         self.costs = [np.array([tolerance.price(tolerance.given * scale) for scale in steps.tolist()])
                       for tolerance, steps in zip(free, model.steps, strict=True)]  # fmt: skip
@@ -61,13 +61,13 @@ class _Choices:
         """Which choices reach the wanted levels by the model, shape (choices,)."""
         every = range(len(self.model.task.settings))
         levels = self.model.aim.level(self.model.reached(self.scales(choices), every))
-        short = levels.reshape(len(self.wanted), len(choices), -1) < self.wanted[:, None]
+        short = levels.reshape(len(self.targets), len(choices), -1) < self.targets[:, None]
         return np.asarray(~short.any(axis=(0, 2)))
 
 
-def graded(model: ToleranceModel, wanted: Floats) -> Graded:
-    """The cheapest choice that reaches the levels `wanted`, shape (limits, poses); the finest where none does."""
-    choices = _Choices(model, wanted)
+def graded(model: ToleranceModel, targets: Floats) -> Graded:
+    """The cheapest choice that reaches the levels `targets`, shape (limits, poses); the finest where none does."""
+    choices = _Choices(model, targets)
     finest = np.zeros((1, len(model.free)), dtype=np.intp)
     if not choices.reach(finest)[0]:
         return Graded(choices.scales(finest)[:, 0], float(choices.cost(finest)[0]))
@@ -148,7 +148,7 @@ def _conditions(choices: _Choices) -> tuple[list[Floats], Floats]:
     variances: list[list[Floats]] = [[] for _ in free]
     most = []
     for k, (output, low, high) in enumerate(bands):
-        level = choices.wanted[min(k, len(choices.wanted) - 1)]
+        level = choices.targets[min(k, len(choices.targets) - 1)]
         widest = model.aim.widest(low - mean[output], high - mean[output], level)
         held = parts[output].sum(axis=0) - parts[output][free].sum(axis=0)
         most.append(widest**2 * (1.0 + _ROUNDING) - held)

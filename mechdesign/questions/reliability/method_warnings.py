@@ -18,17 +18,17 @@ from mechdesign.questions.reliability.task import MethodResult, Task
 _NEAR = 4.75
 
 
-def method_warnings(found: Sequence[MethodResult], task: Task) -> list[Caution]:
+def method_warnings(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     """Warnings about the results of the methods."""
     return [
-        *_outside(task), *disagreements(found, task), *_unseen(found, task), *_unreached(found, task),
-        *_pointless(found, task), *_not_assembled(found, task), *_unassembled(found), *_of_cycles(found, task),
+        *_outside(task), *disagreements(results, task), *_unseen(results, task), *_unreached(results, task),
+        *_pointless(results, task), *_not_assembled(results, task), *_unassembled(results), *_of_cycles(results, task),
     ]  # fmt: skip
 
 
 def _outside(task: Task) -> list[Caution]:
     """Warnings of nominal values outside their own limits, each at its farthest pose."""
-    found = []
+    cautions = []
     for limit, band in zip(task.question.bands, task.question.at(task.nominal).bands, strict=True):
         beyond = np.where(task.assembled & limit.absolute, np.maximum(band.low, -band.high), 0.0)
         poses = np.flatnonzero(beyond > 0)
@@ -41,13 +41,13 @@ def _outside(task: Task) -> list[Caution]:
         if not np.isfinite(low) or not np.isfinite(high):
             between = f"at least {low:.6g}" if np.isfinite(low) else f"at most {high:.6g}"
         several = f" (the farthest of {len(poses)} poses)" if len(poses) > 1 else ""
-        found.append(Caution(
+        cautions.append(Caution(
             "suspect",
             f"{task.question.channels[band.output].name}: the nominal value {value:.6g} at {task.where(pose)}{several} "
             f"lies outside its limits, {between}{f' {unit}' if unit else ''}",
             pose=task.where(pose),
         ))  # fmt: skip
-    return found
+    return cautions
 
 
 def disagreements(results: Sequence[MethodResult], task: Task) -> list[Caution]:
@@ -94,11 +94,11 @@ def _unseen(results: Sequence[MethodResult], task: Task) -> list[Caution]:
     return [
         Caution(
             "unconverged",
-            f"{method}: no failure in {estimate.samples} {what} {where}: the probability of failure is below "
+            f"{method}: no failure in {estimate.samples} {noun} {where}: the probability of failure is below "
             f"{estimate.high:.2g}",
             "reliability",
         )
-        for method, estimate, what, where in cases
+        for method, estimate, noun, where in cases
     ]
 
 
@@ -117,15 +117,15 @@ def _unreached(results: Sequence[MethodResult], task: Task) -> list[Caution]:
         return []
     pose = max(short, key=short.__getitem__)
     if precision.half_width is None:
-        asked, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
-        what = "the coefficient of variation"
+        goal, there = (f"{100 * (part or 0.0):.3g} %" for part in (precision.relative, short[pose]))
+        measure = "the coefficient of variation"
     else:
-        asked, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
-        what = "half the interval"
+        goal, there = (f"{part:.3g}" for part in (precision.half_width, short[pose]))
+        measure = "half the interval"
     others = f" (the worst of {len(short)} poses)" if len(short) > 1 else ""
     return [Caution(
         "unconverged",
-        f"auto: {what} is {there} at {task.where(pose)}{others}, not the {asked} asked; it ends at {task.most} "
+        f"auto: {measure} is {there} at {task.where(pose)}{others}, not the {goal} asked; it ends at {task.most} "
         "samples, which reliability.samples sets",
         "reliability", pose=task.where(pose),
     )]  # fmt: skip

@@ -187,9 +187,9 @@ def uncorrelated(sources: Sources) -> set[str]:
     return {s.name for s, single in zip(sources.scalars, alone, strict=True) if single} | {p.name for p in sources.pins}
 
 
-def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[Caution]:
+def doubts(task: Task, indices: Mapping[int, SobolIndices]) -> list[Caution]:
     """Warnings of sources without indices, and of points that are left out."""
-    if not found:
+    if not indices:
         return []
     notes = []
     alone = uncorrelated(task.sources)
@@ -197,7 +197,7 @@ def doubts(task: Task, found: Mapping[int, SobolIndices]) -> list[Caution]:
     if bound:
         words = f"Sobol' indices are of what varies by itself: {', '.join(bound)} are correlated and have none"
         notes.append(Caution("incomplete", words, "contributions"))
-    pose, worst = max(found.items(), key=lambda item: item[1].invalid)
+    pose, worst = max(indices.items(), key=lambda item: item[1].invalid)
     if worst.invalid:
         notes.append(Caution(
             "unassembled",

@@ -57,10 +57,10 @@ def _with_moments(task: Task, results: Sequence[MethodResult]) -> Sequence[Metho
 
 def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     """Mean and standard deviation of every output and order at every pose."""
-    known = _with_moments(task, results)
-    means, covariances = zip(*(result.moments(task) for result in known), strict=True)
+    results = _with_moments(task, results)
+    means, covariances = zip(*(result.moments(task) for result in results), strict=True)
     scale, linear = task.scale[:, None], task.linear
-    shape = (task.poses.count, len(known), len(scale))
+    shape = (task.poses.count, len(results), len(scale))
     pose, method, channel = (index.ravel() for index in np.indices(shape))
     mean = np.stack(means)[method, channel, pose] * scale[channel, 0]
     variance = np.stack(covariances)[method, pose, channel, channel]
@@ -68,7 +68,7 @@ def moments(task: Task, results: Sequence[MethodResult]) -> Table:
     nominal = (task.nominal * scale)[channel, pose]
     low, high = linear.worst_ends()
     return MOMENTS.table(at_poses(task, pose) + MOMENTS.columns(
-        {}, method=np.array([result.method for result in known])[method], **_channels(task, channel), nominal=nominal,
+        {}, method=np.array([result.method for result in results])[method], **_channels(task, channel), nominal=nominal,
         mean=nominal + mean, sigma=sigma, worst_case=(linear.worst_case() * scale)[channel, pose],
         worst_low=(low * scale)[channel, pose], worst_high=(high * scale)[channel, pose],
         unit=task.labels[2][channel], valid=task.reason[pose] == 0,
@@ -125,12 +125,12 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
 
     Limits of an error are added to the nominal value.
     """
-    known, question = _with_moments(task, results), task.question.at(task.nominal)
+    results, question = _with_moments(task, results), task.question.at(task.nominal)
     single, rows, bands = task.question.single, [band.output for band in question.bands], len(question.bands)
-    shape = (task.poses.count, len(known), len(single))
+    shape = (task.poses.count, len(results), len(single))
     pose, method, limit = (index.ravel() for index in np.indices(shape))
     scale = task.scale[rows]
-    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in known), strict=True))
+    means, covariances = (np.stack(part) for part in zip(*(result.moments(task) for result in results), strict=True))
     # Circles have no value and no limits of a value: nan.
     nominal, mean, sigma, low, high = np.full((5, *shape), np.nan)
     nominal[..., :bands] = (task.nominal[rows].T * scale)[:, None]
@@ -145,7 +145,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     upper = np.where(np.isfinite(high), nominal + high, np.nan)
     for k, disc in enumerate(question.discs, bands):
         upper[..., k] = np.reshape(disc.radius, (-1, 1))
-    estimates = [_by_limit(task, result, single) for result in known]
+    estimates = [_by_limit(task, result, single) for result in results]
     failure, least, most = (
         np.array([[[getattr(by_pose.get(row, _UNKNOWN), name) for by_pose in limits] for limits in estimates]
                   for row in range(len(nominal))])
@@ -154,7 +154,7 @@ def capability(task: Task, results: Sequence[MethodResult]) -> Table:
     output, order, unit = (label[rows + [disc.x for disc in question.discs]] for label in task.labels)
     output = np.array([*output[:bands], *(name.rpartition(".")[0] for name in output[bands:])])
     return CAPABILITY.table(at_poses(task, pose) + CAPABILITY.columns(
-        {}, method=np.array([result.method for result in known])[method], output=output[limit], order=order[limit],
+        {}, method=np.array([result.method for result in results])[method], output=output[limit], order=order[limit],
         lsl=np.where(np.isfinite(low), nominal + low, np.nan).ravel(), usl=upper.ravel(), nominal=nominal.ravel(),
         mean=(nominal + mean).ravel(), sigma=sigma.ravel(), cp=cp.ravel(), cpk=cpk.ravel(),
         sigma_level=_sigma_level(failure).ravel(), ppm=1e6 * failure.ravel(), ppm_low=1e6 * least.ravel(),
@@ -196,12 +196,12 @@ def contributions(task: Task, indices: Mapping[int, SobolIndices]) -> Table:
     ))  # fmt: skip
 
 
-def _index_values(found: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
+def _index_values(by_pose: Mapping[int, SobolIndices], shape: tuple[int, ...]) -> dict[str, Floats]:
     """``sobol_first``, ``sobol_first_low`` ... of all poses, channels and sources; none where not asked."""
     columns: dict[str, Floats] = {}
-    for kind in ("first", "total") if found else ():
+    for kind in ("first", "total") if by_pose else ():
         values = np.full((3, *shape), np.nan)
-        for pose, indices in found.items():
+        for pose, indices in by_pose.items():
             values[:, pose] = getattr(indices, kind)
         columns |= {f"sobol_{kind}{end}": part.ravel() for end, part in zip(("", "_low", "_high"), values, strict=True)}
     return columns

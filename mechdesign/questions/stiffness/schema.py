@@ -198,18 +198,20 @@ class StiffnessSection(PoseSection):
         """Also check names and the units of stiffnesses; loads get three numbers."""
         root: KeyPath = ("stiffness",)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
-        right = checker.known(self.at, [*owners, *ends], "point", (*root, "at"))
+        right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))
         if right and GROUND in (owners[self.at] if self.bearer is None else [self.bearer]):
             checker.report((*root, "at"), f"point {self.at!r} belongs to the ground and does not move")
-        if self.link is not None and checker.known(self.link, checker.mechanism.moving, "moving link", (*root, "link")):
+        if self.link is not None and checker.check_name(
+            self.link, checker.mechanism.moving, "moving link", (*root, "link")
+        ):
             points = checker.mechanism.points_of(self.link)
             if right and self.at not in points and self.at != f"{self.link}.{self.point}":
                 message = f"link {self.link!r} has no point {self.at!r}; it has {', '.join(points)}"
                 checker.report((*root, "at"), message)
         for link, profile in self.elastic.items():
             path: KeyPath = (*root, "elastic", link)
-            checker.known(link, checker.mechanism.moving, "moving link", path, at_key=True)
-            checker.known(profile, self.sections, "section", path)
+            checker.check_name(link, checker.mechanism.moving, "moving link", path, at_key=True)
+            checker.check_name(profile, self.sections, "section", path)
         named = [*self.elastic.values(), *checker.choices()]
         for profile in self.sections:
             if profile not in named:
@@ -217,14 +219,14 @@ class StiffnessSection(PoseSection):
                 checker.reporter.unused((*root, "sections", profile), "section", others)
         for drive in self.actuators:
             path = (*root, "actuators", drive)
-            if checker.known(drive, checker.mechanism.driven_kinds, "drive", path, at_key=True):
+            if checker.check_name(drive, checker.mechanism.driven_kinds, "drive", path, at_key=True):
                 checker.kind(path, _STIFFNESS_KINDS[checker.mechanism.driven_kinds[drive]])
         slides = [*checker.mechanism.slides, *checker.mechanism.legs]
         clamped = [set(other.fixed) for other in checker.mechanism.joints.values() if other.fixed is not None]
         pins = [p for p, owners in checker.mechanism.owners.items() if len(owners) > 1 and set(owners) not in clamped]
         for joint, bearing in self.bearings.items():
             path = (*root, "bearings", joint)
-            if not checker.known(joint, [*pins, *slides], "pin or slide", path, at_key=True):
+            if not checker.check_name(joint, [*pins, *slides], "pin or slide", path, at_key=True):
                 continue
             if bearing.radial is not None:
                 checker.kind((*path, "radial"), "stiffness")

@@ -23,16 +23,16 @@ def workspace(study: Study, *, seed: int | None = None, jobs: int | None = 1, pr
     section = study.workspace
     if section is not None and study.mechanism.mobility == 1:
         return point_path(study)
-    asked = questions(study)
+    all_questions = questions(study)
     assert section is not None
-    progress.start(len(asked), "regions")
+    progress.start(len(all_questions), "regions")
     regions: list[Reached] = []
-    for question in asked:
+    for question in all_questions:
         regions.append(reach(question))
         progress.update(1)
     full = [region for region in regions if region.boundary is not None]
     if not full:
-        raise unreachable(study, asked)
+        raise unreachable(study, all_questions)
     warnings = [caution for row, region in enumerate(regions) for caution in remarks(study, region, row)]
     counts = {"regions": len(regions), "empty": len(regions) - len(full)}
     ranged = next((name for name, values in section.at.items() if isinstance(values, Over)), "")

@@ -110,9 +110,9 @@ def area_in_any_assembly(question: Question) -> float:
         return 0.0
 
 
-def areas(question: Question, given: Evaluation, parts: Sequence[Panels]) -> list[float]:
+def areas(question: Question, evaluation: Evaluation, parts: Sequence[Panels]) -> list[float]:
     """Area of each piece of a single design's region; `parts` are the panels of each."""
-    whole = float(given.values["area"][0])
+    whole = float(evaluation.values["area"][0])
     if len(parts) == 1:
         return [whole]
     none = np.zeros((0, 1), dtype=bool)

@@ -62,5 +62,5 @@ def ellipses(field: Field, patches: Sequence[Patch]) -> Ellipses | None:
             break
     local = Local.at(field, places, {})
     matrices = replace(local, entries=local.homogeneous).matrix
-    known = np.isfinite(matrices).all(axis=(1, 2))
-    return Ellipses(places[known], matrices[known], spacing)
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    return Ellipses(places[finite], matrices[finite], spacing)

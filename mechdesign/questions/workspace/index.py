@@ -83,7 +83,7 @@ def prepare(study: Study, names: Sequence[str]) -> tuple[Prepared, ...]:
     StudyError
         If the study lacks what one of them needs.
     """
-    return tuple(Prepared(name, each, each.prepare(study)) for name in names for each in (indices.index(name),))
+    return tuple(Prepared(name, index, index.prepare(study)) for name in names for index in (indices.index(name),))
 
 
 def of_jacobian(evaluate: Evaluate) -> Callable[[Study], Evaluate]:
@@ -130,10 +130,10 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     if not (section.elastic or section.actuators or section.bearings):
         message = "indices of stiffness need something that gives: elastic links, actuators or bearings"
         raise StudyError((study.problem(message, "stiffness"),))
-    asked = ask(study)
+    question = ask(study)
 
     def evaluate(configuration: Configuration) -> Floats:
-        soft = hold(asked, configuration)[0].compliance
+        soft = hold(question, configuration)[0].compliance
         with np.errstate(divide="ignore", invalid="ignore"):
             values = value(soft)
         return np.where(np.isnan(soft).any(axis=(1, 2)), free, values)

@@ -22,12 +22,12 @@ class Local(Jacobian):
     known: dict[str, Value] = field(default_factory=dict)
 
     @staticmethod
-    def at(seen: Field, z: Complexes, places: Places) -> Local:
+    def at(field: Field, z: Complexes, places: Places) -> Local:
         """What local indices at points `z` are computed from."""
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            configuration = seen.configuration(z, places)
+            configuration = field.configuration(z, places)
             jacobian = Jacobian.of(
-                seen.mechanism.linearize(configuration), seen.outputs, places.get(LENGTH, seen.length)
+                field.mechanism.linearize(configuration), field.outputs, places.get(LENGTH, field.length)
             )
             # Of a table on two slides they are the same everywhere.
             entries, homogeneous = (

@@ -64,7 +64,7 @@ class Peaks:
 
         Of shape (integrands, designs).
         """
-        grows = [each.power * self.order[self.names.index(each.index.name)] >= 1 for each in integrands]
+        grows = [integrand.power * self.order[self.names.index(integrand.index.name)] >= 1 for integrand in integrands]
         return np.array(grows, dtype=bool).reshape(-1, self.order.shape[1])
 
     def of(self, name: str, kind: str) -> tuple[Floats, Floats]:
@@ -79,7 +79,7 @@ Places = NDArray[Any]
 
 
 def find_peaks(
-    panels: Panels, indices: Sequence[Prepared], tolerance: float, wanted: Flags, *, squares: bool
+    panels: Panels, indices: Sequence[Prepared], tolerance: float, searched: Flags, *, squares: bool
 ) -> Peaks:  # fmt: skip
     """Extremes of indices over the regions.
 
@@ -87,23 +87,23 @@ def find_peaks(
     ----------
     tolerance : float
         Relative accuracy at which the search ends.
-    wanted : ndarray of bool, shape (2, indices)
-        Whether the infimum, and the supremum of each index is searched for; else only its order is found.
+    searched : ndarray of bool, shape (2, indices)
+        Whether the infimum, and the supremum of each index is searched for; else only its order is computed.
     squares : bool
         Whether squares of indices are integrated. Without these an integral may be infinite only where an index grows
-        without bound at a crossing: else, and where no extreme is wanted, nothing is looked for.
+        without bound at a crossing: else, and where no extreme is searched for, nothing is computed.
     """
     count, names = len(panels.closes), [index.name for index in indices]
     shape = (len(indices), count)
     value, order = np.stack([np.full(shape, np.inf), np.full(shape, -np.inf)]), np.zeros(shape)
-    if not wanted.any() and not squares and all(index.index.crossing != np.inf for index in indices):
+    if not searched.any() and not squares and all(index.index.crossing != np.inf for index in indices):
         return Peaks(names, value, np.zeros(value.shape), order)
     _at_ends(panels, indices, value, order)
     places, local = _grid(panels)
     _at_crossings(indices, places["design"], local, value, order)
     error = np.zeros(value.shape)
     lanes = []
-    for sense, k in np.argwhere(wanted):
+    for sense, k in np.argwhere(searched):
         start = _best(places["design"], (2 * sense - 1) * np.asarray(indices[k].values(local)), count)
         # What lies at the bound of the index already needs no search.
         design = np.flatnonzero((start >= 0) & (value[sense, k] != indices[k].index.bounds[sense]))
@@ -147,8 +147,8 @@ def _at_crossings(indices: Sequence[Prepared], design: Ints, local: Local, value
     determinant = np.broadcast_to(local.determinant, design.shape)
     count = value.shape[-1]
     crossed, size = np.ones(count, dtype=bool), np.zeros(count)
-    known = np.flatnonzero(np.isfinite(determinant))
-    np.maximum.at(size, design[known], np.abs(determinant[known]))
+    finite = np.flatnonzero(np.isfinite(determinant))
+    np.maximum.at(size, design[finite], np.abs(determinant[finite]))
     for sign in (1, -1):
         crossed &= np.bincount(design[sign * determinant > ROUNDING * size[design]], minlength=count) > 0
     for k, index in enumerate(indices):

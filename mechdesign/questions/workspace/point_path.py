@@ -154,8 +154,8 @@ def _paths(study: Study, drive: str, outputs: tuple[str, str]) -> list[_Path]:
         # Once round only: each is met twice.
         paths = [p for p in paths if drawn - 2 * np.pi < p.low <= drawn and p.high < drawn + 2 * np.pi]
     own = [p for p in paths if p.low <= drawn <= p.high]
-    wanted = study.workspace is not None and study.workspace.assembly == "same"
-    return own[:1] if own and wanted else paths
+    same_assembly = study.workspace is not None and study.workspace.assembly == "same"
+    return own[:1] if own and same_assembly else paths
 
 
 def _range(study: Study, drive: str) -> tuple[float, float]:

@@ -110,19 +110,19 @@ def integrate(
     cells["low_slot"] = cells["high_slot"] = -1
     cells["counted"] = (middle > counted[0]) & (middle < counted[1])
     cells["share"] = (1 / np.maximum(np.bincount(panels.design, minlength=count), 1))[panels.design]
-    each = np.where(endless, np.inf, tolerance)
+    tolerances = np.where(endless, np.inf, tolerance)
     of_area = min(AREA * tolerance, FINEST_AREA)
 
-    def wanted(total: Floats) -> Floats:
+    def allowance(total: Floats) -> Floats:
         with np.errstate(invalid="ignore"):
             area = np.maximum(of_area * total[:2], of_area * SLIVER * whole)
-            return np.concatenate([area, np.where(endless, np.inf, np.fmax(each * total[2:], 0.0))])
+            return np.concatenate([area, np.where(endless, np.inf, np.fmax(tolerances * total[2:], 0.0))])
 
     first = Fan.of(panels, integrands, cells)
-    new = first.integrals(integrands, np.full_like(each, np.inf))
+    new = first.integrals(integrands, np.full_like(tolerances, np.inf))
     total, doubt = new.of_designs(count)
-    allowed = ALONG * np.maximum(wanted(total)[2:], np.finfo(float).tiny)
-    rough = np.asarray((doubt > wanted(total))[2:].any(axis=0))
+    allowed = ALONG * np.maximum(allowance(total)[2:], np.finfo(float).tiny)
+    rough = np.asarray((doubt > allowance(total))[2:].any(axis=0))
     tips = isotropic_points(panels, cells, first.strips, rough[cells["design"]])
     plain = np.ones(len(cells), dtype=bool)
     plain[tips["cell"]] = False
@@ -133,7 +133,7 @@ def integrate(
     for _ in range(MOST_PASSES):
         owner = done.cells["design"]
         total, doubt = done.of_designs(count)
-        most, number = wanted(total), np.bincount(owner, minlength=count)
+        most, number = allowance(total), np.bincount(owner, minlength=count)
         late = (doubt > most).any(axis=0) & (number < MOST_CELLS)
         # What is left of errors along rays looks like roughness in the angle: they get smaller with the cells.
         allowed = np.where(late, LESS, 1.0) * allowed

@@ -71,19 +71,19 @@ class Question(Region):
     @property
     def integrands(self) -> list[Integrand]:
         """What the wanted means and standard deviations need: the indices, and their squares."""
-        wanted = self.statistics.values()
+        statistics = self.statistics.values()
         return [
             Integrand(index, power)
             for power, kinds in ((1, ("mean", "std")), (2, ("std",)))
             for index in self.indices
-            if any((index.name, kind) in wanted for kind in kinds)
+            if any((index.name, kind) in statistics for kind in kinds)
         ]
 
     @property
     def extremes(self) -> Flags:
         """Whether the infimum, and the supremum of each index is wanted, shape (2, indices)."""
-        wanted = self.statistics.values()
-        return np.array([[(index.name, kind) in wanted for index in self.indices] for kind in ("min", "max")])
+        statistics = self.statistics.values()
+        return np.array([[(index.name, kind) in statistics for index in self.indices] for kind in ("min", "max")])
 
 
 def columns(names: Iterable[str]) -> tuple[str, ...]:
@@ -99,9 +99,9 @@ def split(column: str) -> tuple[str, str]:
     return (name, kind) if kind in STATISTICS and name in INDEX_NAMES else ("", "")
 
 
-def shared(study: Study, asked: Sequence[Question], moved: Collection[str]) -> bool:
+def shared(study: Study, questions: Sequence[Question], moved: Collection[str]) -> bool:
     """Whether designs that differ in these parameters share the questions, but for what their fields take as arrays."""
-    field = asked[0].field
+    field = questions[0].field
     of_field = ("workspace.characteristic_length", *(() if field.plan.iterative else ("workspace.at.",)))
     numbers = [part for key, part in parts_of(study.workspace, "workspace") if not key.startswith(of_field)]
     followed = {name for part in numbers if isinstance(part, Amount) and part.expression
@@ -162,8 +162,8 @@ def _over_range(
     assert study.workspace is not None
     for column in wanted:
         if column not in OF_RANGE:
-            known = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
-            raise problem(study, "at", f"{column} has no value: {known}; ask for single values: at: {{{name}: [...]}}")
+            only = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
+            raise problem(study, "at", f"{column} has no value: {only}; ask for single values: at: {{{name}: [...]}}")
     # Only the area is asked, in which angles and lengths do not mix.
     update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
               "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip

@@ -155,10 +155,10 @@ class Ranged(Field):
         """Row, stretch, height, value of the range, and margins of the extremes near the highest samples."""
         every = isinstance(self, Every)
         row, node, lane = _peaks(height, FAR[every])
-        each, own = np.arange(len(row)), samples.only(lane)
+        peak, own = np.arange(len(row)), samples.only(lane)
 
         def highest(near: Floats, low: Floats | float, high: Floats | float) -> tuple[Floats, Floats, Ints]:
-            return _highest(-near[row, :, each].T[None] if every else near, low, high)
+            return _highest(-near[row, :, peak].T[None] if every else near, low, high)
 
         middle = np.clip(node, 1, SAMPLES - 2)
         place = highest(np.stack([margins[:, middle + k, lane] for k in (-1, 0, 1)], axis=1), -1.0, 1.0)[0]
@@ -168,7 +168,7 @@ class Ranged(Field):
         place, _, names = highest(near, np.maximum(first, -2), np.minimum(last, 2))
         at = own.value(np.where(place <= first, 0, np.where(place >= last, SAMPLES - 1, centre + CLOSE * place)))
         there = self.at(z[lane], at)
-        top = _known(-there[row, each]) if every else _smallest(there)
+        top = _known(-there[row, peak]) if every else _smallest(there)
         return row, lane, top, at, names
 
 
@@ -309,8 +309,8 @@ def _highest(y: Floats, low: Floats | float, high: Floats | float) -> tuple[Floa
     y : ndarray, shape (parabolas, 3, n)
         The parabolas at -1, 0 and 1; one that is unknown there does not count.
     """
-    known = np.isfinite(y).all(axis=1)
-    before, a, after = (np.where(known, y[:, k], HIGH) for k in range(3))
+    finite = np.isfinite(y).all(axis=1)
+    before, a, after = (np.where(finite, y[:, k], HIGH) for k in range(3))
     b, c = 0.5 * (after - before), 0.5 * (after + before) - a
     least = np.minimum(np.minimum(before, a), after)
     rival = np.argsort(least, axis=0)[:RIVALS]

@@ -70,20 +70,20 @@ def reach(question: Question) -> Reached:
     singular = not ranged and question.field.singular_everywhere
     if singular:
         question = replace(question, field=replace(question.field, same_assembly=False))
-        given = answer(replace(question, indices=(), wanted=OF_RANGE), {}, 1, SINGLE)
+        evaluation = answer(replace(question, indices=(), wanted=OF_RANGE), {}, 1, SINGLE)
         nothing = {name: np.full(1, np.nan) for name in question.wanted}
-        given = replace(given, values=nothing | given.values, errors=nothing | given.errors)
+        evaluation = replace(evaluation, values=nothing | evaluation.values, errors=nothing | evaluation.errors)
     else:
-        given = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)
+        evaluation = answer(question, {}, 1, OVER_RANGE if ranged else SINGLE)
     everywhere = 0.0 if ranged else area_in_any_assembly(question)
-    if not given.panels.closes[0] or given.pieces is None:
-        return Reached(question, given, singular, everywhere=everywhere)
-    field, parts = question.field, list(given.pieces.all())
-    pieces = areas(question, given, parts)
-    patches = patches_of_pieces(given.pieces.panels, parts, question.rays or RAYS)
+    if not evaluation.panels.closes[0] or evaluation.pieces is None:
+        return Reached(question, evaluation, singular, everywhere=everywhere)
+    field, parts = question.field, list(evaluation.pieces.all())
+    pieces = areas(question, evaluation, parts)
+    patches = patches_of_pieces(evaluation.pieces.panels, parts, question.rays or RAYS)
     reasons = causes(field)
     boundary = boundary_of(field, patches, reasons)
-    region = Reached(question, given, singular, patches, pieces, everywhere, boundary=boundary)
+    region = Reached(question, evaluation, singular, patches, pieces, everywhere, boundary=boundary)
     if ranged:
         return region
     counted = [patch for patch in patches if patch.piece == 1 or not field.same_assembly]

@@ -74,10 +74,10 @@ def rough(name: str, regions: Sequence[Reached]) -> Iterator[Caution]:
     )
     late = (area > 0) & (error > FINEST_AREA * area)
     if late.any():
-        known = (error[late] / area[late]).max()
+        share = (error[late] / area[late]).max()
         yield Caution(
             "unconverged",
-            f"the area is known to {known:.1g} of itself only (area_error): over the range of {name} the boundary "
+            f"the area is known to {share:.1g} of itself only (area_error): over the range of {name} the boundary "
             "is too rough for more",
             "indices", int(late.argmax()),
         )  # fmt: skip
@@ -93,7 +93,7 @@ def unreachable(study: Study, questions: Sequence[Question]) -> AssemblyError:
             span = f"the range of {name} from {over.from_:g} to {over.to:g}{held}"
             return AssemblyError(f"point {section.point} reaches nothing over {span}")
     field, about = question.field, question.about
-    there = " at" * bool(question.held) + ";".join(each.where.removeprefix(" at") for each in questions)
+    there = " at" * bool(question.held) + ";".join(other.where.removeprefix(" at") for other in questions)
     if field.rootless:
         return AssemblyError(f"point {section.point} reaches nothing{there}: {ROOTLESS}")
     assembly = " in the sketch's assembly" if field.same_assembly else ""

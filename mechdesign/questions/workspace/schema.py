@@ -122,7 +122,7 @@ class WorkspaceSection(fields.Model):
     def checked(self, checker: Checker) -> Self:
         """Check names, units and ranges against the mechanism."""
         root: KeyPath = ("workspace",)
-        checker.known(self.point, [*checker.mechanism.owners, *checker.mechanism.ends], "point", (*root, "point"))
+        checker.check_name(self.point, [*checker.mechanism.owners, *checker.mechanism.ends], "point", (*root, "point"))
         checker.coordinates(self.at, (*root, "at"))
         ranges = [name for name, values in self.at.items() if isinstance(values, Over)]
         if len(ranges) > 1:

@@ -259,13 +259,13 @@ def _inverse_determinant(local: Local, shape: tuple[int, ...]) -> Floats:
 def _sign_change(x: Floats, values: Floats) -> Floats:
     """A root between two nodes (first axis), by a straight line; nan where there is none."""
     # Where rounding leaves nothing of a determinant, at a cusp, its sign tells no place.
-    known = np.isfinite(values).all(axis=0)
+    finite = np.isfinite(values).all(axis=0)
     change = (values[1:] > 0) != (values[:-1] > 0)
     first, lane = change.argmax(axis=0), np.arange(values.shape[1])
     a, b = values[first, lane], values[first + 1, lane]
     with np.errstate(divide="ignore", invalid="ignore"):
         root = x[first, lane] + (x[first + 1, lane] - x[first, lane]) * a / (a - b)
-    return np.where(known & change.any(axis=0), root, np.nan)
+    return np.where(finite & change.any(axis=0), root, np.nan)
 
 
 def _crossing(designs: Designs, segments: Parts, v: Floats) -> Floats:

@@ -93,10 +93,10 @@ def _indices(study: Study, regions: Sequence[Reached]) -> Iterator[Column]:
     kinds = index_columns(study, question)
 
     def column(name: str) -> Column:
-        return replace(kinds[name], values=np.concatenate([given.values[name] for given in answers]))
+        return replace(kinds[name], values=np.concatenate([evaluation.values[name] for evaluation in answers]))
 
     def error(name: str) -> Column:
-        values = np.concatenate([given.errors[name] for given in answers])
+        values = np.concatenate([evaluation.errors[name] for evaluation in answers])
         return INDICES["<statistic>_error"].column(values, kinds[name].unit, statistic=name)
 
     estimated = question.rule == "gauss"
@@ -125,12 +125,12 @@ def _totals(indices: Table, held: Sequence[str]) -> Table:
     statistics = [column for column in indices.columns
                   if column.name not in held and not column.name.endswith(("_error", "_x", "_y"))]  # fmt: skip
     values = np.array([column.values for column in statistics], dtype=float)
-    known = ~np.isnan(values)
-    least = np.argmin(np.where(known, values, np.inf), axis=1)
-    most = np.argmax(np.where(known, values, -np.inf), axis=1)
-    row, some = np.arange(len(statistics)), known.any(axis=1)
+    present = ~np.isnan(values)
+    least = np.argmin(np.where(present, values, np.inf), axis=1)
+    most = np.argmax(np.where(present, values, -np.inf), axis=1)
+    row, some = np.arange(len(statistics)), present.any(axis=1)
     with np.errstate(invalid="ignore"):
-        mean = np.where(known, values, 0.0).sum(axis=1) / np.where(some, known.sum(axis=1), np.nan)
+        mean = np.where(present, values, 0.0).sum(axis=1) / np.where(some, present.sum(axis=1), np.nan)
     ends = {"smallest": least, "largest": most}
     return TOTALS.table([
         *TOTALS.columns({}, statistic=np.array([column.name for column in statistics]), smallest=values[row, least],
@@ -147,9 +147,9 @@ def _totals(indices: Table, held: Sequence[str]) -> Table:
 def _local(study: Study, question: Question, nodes: Nodes) -> list[Column]:
     """Local indices at the nodes of a region."""
     columns = [
-        LOCAL["<index>"].column(values, each.index.unit(study, question.field),
-                                **{"index": each.name, "meaning of the index": each.index.meaning})
-        for each, values in nodes.values
+        LOCAL["<index>"].column(values, index.index.unit(study, question.field),
+                                **{"index": index.name, "meaning of the index": index.index.meaning})
+        for index, values in nodes.values
     ]  # fmt: skip
     per_area = power_of_length(study.units, determinant_power(question.field))
     words = study.units.labels | {"as its outputs over the drives, multiplied": per_area}
@@ -202,13 +202,14 @@ def _singularities(study: Study, region: Reached) -> list[Column]:
     lengths = [len(locus.points) for locus in loci]
     z = np.concatenate([np.zeros(0, dtype=complex), *(locus.points for locus in loci)])
 
-    def each(values: Sequence[str]) -> NDArray[np.str_]:
+    def per_point(values: Sequence[str]) -> NDArray[np.str_]:
         return np.repeat(np.array(values, dtype=str), lengths)
 
     return [
         *_held(study, region.question, len(z)),
         *SINGULARITIES.columns(
             study.units.labels, curve=np.repeat(np.arange(len(loci)), lengths),
-            kind=each([locus.kind for locus in loci]), x=z.real, y=z.imag, cause=each([locus.cause for locus in loci]),
+            kind=per_point([locus.kind for locus in loci]), x=z.real, y=z.imag,
+            cause=per_point([locus.cause for locus in loci]),
         ),
     ]  # fmt: skip

@@ -67,8 +67,8 @@ class Difference:
         at = f" at {self.row}" if self.row else ""
         if self.change in ("missing", "new"):
             whole = "column" if self.column else "table" if self.table else "result"
-            what = counted(self.rows, "row") if self.rows else whole
-            return f"{place}: {what} {self.change}{f', the first{at}' if at else ''}"
+            noun = counted(self.rows, "row") if self.rows else whole
+            return f"{place}: {noun} {self.change}{f', the first{at}' if at else ''}"
         size = "" if math.isnan(self.largest) else f" by {self.largest:.3g} {self.unit}".rstrip()
         size += "" if math.isnan(self.relative) else f" (relative {self.relative:.2g})"
         rows = f" ({self.rows} rows)" if self.rows > 1 else ""
@@ -88,7 +88,7 @@ class Comparison:
     def moved(self) -> list[Difference]:
         """The columns of numbers that moved, those first that moved most for their size."""
         return sorted(
-            (difference for difference in self.differences if difference.values), key=lambda each: -each.share
+            (difference for difference in self.differences if difference.values), key=lambda entry: -entry.share
         )
 
     @property

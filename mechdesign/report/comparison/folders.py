@@ -38,7 +38,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     """
     before, after = results(old), results(new)
     # A manifest stands for its folder.
-    old, new = (each.parent if each.name == manifest.NAME else each for each in (old, new))
+    old, new = (path.parent if path.name == manifest.NAME else path for path in (old, new))
     if not before.keys() & after.keys():
         there = [f"{root} has {', '.join(folders) or 'none'}" for root, folders in ((old, before), (new, after))]
         raise StudyError(f"nothing to compare: no result stands in both folders; {'; '.join(there)}")
@@ -58,7 +58,7 @@ def compare(old: Path, new: Path, tolerances: Tolerances) -> Comparison:
     ]
     unfit = [f"tolerances: {pattern!r} fits no column that was compared" for pattern in sorted(unused)]
     if unfit and not comparison.differences:
-        raise StudyError([Problem(each) for each in unfit])
+        raise StudyError([Problem(note) for note in unfit])
     comparison.notes += unfit
     return comparison
 
@@ -98,11 +98,11 @@ def tolerances_from(path: Path, default: Tolerance) -> Tolerances:
     if not isinstance(document.data, dict):
         raise document.values[()].failure("write a tolerance a line: reliability.*.sigma: {rtol: 0.05}")
     patterns, problems = {}, list(document.problems)
-    for pattern, given in document.data.items():
+    for pattern, entry in document.data.items():
         try:
-            if not (isinstance(given, dict) and given and given.keys() <= {"rtol", "atol"}):
+            if not (isinstance(entry, dict) and entry and entry.keys() <= {"rtol", "atol"}):
                 raise failure("a tolerance is {rtol: 0.05}, {atol: 0.001 mm} or both")
-            patterns[str(pattern)] = default._replace(**{name: _tolerance(name, raw) for name, raw in given.items()})
+            patterns[str(pattern)] = default._replace(**{name: _tolerance(name, raw) for name, raw in entry.items()})
         except PydanticCustomError as error:
             problems.append(document.values[(pattern,)].problem(error.message(), str(pattern)))
     if problems:
@@ -133,18 +133,18 @@ def _fits(pattern: str, folder: str, command: str, table: str, column: str) -> b
 
 def notes(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
     """Differences in what two results were computed from: versions, inputs, overrides, seed, study."""
-    for what in ("tool", "libraries", "inputs"):
-        before, after = old.get(what) or {}, new.get(what) or {}
+    for key in ("tool", "libraries", "inputs"):
+        before, after = old.get(key) or {}, new.get(key) or {}
         for name in dict.fromkeys((*before, *after)):
             if before.get(name) != after.get(name):
-                words = f"input {name}: another file" if what == "inputs" else None
-                yield words or f"{what} {name}: {before.get(name, 'none')} -> {after.get(name, 'none')}"
-    for what in ("overrides", "seed"):
-        if old.get(what) != new.get(what):
-            yield f"{what}: {old.get(what)} -> {new.get(what)}"
+                words = f"input {name}: another file" if key == "inputs" else None
+                yield words or f"{key} {name}: {before.get(name, 'none')} -> {after.get(name, 'none')}"
+    for key in ("overrides", "seed"):
+        if old.get(key) != new.get(key):
+            yield f"{key}: {old.get(key)} -> {new.get(key)}"
     entries = [
-        {".".join(map(str, keys)): value for keys, value in leaves(each["study"].get("resolved") or {})}
-        for each in (old, new)
+        {".".join(map(str, keys)): value for keys, value in leaves(content["study"].get("resolved") or {})}
+        for content in (old, new)
     ]
     changed = [name for name in entries[0] | entries[1] if entries[0].get(name) != entries[1].get(name)]
     if changed:
@@ -184,7 +184,7 @@ def compare_results(
             if illegible:
                 continue
             raise
-        given = [_given(each, command) for each in (before, after)]
+        poses = [_given(entry, command) for entry in (before, after)]
         chosen = {}
         for column in pair[0].names:
             fitting = [pattern for pattern in tolerances.patterns if _fits(pattern, folder, command, table, column)]
@@ -194,9 +194,9 @@ def compare_results(
                 chosen[column] = _in_unit(tolerances.patterns[fitting[-1]], fitting[-1], pair[0], column)
         comparison.compared.update(tables=1, columns=len(chosen))
         comparison.cases.append((folder, table))
-        same_poses = given[0] == given[1]
-        comparison.differences += compare_tables(*pair, chosen, given[1][0], folder=folder, same_poses=same_poses)
-    verdicts = [{each["requirement"]: each for each in content["requirements"]} for content in (before, after)]
+        same_poses = poses[0] == poses[1]
+        comparison.differences += compare_tables(*pair, chosen, poses[1][0], folder=folder, same_poses=same_poses)
+    verdicts = [{entry["requirement"]: entry for entry in content["requirements"]} for content in (before, after)]
     for words in verdicts[0] | verdicts[1]:
         outcomes = [_verdict(verdict.get(words)) for verdict in verdicts]
         if outcomes[0].split(",")[0] != outcomes[1].split(",")[0]:
@@ -240,7 +240,7 @@ def _given(content: Mapping[str, Any], command: str) -> tuple[frozenset[str], An
     """
     resolved = content["study"].get("resolved") or {}
     if command == SWEEP.name:
-        columns = [each for about in content["tables"].values() for each in about["columns"]]
+        columns = [column_data for about in content["tables"].values() for column_data in about["columns"]]
         return frozenset(column["name"] for column in columns if column["meaning"] == VARIED), resolved.get(
             SWEEP.section
         )

@@ -26,25 +26,25 @@ def differences_figure(moved: Sequence[Difference]) -> Figure:
     columns = 1 if style.narrow() else min(_COLUMNS, len(shown))
     figure, panels = style.page(len(shown), columns, _HEIGHT, across=_ACROSS, down=_DOWN, **_MARGINS)
     room = panels[0].get_position().width * style.width()
-    for axes, each in zip(panels, shown, strict=True):
-        assert each.values is not None
-        if each.along is None:
-            axes.plot(*each.values, "o", color=style.VERMILION, markersize=4, linestyle="none")
-            both = np.concatenate(each.values)
+    for axes, difference in zip(panels, shown, strict=True):
+        assert difference.values is not None
+        if difference.along is None:
+            axes.plot(*difference.values, "o", color=style.VERMILION, markersize=4, linestyle="none")
+            both = np.concatenate(difference.values)
             ends = [both[np.isfinite(both)].min(initial=np.inf), both[np.isfinite(both)].max(initial=-np.inf)]
             if ends[0] < ends[1]:
                 axes.plot(ends, ends, color=style.FAINT, linewidth=1.0, zorder=1)
-            axes.set_xlabel(style.axis_label("old", each.unit))
-            axes.set_ylabel(style.axis_label("new", each.unit))
+            axes.set_xlabel(style.axis_label("old", difference.unit))
+            axes.set_ylabel(style.axis_label("new", difference.unit))
         else:
-            order = np.argsort(each.along.values, kind="stable")
+            order = np.argsort(difference.along.values, kind="stable")
             looks = (("old", style.BLUE, style.DASHES[0]), ("new", style.VERMILION, style.DASHES[1]))
-            for values, (name, color, dashes) in zip(each.values, looks, strict=True):
-                axes.plot(each.along.values[order], values[order], color=color, linestyle=dashes, label=name)
-            axes.set_xlabel(style.axis_label(each.along.name, each.along.unit))
-            axes.set_ylabel(style.axis_label("value", each.unit))
+            for values, (name, color, dashes) in zip(difference.values, looks, strict=True):
+                axes.plot(difference.along.values[order], values[order], color=color, linestyle=dashes, label=name)
+            axes.set_xlabel(style.axis_label(difference.along.name, difference.along.unit))
+            axes.set_ylabel(style.axis_label("value", difference.unit))
             axes.legend(loc="best")
-        name = f"{each.folder}/{each.table}: {each.column}".removeprefix("./")
+        name = f"{difference.folder}/{difference.table}: {difference.column}".removeprefix("./")
         axes.set_title(style.folded(name, _TITLE_SIZE, room), fontsize=_TITLE_SIZE, loc="left")
     style.name_powers(panels)
     left = len(moved) - len(shown)

@@ -22,12 +22,12 @@ Rows = NDArray[np.intp]
 
 
 def compare_tables(
-    old: Table, new: Table, tolerances: Mapping[str, Tolerance], given: Iterable[str] = (), *, folder: str = ".",
+    old: Table, new: Table, tolerances: Mapping[str, Tolerance], coordinates: Iterable[str] = (), *, folder: str = ".",
     same_poses: bool = True,
 ) -> Iterator[Difference]:  # fmt: skip
     """Differences of two tables of a folder.
 
-    Rows are the same where their keys are: coordinates that are `given`, and then as many of the leading columns as
+    Rows are the same where their keys are: the `coordinates` of the poses, then as many of the leading columns as
     tell the rows apart; numbers among them within their tolerance. Where a limit or a boundary lies is found, not
     given: of studies with the `same_poses`, rows that are left over are matched in their order where the words of
     their keys are the same and there are as many in both.
@@ -37,7 +37,7 @@ def compare_tables(
         for column in table.columns:
             if column.name not in other:
                 yield differs(column.name, "missing" if table is old else "new", unit=column.unit)
-    keys = _keys(old, new, given)
+    keys = _keys(old, new, coordinates)
     widths = {name: _width(old, new, name, tolerances[name]) for name in old.names if name in new}
     first, second = _matched(old, new, keys, {name: (tolerances[name].rtol, widths[name]) for name in keys}, same_poses)
     for table, rows in ((old, first), (new, second)):
@@ -86,9 +86,9 @@ def _width(old: Table, new: Table, name: str, tolerance: Tolerance) -> float:
         return 0.0
     scale = 0.0
     for table in (old, new):
-        for each in table.columns:
-            if each.numeric and (each.name == name or (column.unit and each.unit == column.unit)):
-                values = np.abs(each.values.astype(float))
+        for other in table.columns:
+            if other.numeric and (other.name == name or (column.unit and other.unit == column.unit)):
+                values = np.abs(other.values.astype(float))
                 scale = max(scale, float(values[np.isfinite(values)].max(initial=0.0)))
     return ROUNDING * scale
 
@@ -106,10 +106,10 @@ def _words(table: Table, keys: Sequence[str], row: int) -> str:
     return ", ".join(parts)
 
 
-def _keys(old: Table, new: Table, given: Iterable[str]) -> tuple[str, ...]:
+def _keys(old: Table, new: Table, coordinates: Iterable[str]) -> tuple[str, ...]:
     """Columns that identify the rows of both tables: given coordinates, then as few leading columns as needed."""
-    known = set(given)
-    names = sorted((name for name in old.names if name in new), key=lambda name: name not in known)
+    named = set(coordinates)
+    names = sorted((name for name in old.names if name in new), key=lambda name: name not in named)
     tables = [table for table in (old, new) if len(table) > 1]
     codes = [{name: np.unique(table[name], return_inverse=True)[1] for name in names} for table in tables]
 
@@ -124,7 +124,7 @@ def _keys(old: Table, new: Table, given: Iterable[str]) -> tuple[str, ...]:
 
     keys = next((names[:count] for count in range(len(names)) if apart(names[:count])), names)
     # Result columns between them, such as values at the nodes of rays, are not needed.
-    for name in [name for name in keys if name not in known and old.column(name).numeric]:
+    for name in [name for name in keys if name not in named and old.column(name).numeric]:
         if apart([key for key in keys if key != name]):
             keys = [key for key in keys if key != name]
     return tuple(keys)
@@ -135,8 +135,8 @@ def _matched(
 ) -> tuple[Rows, Rows]:
     """Rows of both tables that are the same, in the order of the old."""
     # Equal rows are matched in their order.
-    known = {key: row for row, key in enumerate(_numbered(_texts(old, keys)))}
-    pairs = [(known[key], row) for row, key in enumerate(_numbered(_texts(new, keys))) if key in known]
+    rows_by_key = {key: row for row, key in enumerate(_numbered(_texts(old, keys)))}
+    pairs = [(rows_by_key[key], row) for row, key in enumerate(_numbered(_texts(new, keys))) if key in rows_by_key]
     numbers = [name for name in keys if old.column(name).numeric and new.column(name).numeric]
     words = [name for name in keys if name not in numbers]
     left: dict[Any, tuple[list[int], list[int]]] = defaultdict(lambda: ([], []))
@@ -165,10 +165,10 @@ def _texts(table: Table, names: Sequence[str]) -> Iterable[tuple[str, ...]]:
 
 
 def _numbered(keys: Iterable[tuple[str, ...]]) -> Iterator[tuple[tuple[str, ...], int]]:
-    seen: Counter[tuple[str, ...]] = Counter()
+    counts: Counter[tuple[str, ...]] = Counter()
     for key in keys:
-        yield key, seen[key]
-        seen[key] += 1
+        yield key, counts[key]
+        counts[key] += 1
 
 
 def _nearest(

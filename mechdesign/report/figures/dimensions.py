@@ -216,8 +216,8 @@ def table_rows(study: Study, scene: Scene) -> list[tuple[str, ...]]:
             rows.append(("" if name in described else name, f"{one} to {other}", _number(value, angle), text, section))
             described.add(name)
     rows += _guides(scene)
-    rows += [(name, "", _nominal(study, name), _tolerance(given, study.sizes.get(name, 0.0), _unit(study, name)), "")
-             for name, given in tolerances.items()]  # fmt: skip
+    rows += [(name, "", _nominal(study, name), _tolerance(size, study.sizes.get(name, 0.0), _unit(study, name)), "")
+             for name, size in tolerances.items()]  # fmt: skip
     kept = [k for k in range(5) if any(row[k] for row in rows[1:])]
     return [tuple(row[k] for k in kept) for row in rows] if kept else []
 
@@ -244,12 +244,12 @@ def _unit(study: Study, name: str) -> str:
     return "" if unit == study.units.label("length") else style.printed(unit)
 
 
-def _tolerance(given: Dimension, nominal: float, unit: str = "") -> str:
-    if given.measured is not None:
+def _tolerance(dimension: Dimension, nominal: float, unit: str = "") -> str:
+    if dimension.measured is not None:
         return "measured"
-    low, high = given.ends(nominal)
-    if given.sigma is not None:
-        words = f"\N{GREEK SMALL LETTER SIGMA} = {given.sigma:g}"
+    low, high = dimension.ends(nominal)
+    if dimension.sigma is not None:
+        words = f"\N{GREEK SMALL LETTER SIGMA} = {dimension.sigma:g}"
     else:
         words = f"\N{PLUS-MINUS SIGN}{high:g}" if low == -high else f"{high:+g} / {low:+g}"
     return f"{words} {unit}".rstrip()

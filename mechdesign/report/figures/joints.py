@@ -154,20 +154,20 @@ def place_in_words(study: Study, over: Along, value: float) -> str:
 
 
 def joint_hodographs(
-    study: Study, joints: Sequence[Joint], cases: Sequence[str], over: Along, *, what: str = "force", cut: bool = True
+    study: Study, joints: Sequence[Joint], cases: Sequence[str], over: Along, *, noun: str = "force", cut: bool = True
 ) -> Figure:  # fmt: skip
     """Where the tip of each joint's force goes, drawn from the origin, a panel a case with its title."""
     shown = np.array([joint.values[:, : len(cases)] for joint in joints])
     some = [number for number in range(len(cases)) if np.nan_to_num(shown[:, :, number]).any()]
-    known = shown[np.isfinite(shown)]
+    finite = shown[np.isfinite(shown)]
     # As for the curves, peaks near a singularity are left out.
-    usual = _BEYOND * np.quantile(np.abs(known), _USUAL) if cut else np.inf
-    places = np.append(known[np.abs(known) <= usual], 0.0)
+    usual = _BEYOND * np.quantile(np.abs(finite), _USUAL) if cut else np.inf
+    places = np.append(finite[np.abs(finite) <= usual], 0.0)
     columns = 1 if style.narrow() else len(some)
     window = fit(places, (style.width() - RIGHT - LEFT * columns) / columns, _HODOGRAPH, 0.2)
     labels = [f"{joint.name.split(', ')[0]}: {joint.words}" for joint in joints]
     rows = -(-len(labels) // fitting(labels))
-    words = f"Way of the tip of each joint's {what} over {over.name or 'the path'}; dot: first pose, ring: largest"
+    words = f"Way of the tip of each joint's {noun} over {over.name or 'the path'}; dot: first pose, ring: largest"
     size = 8.0 if style.narrow() else 11.0
     words = style.folded(words, size, style.width() - LEFT - RIGHT)
     figure, panels = windows(window, "", len(some), columns, above=0.28 if columns > 1 else 0.75, top=0.34,
@@ -199,17 +199,17 @@ def force_axes(study: Study, axes: Axes) -> None:
 def hodograph(axes: Axes, forces: Complexes, look: Mapping[str, Any]) -> None:
     """Hodograph of a force with its first and its largest value, and arrows in the direction of motion."""
     axes.plot(forces.real, forces.imag, linewidth=1.6, **look)
-    known = forces[np.isfinite(forces)]
-    if not len(known):
+    finite = forces[np.isfinite(forces)]
+    if not len(finite):
         return
-    first, worst = known[0], known[np.argmax(np.abs(known))]
+    first, worst = finite[0], finite[np.argmax(np.abs(finite))]
     axes.plot(first.real, first.imag, "o", color=look["color"], markersize=5)
     axes.plot([0, worst.real], [0, worst.imag], color=look["color"], linewidth=0.8)
     axes.plot(worst.real, worst.imag, "o", color=look["color"], markersize=9, markerfacecolor="none",
               markeredgewidth=1.6)  # fmt: skip
-    for k in np.linspace(0, len(known) - 2, _ARROWS + 2).astype(int)[1:-1]:
-        if known[k] != known[k + 1]:
-            tail, tip = ((place.real, place.imag) for place in known[k : k + 2])
+    for k in np.linspace(0, len(finite) - 2, _ARROWS + 2).astype(int)[1:-1]:
+        if finite[k] != finite[k + 1]:
+            tail, tip = ((place.real, place.imag) for place in finite[k : k + 2])
             axes.annotate("", tip, tail, annotation_clip=True,
                           arrowprops={"arrowstyle": "-|>", "color": look["color"], "linewidth": 0, "shrinkA": 0,
                                       "shrinkB": 0, "mutation_scale": 12})  # fmt: skip

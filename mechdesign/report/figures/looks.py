@@ -114,5 +114,5 @@ def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: 
 
 def apart(limits: tuple[float, float], low: float, high: float) -> tuple[list[float], list[float]]:
     """Finite limits between two ends, and those beyond them."""
-    known = [limit for limit in limits if np.isfinite(limit)]
-    return [limit for limit in known if low < limit < high], [limit for limit in known if not low < limit < high]
+    finite = [limit for limit in limits if np.isfinite(limit)]
+    return [limit for limit in finite if low < limit < high], [limit for limit in finite if not low < limit < high]

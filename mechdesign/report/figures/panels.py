@@ -304,10 +304,10 @@ def _levels(over: Plane, values: Floats, patches: Sequence[slice], logarithmic: 
     """Levels of the colours over some patches, or their powers of ten; None where there is no value."""
     sizes = np.concatenate([node_areas(over.x[patch], over.y[patch]).ravel() for patch in patches])
     shown = np.concatenate([values[patch].ravel() for patch in patches])
-    known = np.isfinite(shown) & ((shown > 0) | (not logarithmic))
-    if not known.any():
+    finite = np.isfinite(shown) & ((shown > 0) | (not logarithmic))
+    if not finite.any():
         return None
-    sizes, shown = sizes[known], shown[known]
+    sizes, shown = sizes[finite], shown[finite]
     if logarithmic:
         return np.asarray(np.log10(_powers(shown, sizes)))
     return style.levels(float(shown.min()), quantile(shown, sizes, 0.97), 9)
@@ -327,8 +327,8 @@ def _map(
     if logarithmic:
         # Between nodes powers are interpolated; below the last level is all that is smaller, even 0.
         values = np.log10(np.maximum(values, 1e-3 * 10.0 ** levels[0]))
-    known = values[np.isfinite(values)]
-    norm = style.steps(levels, float(known.min()), float(known.max()))
+    finite = values[np.isfinite(values)]
+    norm = style.steps(levels, float(finite.min()), float(finite.max()))
     shown = [
         (patch.nodes.real, patch.nodes.imag,
          _between(patch, over.x[patch.rays] + 1j * over.y[patch.rays], values[patch.rays]))

@@ -89,8 +89,8 @@ def picture(view: type[V], *names: str, order: int = 100) -> Callable[[Callable[
 def pictures(command: str) -> list[Picture[View]]:
     """Pictures of a question, the most telling first: those that the modules of its folder of figures declare."""
     package = import_module(QUESTIONS[command].figures)
-    found = iter_modules(getattr(package, "__path__", ()))
-    modules = [package, *(import_module(f"{package.__name__}.{module.name}") for module in found)]
+    listed = iter_modules(getattr(package, "__path__", ()))
+    modules = [package, *(import_module(f"{package.__name__}.{module.name}") for module in listed)]
     declared = (value for module in modules for value in vars(module).values() if isinstance(value, Picture))
     return sorted(dict.fromkeys(declared), key=lambda declared: (declared.order, declared.names))
 

@@ -222,9 +222,9 @@ class Sweep(Shown):
         names = self.poses.groups[0].names
         plan = self.mechanism.plan(names)
         parts = -(-_TRACE_POSES // count)
-        given = [radians(self.study, coordinate, self._between(name, parts))
+        values = [radians(self.study, coordinate, self._between(name, parts))
                  for coordinate, name in zip(plan.structure.given, names, strict=True)]  # fmt: skip
-        solved = plan.solve(given)
+        solved = plan.solve(values)
         return {name: np.where(solved.valid, solved.point(name), complex(np.nan, np.nan)) for name in self.places}
 
     def _between(self, name: str, parts: int) -> Floats:
@@ -233,7 +233,7 @@ class Sweep(Shown):
         values = poses.values[name][ends]
         begin = end = steps = np.diff(values)
         if poses.times is None and np.any(poses.bends.get(name, 0.0)):
-            bent = [poses.values[each][ends] for each, bends in poses.bends.items() if np.any(bends)]
+            bent = [poses.values[coordinate][ends] for coordinate, bends in poses.bends.items() if np.any(bends)]
             slopes, length = poses.slopes[name][ends], np.linalg.norm(np.diff(bent), axis=0)
             begin, end = slopes[:-1] * length, slopes[1:] * length
         t = np.arange(parts)[:, None] / parts
@@ -296,12 +296,12 @@ def ranks(study: Study) -> dict[str, int]:
         points = link_points(link)
         if name != GROUND and not link.telescopic and ground & set(points):
             simple |= set(points)
-    asked = {name.split(".")[0] for name in (section and section.outputs) or ()}
+    outputs = {name.split(".")[0] for name in (section and section.outputs) or ()}
     rank = {}
     for point in mechanism.points:
         if point in ground:
             continue
-        if point in asked or (uses[point] == 1 and point not in simple):
+        if point in outputs or (uses[point] == 1 and point not in simple):
             rank[point] = 2
         else:
             rank[point] = 0 if point in simple else 1

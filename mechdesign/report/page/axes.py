@@ -20,14 +20,14 @@ def axes_of(figure: Figure) -> list[list[Any]]:
     upper left corner of the picture; the values at the left and right edge, and of places those at the lower and upper
     edge too.
     """
-    found = []
+    entries = []
     for axes in figure.axes:
         label = str(axes.get_label())
         if label == PLANE:
-            found.append([PLANE, *box(axes), *_rounded(axes.get_xlim()), *_rounded(axes.get_ylim())])
+            entries.append([PLANE, *box(axes), *_rounded(axes.get_xlim()), *_rounded(axes.get_ylim())])
         elif label.startswith(OVER) and axes.get_xscale() == "linear":
-            found.append([label.removeprefix(OVER), *box(axes), *_rounded(axes.get_xlim())])
-    return found
+            entries.append([label.removeprefix(OVER), *box(axes), *_rounded(axes.get_xlim())])
+    return entries
 
 
 def box(axes: Axes) -> list[float]:

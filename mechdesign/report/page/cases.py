@@ -25,7 +25,7 @@ def gates(result: Result) -> dict[str, Any] | None:
     table, drawn = result.main, DrawnCases.of(result)
     best = best_of(table)
     if best is None and not any(
-        name for name, bounds in drawn.results.items() if any(each is not None for each in bounds)
+        name for name, bounds in drawn.results.items() if any(bound is not None for bound in bounds)
     ):
         return None
     row = None if best is None else int(np.flatnonzero(table[RANK] == 1)[0])

@@ -68,7 +68,7 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     rows = np.array(sorted(fitting, key=lambda row: (table[drawn.goals[0].name][row], row)))
     choices = [fitting[row] | _named(drawn, table, row, marks.get(row, "")) for row in rows.tolist()]
     knee = next((k for k, choice in enumerate(choices) if choice["mark"] == "knee"), 0)
-    numbers, entries, given = _numbers(drawn, table, rows, knee)
+    numbers, entries, fields = _numbers(drawn, table, rows, knee)
     figure = front_figure(drawn, table)
     for line in figure.findobj(Line2D):
         assert isinstance(line, Line2D)
@@ -76,7 +76,7 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
     beside = inline(figure, name, described(figure))
     count = f"{len(rows)} of the {len(table)}" if len(rows) < len(table) else f"All {len(table)}"
     pace = f"{count} designs of the front are in this page: a click there shows the nearest, an arrow key the next."
-    data = {"poses": len(rows), "first": knee, "choices": choices, "given": given, "keys": [given],
+    data = {"poses": len(rows), "first": knee, "choices": choices, "given": fields, "keys": [fields],
             "numbers": numbers.tracks, "front": _points(figure, drawn, table, rows), "pace": pace}  # fmt: skip
     drawing = _drawing(sheet, sweeps[int(rows[knee])])
     return Moving(drawing, beside, data, choices[knee]["title"], ["value"], entries, {}, ["pareto"])
@@ -84,15 +84,15 @@ def front(drawn: Designs, table: Table, name: str) -> Moving | None:
 
 def _fitting(sheet: Sheet, sweeps: Sequence[tuple[int, Sweep]]) -> dict[int, dict[str, Any]]:
     """The first designs, by their rows, as the script draws them: as many as fit into the budget, and always one."""
-    found: dict[int, dict[str, Any]] = {}
+    choices: dict[int, dict[str, Any]] = {}
     size, alike = 0, None
     for row, sweep in sweeps:
         choice, alike = _choice(sheet, sweep, alike)
         size += len(json_text(choice))
-        if found and size > BUDGET:
+        if choices and size > BUDGET:
             break
-        found[row] = choice
-    return found
+        choices[row] = choice
+    return choices
 
 
 def _named(drawn: Designs, table: Table, row: int, mark: str) -> dict[str, Any]:
@@ -128,9 +128,9 @@ def _spread(drawn: Designs, table: Table, first: Sequence[int]) -> Ints:
 
 def _sweeps(drawn: Designs, table: Table, rows: Ints) -> Iterator[tuple[int, Sweep]]:
     """Designs of a front in their motions, those of one mechanism solved in one batch; not those that have none."""
-    known = drawn.study.parameters.known()
-    numbers = {name: np.asarray(table[name], dtype=float) for name in drawn.variables if name in known}
-    words = {name: table[name] for name in drawn.variables if name not in known}
+    numeric = drawn.study.parameters.names()
+    numbers = {name: np.asarray(table[name], dtype=float) for name in drawn.variables if name in numeric}
+    words = {name: table[name] for name in drawn.variables if name not in numeric}
     kinds: dict[tuple[Any, ...], list[int]] = {}
     for row in rows.tolist():
         kinds.setdefault(tuple(column[row].item() for column in words.values()), []).append(row)
@@ -175,12 +175,12 @@ def _choice(sheet: Sheet, sweep: Sweep, alike: Numbers | None) -> tuple[dict[str
     columns = [Column(name, np.asarray(values), study.units.label(study.mechanism.quantity(name)))
                for name, values in poses.values.items()]  # fmt: skip
     numbers = Numbers(Table("poses", tuple(columns)), sweep.rows, int(sweep.valid[0]), alike)
-    given = [[column.name, numbers.cell(column).unit, numbers.add(column)] for column in columns]
+    fields = [[column.name, numbers.cell(column).unit, numbers.add(column)] for column in columns]
     assert poses.rows is not None
     share = (poses.rows - poses.rows[0]) / (poses.rows[-1] - poses.rows[0])
     return {
         "drawing": "".join(tostring(part, encoding="unicode") for part in layer), "poses": len(sweep.rows),
-        "first": int(sweep.valid[0]), "returns": sweep.returns, "gaps": gaps(sweep), "given": given,
+        "first": int(sweep.valid[0]), "returns": sweep.returns, "gaps": gaps(sweep), "given": fields,
         "numbers": numbers.tracks, "times": deltas(share, TIMES),
     } | places(sheet, sweep.configuration, sweep.mechanism.description.links), numbers  # fmt: skip
 
@@ -202,11 +202,11 @@ def _numbers(drawn: Designs, table: Table, rows: Ints, begin: int) -> tuple[Numb
     columns = [replace(column, values=np.asarray(column.values, dtype=float)) for column in columns]
     numbers = Numbers(Table("front", tuple(columns)), rows, begin)
     entries: list[Entry] = [(column.name, [numbers.cell(column)]) for column in columns]
-    given = []
+    fields = []
     for column in columns:
         which, _, power = numbers.scaled[column.name]
-        given.append([column.name, numbers.units[column.name], which, power])
-    return numbers, entries, given
+        fields.append([column.name, numbers.units[column.name], which, power])
+    return numbers, entries, fields
 
 
 def _points(figure: Figure, drawn: Designs, table: Table, rows: Ints) -> list[list[list[float]]]:

@@ -57,7 +57,7 @@ class _Pose(NamedTuple):
     """Where a number occurs: in words, by coordinate, and between the poses of a motion its place in rows."""
 
     words: str = ""
-    given: Mapping[str, float] = {}
+    coordinates: Mapping[str, float] = {}
     place: float | None = None
 
 
@@ -77,19 +77,19 @@ def shown(value: float) -> str:
 
 def headlines(result: Result) -> list[Headline]:
     """The headlines of a result, at most `MOST`, no name twice."""
-    numbers = {each.label: each for each in _of_cases(result)}
+    numbers = {number.label: number for number in _of_cases(result)}
     front = "pareto" in result.tables
     if front:
-        numbers |= {each.label: each for each in _of_front(result.tables[OPTIMUM.name])}
+        numbers |= {number.label: number for number in _of_front(result.tables[OPTIMUM.name])}
     for rule in () if front else key_numbers(result.command):
         table = result.tables.get(rule.table.name)
         if table is None or not len(table):
             continue
         for column in table.columns:
             fits = not rule.column or column.kind == rule.table[rule.column]
-            if fits and column.numeric and _asked(result, rule, column):
-                for each in _of(result, rule, column):
-                    numbers.setdefault(each.label, each)
+            if fits and column.numeric and _requested(result, rule, column):
+                for number in _of(result, rule, column):
+                    numbers.setdefault(number.label, number)
     return list(numbers.values())[:MOST]
 
 
@@ -114,17 +114,17 @@ def _of_front(table: Table) -> Iterator[Headline]:
     """The knee of a front with each goal, and the best of each goal, and which designs these are."""
     goals = [name.removeprefix("w_") for name in table.names if name.startswith("w_")]
     variables = [column for column in table.columns if column.kind == OPTIMUM["<variable>"]]
-    for row, what in enumerate(table["what"].tolist()):
+    for row, role in enumerate(table["what"].tolist()):
         design = _in_words(variables, row)
-        known = [column for column in (*variables, *map(table.column, goals)) if column.numeric]
-        given = {column.name: float(column.values[row]) for column in known}
+        columns = [column for column in (*variables, *map(table.column, goals)) if column.numeric]
+        numbers = {column.name: float(column.values[row]) for column in columns}
         for goal in goals:
             own, others = table.column(goal), [table.column(name) for name in goals if name != goal]
-            if what == "knee":
-                yield Headline(f"{goal} of the knee", shown(own.values[row]), own.unit, design, design, given)
-            elif what == f"best {goal}":
+            if role == "knee":
+                yield Headline(f"{goal} of the knee", shown(own.values[row]), own.unit, design, design, numbers)
+            elif role == f"best {goal}":
                 note = f"{design}; there {_in_words(others, row)}"
-                yield Headline(what, shown(own.values[row]), own.unit, note, design, given)
+                yield Headline(role, shown(own.values[row]), own.unit, note, design, numbers)
 
 
 def _in_words(columns: Iterable[Column], row: int) -> str:
@@ -135,7 +135,7 @@ def _in_words(columns: Iterable[Column], row: int) -> str:
     return ", ".join(word.strip().replace(" ", _TOGETHER) for word in words)
 
 
-def _asked(result: Result, rule: KeyNumber, column: Column) -> bool:
+def _requested(result: Result, rule: KeyNumber, column: Column) -> bool:
     """Whether the study asked for a column: the rate of an output, or a goal with a weight."""
     if rule.column == "<output>_velocity" and "extremes" in result.tables:
         return column.name.removesuffix("_velocity") in result.tables["extremes"]["output"]
@@ -164,7 +164,7 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
         rows = [best[group] for group in dict.fromkeys(groups) if group in best]
     between = _between(rule, table, column)
     for row in rows[:1] if between else rows:
-        words = {each.name: str(each.values[row]) for each in table.columns if not each.numeric}
+        words = {other.name: str(other.values[row]) for other in table.columns if not other.numeric}
         if rule.table is EXTREMES and result.tables["motion"].column(words["output"]).kind in _RATES_AND_FORCES:
             continue
         unit = unit_of(table, column.name, np.arange(len(table)) == row)
@@ -184,7 +184,7 @@ def _of(result: Result, rule: KeyNumber, column: Column) -> Iterator[Headline]:
                 notes.append(f"the largest of {len(finite)} {rule.several}, the smallest is {least}")
             said = unit or rule.table is EXTREMES or column.meaning in label
             meaning = "" if said else column.meaning
-            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.given, pose.place, meaning)
+            yield Headline(label, shown(value), unit, "; ".join(notes), at, pose.coordinates, pose.place, meaning)
 
 
 def _between(rule: KeyNumber, table: Table, column: Column) -> tuple[float, _Pose] | None:

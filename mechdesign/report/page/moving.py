@@ -91,9 +91,9 @@ def _motion(
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
     data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
     data["given"] = []
-    for given in [table.column(name) for name in sweep.poses.named if name in table]:
-        unit = numbers.cell(given).unit
-        data["given"].append([given.name, unit, numbers.scaled[given.name][0]])
+    for column in [table.column(name) for name in sweep.poses.named if name in table]:
+        unit = numbers.cell(column).unit
+        data["given"].append([column.name, unit, numbers.scaled[column.name][0]])
     # What names a pose: the coordinates that are given, or the drives.
     keys = dict.fromkeys(
         tuple(name for name in names if name in table) for names in (sweep.poses.values, study.mechanism.drives)
@@ -168,8 +168,8 @@ def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, 
     if steps is not None:
         own = float(times[-1])
         seconds = own if unit == "s" and _SHORTEST <= own <= _LONGEST else _SECONDS
-        what = "at the study's rates" if timed is None else "in the study's motion"
-        note = f", as {what}" if seconds == own else f"; {what} {own:.3g} {unit}".rstrip()
+        clause = "at the study's rates" if timed is None else "in the study's motion"
+        note = f", as {clause}" if seconds == own else f"; {clause} {own:.3g} {unit}".rstrip()
     pace = f"1\N{MULTIPLICATION SIGN}: {seconds:.3g} s {'a round' if returns else 'from end to end'}{note}"
     return {"times": deltas(times / times[-1], TIMES), "seconds": round(seconds, 3), "pace": pace,
             "backwards": steps is not None and bool(steps[0] < 0)}  # fmt: skip
@@ -190,19 +190,19 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
         if not size > 0:
             continue
         step, mean = np.diff(values) / size, (rate[1:] + rate[:-1]) / 2 / size
-        known = np.isfinite(step) & np.isfinite(mean)
-        along += np.where(known, step * mean, 0.0)
-        square += np.where(known, mean**2, 0.0)
-        length += np.where(known, step**2, 0.0)
-    known = square > 0
-    if not known.any():
+        finite = np.isfinite(step) & np.isfinite(mean)
+        along += np.where(finite, step * mean, 0.0)
+        square += np.where(finite, mean**2, 0.0)
+        length += np.where(finite, step**2, 0.0)
+    finite = square > 0
+    if not finite.any():
         return None
-    times = np.where(known, along / np.where(known, square, 1.0), np.nan)
+    times = np.where(finite, along / np.where(finite, square, 1.0), np.nan)
     # Squared distance of each step from what the rates predict for its time.
     astray = length - 2 * times * along + times**2 * square
-    if np.any(known & ((times * times[known][0] <= 0) | (astray > _ASTRAY * length))):
+    if np.any(finite & ((times * times[finite][0] <= 0) | (astray > _ASTRAY * length))):
         return None
-    return np.where(known, times, np.nanmedian(times))
+    return np.where(finite, times, np.nanmedian(times))
 
 
 def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
@@ -213,11 +213,11 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     linear = sweep.mechanism.linearize(configuration)
     solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
     velocity = linear.velocity(drive_rates(study, section, sweep.poses, solved, linear).velocities)
-    known = configuration.valid & (regularity(linear) >= STALLED)
+    regular = configuration.valid & (regularity(linear) >= STALLED)
     velocities = {}
     for point in sweep.places:
         x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
-        velocities[point] = np.where(known, x + 1j * y, np.nan)
+        velocities[point] = np.where(regular, x + 1j * y, np.nan)
     speeds = np.abs(np.concatenate(list(velocities.values())))
     speeds = speeds[np.isfinite(speeds)]
     if not speeds.any():
@@ -226,8 +226,8 @@ def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
     usual = float(np.quantile(speeds, _COMMON)) or float(speeds.max())
     scale, length = _ARROW / usual, round_down(usual)
     unit = style.printed(study.units.label("velocity"))
-    arrows = {point: [deltas(each.real * scale, PLACES), deltas(-each.imag * scale, PLACES)]
-              for point, each in velocities.items()}  # fmt: skip
+    arrows = {point: [deltas(rates.real * scale, PLACES), deltas(-rates.imag * scale, PLACES)]
+              for point, rates in velocities.items()}  # fmt: skip
     return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
 
 
@@ -238,8 +238,8 @@ def _dots(figure: Figure, table: Table, numbers: Numbers) -> list[list[Any]]:
         (_, _, upper, lower), (bottom, top) = box(axes), axes.get_ylim()
         for line in axes.get_lines():
             drawn = np.asarray(line.get_ydata(), dtype=float)
-            column = next((each for each in table.columns if each.values.dtype.kind == "f"
-                           and np.array_equal(each.values, drawn, equal_nan=True)), None)  # fmt: skip
+            column = next((candidate for candidate in table.columns if candidate.values.dtype.kind == "f"
+                           and np.array_equal(candidate.values, drawn, equal_nan=True)), None)  # fmt: skip
             if column is None or axes.get_yscale() != "linear":
                 continue
             which = numbers.add(column)

@@ -112,7 +112,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     drawing = drawing or (_sketch(study) if plots else "")
     drawings = [drawing, *(part[key] for part in moving.values() for key in ("drawing", "beside"))]
     # Each design of a front has a drawing.
-    drawings += [each.get("drawing", "") for part in moving.values() for each in part["data"].get("choices", ())]
+    drawings += [entry.get("drawing", "") for part in moving.values() for entry in part["data"].get("choices", ())]
     drawings += [picture["html"] for section in sections for picture in section["pictures"]]
     first, more = _divided({section["command"]: section["headlines"] for section in sections})
     return _page(
@@ -132,7 +132,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         pose_of=_pose_of,
         questions=QUESTIONS,
         required=required,
-        met=sum(each["met"] for each in required),
+        met=sum(entry["met"] for entry in required),
         warnings=warnings,
         below=below,
         made=computed_from(study, ""),
@@ -143,7 +143,7 @@ def _mover(moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[
     """The question whose mechanism moves, and through poses like one: its own, or kinematics; empty without one."""
     for name in dict.fromkeys((command, "kinematics")):
         keys = moving[name]["data"].get("keys", ()) if name in moving else ()
-        if any(pose is None or {each for each, *_ in key} <= pose.keys() for key in keys):
+        if any(pose is None or {coordinate for coordinate, *_ in key} <= pose.keys() for key in keys):
             return name
     return ""
 
@@ -275,7 +275,7 @@ def _in_words(requirement: Requirement) -> dict[str, str]:
     bounds = ("\N{GREATER-THAN OR EQUAL TO}", requirement.at_least), ("\N{LESS-THAN OR EQUAL TO}", requirement.at_most)
     return {
         "what": f"|{path}|" if requirement.abs else path,
-        "where": ", ".join(f"{column} {wanted}" for column, wanted in requirement.where.items()),
+        "where": ", ".join(f"{column} {value}" for column, value in requirement.where.items()),
         "limit": ", ".join(f"{sign} {text_of(bound) or shown(bound)}" for sign, bound in bounds if bound is not None),
     }
 

@@ -97,15 +97,15 @@ def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configurati
     """Rows of the region's grid, at most one in each of even cells, and the poses there."""
     local, configuration = region.local, solved_inside(study, region)
     z = local["x"] + 1j * local["y"]
-    known = np.flatnonzero(configuration.valid)
-    z, corner = z[known], complex(z.real.min(), z.imag.min())
+    valid = np.flatnonzero(configuration.valid)
+    z, corner = z[valid], complex(z.real.min(), z.imag.min())
     size = max(np.ptp(z.real), np.ptp(z.imag)) / cells
     steps = (z - corner) / size
     column, row = np.floor(steps.real).astype(int), np.floor(steps.imag).astype(int)
     far = np.abs(steps - column - 0.5 - 1j * (row + 0.5))
     order = np.lexsort((far, column, row))
     cell = row[order] * (cells + 2) + column[order]
-    nearest = known[order[np.append(True, np.diff(cell) > 0)]]
+    nearest = valid[order[np.append(True, np.diff(cell) > 0)]]
     return nearest, configuration.take(nearest)
 
 
@@ -208,9 +208,9 @@ def _look(line: Element, kind: str) -> None:
 
 def _legend(root: Element, sheet: Sheet, shown: Sequence[Region], maps: Sequence[tuple[Column, BoundaryNorm]]) -> None:
     """Below the drawing what ends the regions, and what the colours of each map mean; the first is seen."""
-    seen = {fate(str(kind), str(at)) for region in shown
+    fates = {fate(str(kind), str(at)) for region in shown
             for kind, at in zip(region.boundary["kind"], region.boundary["at"], strict=True)}  # fmt: skip
-    kinds = [kind for kind in LOOKS if kind in seen]
+    kinds = [kind for kind in LOOKS if kind in fates]
     columns = int(sheet.width // _ENTRY)
     for k, kind in enumerate(kinds):
         x, y = 12 + _ENTRY * (k % columns), sheet.height + _LINE * (k // columns + 0.5)

@@ -122,8 +122,8 @@ def meanings(table: Table) -> dict[str, str]:
 
 def _size(values: Floats) -> float:
     """How large the numbers of a column usually are."""
-    known = np.abs(values[np.isfinite(values)])
-    return float(np.quantile(known, _COMMON) or known.max()) if len(known) else 0.0
+    sizes = np.abs(values[np.isfinite(values)])
+    return float(np.quantile(sizes, _COMMON) or sizes.max()) if len(sizes) else 0.0
 
 
 def deltas(values: Floats, factor: float) -> str:
@@ -145,15 +145,15 @@ def deltas(values: Floats, factor: float) -> str:
 
 def steps(text: str, count: int) -> Floats:
     """The integers that `deltas` has written, shape (count,); where there is no value the last one before it."""
-    found, value, place = [], 0, 1
+    integers, value, place = [], 0, 1
     for letter in text:
         digit = _LETTERS.find(letter)
         value += place * (digit % _BASE if digit >= 0 else 0)
         place *= _BASE
         if digit < _BASE:
-            found.append(-(value + 1) // 2 if value % 2 else value // 2)
+            integers.append(-(value + 1) // 2 if value % 2 else value // 2)
             value, place = 0, 1
-    return np.cumsum([*found, *[0] * (count - len(found))]).astype(np.float64)
+    return np.cumsum([*integers, *[0] * (count - len(integers))]).astype(np.float64)
 
 
 def _letters(number: int) -> str:

@@ -112,10 +112,10 @@ def _clean(element: Element, halo: str) -> None:
         else:
             _clean(child, halo)
     element.tag = element.tag.removeprefix(_SPACE)
-    given = dict(element.attrib)
+    attributes = dict(element.attrib)
     element.attrib.clear()
-    looks = dict(part.split(":", 1) for part in given.pop("style", "").split(";") if ":" in part)
-    for key, value in (*given.items(), *((key.strip(), value.strip()) for key, value in looks.items())):
+    looks = dict(part.split(":", 1) for part in attributes.pop("style", "").split(";") if ":" in part)
+    for key, value in (*attributes.items(), *((key.strip(), value.strip()) for key, value in looks.items())):
         key = "href" if key == _LINK else key
         if key == "d":
             value = _path(value)
@@ -172,7 +172,7 @@ def _path(text: str) -> str:
             continue
         points = list(zip(numbers[::2], numbers[1::2], strict=True))
         numbers = []
-        steps = [each for x, y in points for each in (x - here[0], y - here[1])]
+        steps = [coordinate for x, y in points for coordinate in (x - here[0], y - here[1])]
         if command == "M":
             commands.append("M" + _joined(points[0]))
             start, last = points[0], "m"

@@ -68,23 +68,23 @@ class Builder:
             self.measured.add(name)
         return name
 
-    def check_name(self, name: str, known: Iterable[str], what: str, path: Iterable[str | int]) -> bool:
-        """Whether a name is known; if not, note it with the nearest one (of the ground that is missing, once)."""
+    def check_name(self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int]) -> bool:
+        """Whether a name is among the names; if not, report it with the nearest one (a missing ground only once)."""
         if name == GROUND and GROUND not in self.section.links:
             return False
-        return self.reporter.known(name, known, what, (*ROOT, *path))
+        return self.reporter.check_name(name, names, noun, (*ROOT, *path))
 
-    def check_named(self, what: str, names: Iterable[str], path: KeyPath) -> bool:
+    def check_named(self, noun: str, names: Iterable[str], path: KeyPath) -> bool:
         """Whether all names of a list are known links, points, drives or measures; each that is not is noted.
 
-        `what` may be the quantity that they give: an angle is that of links, a distance that of points.
+        `noun` says what they name, or the quantity that they give: an angle is that of links, a distance of points.
         """
-        what = {"angle": "link", "distance": "point"}.get(what, what)
+        noun = {"angle": "link", "distance": "point"}.get(noun, noun)
         points = [*self.section.owners, *self.section.ends]
-        known: Iterable[str] = points if what == "point" else getattr(self.section, f"{what}s")
+        candidates: Iterable[str] = points if noun == "point" else getattr(self.section, f"{noun}s")
         # No short circuit: every mistake is reported.
-        found = [self.check_name(name, known, what, (*path, k)) for k, name in enumerate(names)]
-        return all(found)
+        right = [self.check_name(name, candidates, noun, (*path, k)) for k, name in enumerate(names)]
+        return all(right)
 
     def check_distinct(self) -> None:
         """Names are distinct, and there is a ground."""
@@ -93,7 +93,7 @@ class Builder:
             fixed = [name for name, link in section.links.items() if link.from_ is None]
             cure = f"rename the link that does not move (is it {fixed[0]!r}?)" if fixed else "add 'ground: {O: [0, 0]}'"
             self.report(("links",), f"there is no 'ground', the fixed link whose frame is the world; {cure}")
-        seen: dict[str, str] = {}
+        kinds: dict[str, str] = {}
         groups: list[tuple[str, str, Iterable[str]]] = [
             ("parameter", "parameters", self.parameter_values),
             ("link", "links", section.links),
@@ -103,20 +103,20 @@ class Builder:
             ("spring", "springs", section.springs),
             ("coupling", "couplings", section.couplings),
         ]
-        for what, key, names in groups:
+        for kind, key, names in groups:
             for name in names:
-                if name in seen:
+                if name in kinds:
                     path = (key, name) if key else self._where(name)
                     self.report(
-                        path, f"{name!r} is the name of a {seen[name]} already; names are distinct", at_key=True
+                        path, f"{name!r} is the name of a {kinds[name]} already; names are distinct", at_key=True
                     )
                 else:
-                    seen[name] = what
+                    kinds[name] = kind
         for name, drive in section.drives.items():
             target = name if drive is None else drive.angle or drive.length or drive.slide
-            if name in seen and name != target:
+            if name in kinds and name != target:
                 message = (
-                    f"{name!r} is the name of a {seen[name]} already; a drive may only bear that of what it drives"
+                    f"{name!r} is the name of a {kinds[name]} already; a drive may only bear that of what it drives"
                 )
                 self.report(("drives", name), message, at_key=True)
 
@@ -224,34 +224,34 @@ class Builder:
             return {}
         if free and not given and len(measured) < 2:
             return dict.fromkeys(measured, 0j)
-        known = [*(ends or (given if free else ()))]
-        drawn = self._drawn([*known, *measured], path, "the place of its points")
+        anchors = [*(ends or (given if free else ()))]
+        drawn = self._drawn([*anchors, *measured], path, "the place of its points")
         if drawn is None:
             return {}
-        places = drawn[len(known) :]
+        places = drawn[len(anchors) :]
         start, turn, centre = 0j, 1 + 0j, 0j
         if free and given:
             local = [complex(x, y) for x, y in given.values()]
             start, turn, centre = sum(drawn[: len(local)]) / len(local), rotation(local, drawn), sum(local) / len(local)
         elif free or ends:
             if drawn[0] == drawn[1]:
-                first, second = [*known, *measured][:2]
+                first, second = [*anchors, *measured][:2]
                 self.report(
                     path, f"{first!r} and {second!r} are at one place in the sketch: no x axis; draw them apart"
                 )
                 return {}
             start, turn = drawn[0], (drawn[1] - drawn[0]) / abs(drawn[1] - drawn[0])
-        found = {point: (at - start) / turn + centre for point, at in zip(measured, places, strict=True)}
+        coordinates = {point: (at - start) / turn + centre for point, at in zip(measured, places, strict=True)}
         if free and not given:
             # Without this, rounding would leave the second point off its axis.
-            found[measured[1]] = complex(found[measured[1]].real, 0.0)
-        return found
+            coordinates[measured[1]] = complex(coordinates[measured[1]].real, 0.0)
+        return coordinates
 
-    def _drawn(self, points: list[str], path: KeyPath, what: str) -> list[complex] | None:
+    def _drawn(self, points: list[str], path: KeyPath, noun: str) -> list[complex] | None:
         missing = [point for point in points if point not in self.sketch]
         if missing:
             names = ", ".join(repr(point) for point in missing)
-            self.report(path, f"{what} is left out and so measured from the sketch, which lacks {names}", at_key=True)
+            self.report(path, f"{noun} is left out and so measured from the sketch, which lacks {names}", at_key=True)
             return None
         return [self.sketch[point] for point in points]
 
@@ -263,11 +263,11 @@ class Builder:
         if link.telescopic and link.ends is not None:
             a, b = (self.sketch.get(end) for end in link.ends)
             return None if a is None or b is None or a == b else cmath.phase(b - a)
-        known = [point for point in link.points if point in self.sketch]
-        local = [complex(*(self.nominal(term) for term in link.points[point])) for point in known]
-        if len(known) < 2 or len(set(local)) < 2:
+        drawn = [point for point in link.points if point in self.sketch]
+        local = [complex(*(self.nominal(term) for term in link.points[point])) for point in drawn]
+        if len(drawn) < 2 or len(set(local)) < 2:
             return None
-        turn = rotation(local, [self.sketch[point] for point in known])
+        turn = rotation(local, [self.sketch[point] for point in drawn])
         return cmath.phase(turn)
 
 

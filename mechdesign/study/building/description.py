@@ -82,8 +82,8 @@ def _refuse(builder: Builder, path: KeyPath, message: str) -> NoReturn:
     raise _WrongJoint
 
 
-def _check_named(builder: Builder, what: str, names: Sequence[str], path: KeyPath) -> None:
-    if not builder.check_named(what, names, path):
+def _check_named(builder: Builder, noun: str, names: Sequence[str], path: KeyPath) -> None:
+    if not builder.check_named(noun, names, path):
         raise _WrongJoint
     if len(names) == 2 and names[0] == names[1]:
         _refuse(builder, path, f"a joint of link {names[0]!r} with itself")
@@ -226,12 +226,12 @@ def _check_connected(builder: Builder) -> None:
 def _drives(builder: Builder) -> dict[str, Drive]:
     """Drives without mistakes in their names."""
     mechanism = builder.section
-    known: Mapping[str, tuple[str, Iterable[str]]] = {
+    candidates: Mapping[str, tuple[str, Iterable[str]]] = {
         "angle": ("moving link", mechanism.moving),
         "length": ("telescopic leg", mechanism.legs),
         "slide": ("slide", mechanism.slides),
     }
-    found: dict[str, Drive] = {}
+    drives: dict[str, Drive] = {}
     for name, section in mechanism.drives.items():
         kind, item = mechanism.driven(name)
         path: KeyPath = ("drives", name) if section is None else ("drives", name, kind)
@@ -247,22 +247,22 @@ def _drives(builder: Builder) -> dict[str, Drive]:
             )
             right = False
         else:
-            right = builder.check_name(item, known[kind][1], known[kind][0], path)
+            right = builder.check_name(item, candidates[kind][1], candidates[kind][0], path)
             if right and kind == "angle":
                 right = builder.check_name(reference, builder.section.links, "link", ("drives", name, "from"))
                 if reference == item:
                     mistake = "the angle of a link from itself never changes; name another link"
                     builder.report(("drives", name, "from"), mistake)
         if right:
-            found[name] = Drive(name, kind, item, reference)
-    return found
+            drives[name] = Drive(name, kind, item, reference)
+    return drives
 
 
 def _measures(builder: Builder) -> dict[str, Measure]:
     """Measures without mistakes in their names."""
     # A measure may use those above it.
-    known = [name for name in builder.section.coordinates if name not in builder.section.measures]
-    found: dict[str, Measure] = {}
+    above = [name for name in builder.section.coordinates if name not in builder.section.measures]
+    measures: dict[str, Measure] = {}
     for name, section in builder.section.measures.items():
         path: KeyPath = ("measures", name)
         pair = section.angle or section.distance
@@ -275,19 +275,19 @@ def _measures(builder: Builder) -> dict[str, Measure]:
                 builder.report(path, str(error))
                 continue
             parameters = builder.parameter_values
-            what, listed = "coordinate or parameter", [*known, *parameters]
-            if all(builder.check_name(item, listed, what, path) for item in sorted(expression.names)):
+            noun, listed = "coordinate or parameter", [*above, *parameters]
+            if all(builder.check_name(item, listed, noun, path) for item in sorted(expression.names)):
                 for item in expression.names & parameters.keys():
                     builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
-                found[name] = Measure(name, "expression", None, expression)
+                measures[name] = Measure(name, "expression", None, expression)
         elif pair is not None and builder.check_named(section.kind, pair, (*path, section.kind)):
-            found[name] = Measure(name, section.kind, pair)
+            measures[name] = Measure(name, section.kind, pair)
             one, other = (item.rpartition(".")[2] for item in pair)
             if section.distance is not None and one == other:
                 message = f"{one!r} twice is one place, whose distance has no sign: give {pair[1]}.x - {pair[0]}.x"
                 builder.report((*path, "distance"), message)
-        known.append(name)
-    return found
+        above.append(name)
+    return measures
 
 
 # Kinds of a spring's numbers between points, and between links.
@@ -304,7 +304,7 @@ _SPRING_KINDS: Mapping[str, tuple[Physical | Quantity, Physical | Quantity]] = {
 
 def _springs(builder: Builder) -> dict[str, Spring]:
     """Springs without mistakes in their names; their numbers become places."""
-    section, found = builder.section, dict[str, Spring]()
+    section, springs = builder.section, dict[str, Spring]()
     for name, spring in section.springs.items():
         path: KeyPath = ("springs", name)
         one, other = spring.between
@@ -313,8 +313,8 @@ def _springs(builder: Builder) -> dict[str, Spring]:
         if not builder.check_named("link" if turning else "point", spring.between, (*path, "between")):
             continue
         if one.rpartition(".")[2] == other.rpartition(".")[2]:
-            what = f"{one!r} and itself" if one == other else f"{one!r} and {other!r}, which are one place,"
-            builder.report((*path, "between"), f"a spring between {what} does nothing")
+            pair = f"{one!r} and itself" if one == other else f"{one!r} and {other!r}, which are one place,"
+            builder.report((*path, "between"), f"a spring between {pair} does nothing")
             continue
         wrong = ("free_length", "force", "rise") if turning else ("free_angle",)
         for key in spring.given(*wrong):
@@ -326,12 +326,12 @@ def _springs(builder: Builder) -> dict[str, Spring]:
             kind = _SPRING_KINDS[key][turning]
             builder.reporter.kind((*ROOT, *path, key), kind)
             terms[key] = builder.place(f"{name}.{key}", getattr(spring, key), kind)
-        found[name] = Spring(
+        springs[name] = Spring(
             name, spring.between, turning, terms.get("stiffness", terms.get("rise", 0.0)),
             terms.get("free_angle" if turning else "free_length", 0.0), terms.get("preload", 0.0),
             terms.get("force", 0.0), terms.get("damping", 0.0),
         )  # fmt: skip
-    return found
+    return springs
 
 
 def _couplings(builder: Builder) -> dict[str, Coupling]:
@@ -434,16 +434,16 @@ def _with_phases(builder: Builder, description: Description) -> Description:
 
 def _limits(builder: Builder) -> tuple[Limit, ...]:
     """Limits without mistakes in their names; their bounds become places."""
-    found = []
+    limits = []
     for index, section in enumerate(builder.section.limits):
         path: KeyPath = ("limits", index)
-        kind, given = section.kind, getattr(section, section.kind)
-        items: tuple[str, ...] = given if isinstance(given, tuple) else (given,)
+        kind, named = section.kind, getattr(section, section.kind)
+        items: tuple[str, ...] = named if isinstance(named, tuple) else (named,)
         right = builder.check_named(kind, items, (*path, kind))
         quantity: Quantity = "angle" if kind == "angle" else "length"
         if kind in ("drive", "measure"):
             quantity = (builder.section.driven_kinds if kind == "drive" else builder.section.measured_kinds).get(
-                given, "none"
+                named, "none"
             )
         bounds: list[Term | None] = []
         for end, value in (("min", section.min), ("max", section.max)):
@@ -451,12 +451,12 @@ def _limits(builder: Builder) -> tuple[Limit, ...]:
                 builder.reporter.kind((*ROOT, *path, end), quantity)
             bounds.append(None if value is None else builder.place(f"limits.{index}.{end}", value, quantity))
         expression = (
-            kind == "measure" and given in builder.section.measures and builder.section.measures[given].expression
+            kind == "measure" and named in builder.section.measures and builder.section.measures[named].expression
         )
         _check_bounds(builder, section, "none" if expression else quantity, path)
         if right:
-            found.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
-    return tuple(found)
+            limits.append(Limit(kind, items, bounds[0], bounds[1], f"limits.{index}"))
+    return tuple(limits)
 
 
 def _check_bounds(builder: Builder, section: models.Limit, quantity: Quantity, path: KeyPath) -> None:

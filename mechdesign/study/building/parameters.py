@@ -32,11 +32,11 @@ class Parameters:
 
     def moved(self, names: Collection[str]) -> set[str]:
         """Those of the names that are parameters, and the parameters that follow from them."""
-        found = {name for name in names if name in self.nominal}
+        moving = {name for name in names if name in self.nominal}
         for name, formula in self.formulas.items():
-            if formula.names & found:
-                found.add(name)
-        return found
+            if formula.names & moving:
+                moving.add(name)
+        return moving
 
     def moved_places(self, names: Collection[str]) -> set[str]:
         """Places that are among the names, or follow from one of them."""
@@ -109,7 +109,7 @@ class Parameters:
         """Places that a pattern such as ``*.length`` names."""
         return tuple(place for place in self._dimensions() if fnmatchcase(place, pattern))
 
-    def known(self) -> Iterable[str]:
+    def names(self) -> Iterable[str]:
         """Names of all parameters and dimensions."""
         return [*self.nominal, *self._dimensions()]
 

@@ -468,11 +468,11 @@ class MechanismSection(fields.Model):
     @cached_property
     def owners(self) -> Mapping[str, list[str]]:
         """Every point with the links that have it, in the order of the study."""
-        found: dict[str, list[str]] = {}
+        owners: dict[str, list[str]] = {}
         for link in self.links:
             for point in self.points_of(link):
-                found.setdefault(point, []).append(link)
-        return found
+                owners.setdefault(point, []).append(link)
+        return owners
 
     @cached_property
     def ends(self) -> Mapping[str, tuple[str, str]]:
@@ -521,16 +521,16 @@ class MechanismSection(fields.Model):
     @cached_property
     def measured_kinds(self) -> Mapping[str, Quantity]:
         """Measures and the kind of each."""
-        known, found = dict(self._coordinates), dict[str, Quantity]()
+        coordinates, kinds = dict(self._coordinates), dict[str, Quantity]()
         for name, measure in self.measures.items():
-            found[name] = "angle" if measure.kind == "angle" else "length"
+            kinds[name] = "angle" if measure.kind == "angle" else "length"
             if measure.expression is not None:
-                found[name] = "none"
+                kinds[name] = "none"
                 # A text that is no expression is reported by `description`.
                 with suppress(ExpressionError):
-                    found[name] = "angle" if Expression.parse(measure.expression).is_angle(known) else "none"
-            known[name] = found[name]
-        return found
+                    kinds[name] = "angle" if Expression.parse(measure.expression).is_angle(coordinates) else "none"
+            coordinates[name] = kinds[name]
+        return kinds
 
     @cached_property
     def coordinates(self) -> Mapping[str, Quantity]:
@@ -541,16 +541,16 @@ class MechanismSection(fields.Model):
     @cached_property
     def _coordinates(self) -> Mapping[str, Quantity]:
         """Every coordinate but measures and those of a link's points."""
-        found: dict[str, Quantity] = dict(self.driven_kinds)
+        kinds: dict[str, Quantity] = dict(self.driven_kinds)
         for point in self.owners:
-            found[f"{point}.x"] = found[f"{point}.y"] = "length"
+            kinds[f"{point}.x"] = kinds[f"{point}.y"] = "length"
         for link in self.moving:
-            found[f"{link}.angle"] = "angle"
+            kinds[f"{link}.angle"] = "angle"
         for leg in self.legs:
-            found[f"{leg}.length"] = "length"
+            kinds[f"{leg}.length"] = "length"
         for slide in self.slides:
-            found[f"{slide}.slide"] = "length"
-        return found
+            kinds[f"{slide}.slide"] = "length"
+        return kinds
 
 
 def _unit_of(kind: str) -> fields.Read:

@@ -32,7 +32,7 @@ class Checker:
         self.mechanism, self.places, self.reporter = builder.section, builder.places, builder.reporter
         self.parameters = parameters
         self.parts, self.folder = parts, folder
-        self.known, self.kind = builder.reporter.known, builder.reporter.kind
+        self.check_name, self.kind = builder.reporter.check_name, builder.reporter.kind
         self.report, self.doubt, self.units = builder.reporter.report, builder.reporter.doubt, builder.units
 
     def coordinate(
@@ -51,12 +51,14 @@ class Checker:
             if name in self.mechanism.owners:
                 self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
             elif name in self.mechanism.moving:
-                drives = [drive for drive, given in self.mechanism.drives.items() if given and given.angle == name]
+                drives = [
+                    drive for drive, section in self.mechanism.drives.items() if section and section.angle == name
+                ]
                 also = f", and its drive is {drives[0]}" if drives else ""
                 self.report(path, f"{name!r} is a link; its coordinate is {name}.angle{also}", at_key=at_key)
             else:
-                what = f"coordinate or {also}" if others else "coordinate"
-                self.known(name, [*self.mechanism.coordinates, *others], what, path, at_key=at_key)
+                noun = f"coordinate or {also}" if others else "coordinate"
+                self.check_name(name, [*self.mechanism.coordinates, *others], noun, path, at_key=at_key)
         return quantity
 
     def quantity(self, name: str) -> str | None:
@@ -76,14 +78,14 @@ class Checker:
 
     def outputs(self, outputs: Iterable[str] | None, path: KeyPath, columns: Collection[str] = ()) -> None:
         """Check the names in a list of outputs: coordinates, points, and `columns` of dynamics where they may stand."""
-        seen: set[str] = set()
+        listed: set[str] = set()
         for index, name in enumerate(outputs or ()):
             parts = self.mechanism.coordinates_of(name)
             if parts == (name,) and name not in columns:
                 self.coordinate(name, (*path, index), others=columns, also="column of dynamics")
-            if seen.intersection(parts):
+            if listed.intersection(parts):
                 self.report((*path, index), f"{name!r} is listed twice")
-            seen.update(parts)
+            listed.update(parts)
 
     def load(self, load: tuple[float, ...], path: KeyPath, *, on_pin: bool) -> tuple[float, ...]:
         """A load of the stiffness section's point or link as fx, fy, mz."""
@@ -104,11 +106,11 @@ class Checker:
     def choices(self) -> list[Any]:
         """Values that entries of the study have in cases of its matrix, or in designs."""
         matrix, optimize = self.parts.get("matrix"), self.parts.get("optimize")
-        varied = [] if matrix is None else [each.values for each in (matrix.vary or {}).values()]
+        varied = [] if matrix is None else [variation.values for variation in (matrix.vary or {}).values()]
         varied += [] if optimize is None else [variable.choices for variable in optimize.variables.values()]
         return [value for values in varied for value in values or ()]
 
-    def needs(self, section: str | None, what: str, path: KeyPath) -> None:
-        """Check that the study has a section that `what` needs."""
+    def needs(self, section: str | None, subject: str, path: KeyPath) -> None:
+        """Check that the study has a section that `subject` needs."""
         if section is not None and self.reporter.raw((section,)) is None:
-            self.report(path, f"{what} needs the {section} section, and the study has none")
+            self.report(path, f"{subject} needs the {section} section, and the study has none")

@@ -51,13 +51,13 @@ def _angles(checker: Checker, section: PoseSection) -> None:
             continue
         if factor == 1.0:
             slips = [size for size in sizes if size > MOST_TURNS * 2 * math.pi and size % STEP == 0]
-            meant = "deg"
+            other = "deg"
         else:
             slips = [size for size in sizes for turn in TURNS if abs(size / (turn * 2 * math.pi) - 1) < DIGITS]
-            meant = "rad"
-        if slips and meant != checker.units.angle:
+            other = "rad"
+        if slips and other != checker.units.angle:
             unit = checker.units.label("angle")
-            checker.doubt(path, f"{slips[0]:g} is in {unit} here; if {meant} is meant, say so: {slips[0]:g} {meant}")
+            checker.doubt(path, f"{slips[0]:g} is in {unit} here; if {other} is meant, say so: {slips[0]:g} {other}")
 
 
 def _given(section: PoseSection) -> Iterator[tuple[KeyPath, list[float]]]:
@@ -81,14 +81,14 @@ def _lengths(checker: Checker, description: Description) -> None:
         name: max((abs(a - b) for a, b in combinations(_points(link, description).values(), 2)), default=0.0)
         for name, link in description.links.items() if not link.telescopic
     }  # fmt: skip
-    known = {name: size for name, size in sizes.items() if size > 0}
-    if not known:
+    positive = {name: size for name, size in sizes.items() if size > 0}
+    if not positive:
         return
-    least, most = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
-    if known[most] >= APART * known[least] * (1 - 1e-9):
+    least, most = min(positive, key=positive.__getitem__), max(positive, key=positive.__getitem__)
+    if positive[most] >= APART * positive[least] * (1 - 1e-9):
         unit = checker.units.label("length")
-        told = " and ".join(f"{name} is {f'{known[name]:.6g} {unit}'.strip()} long" for name in (least, most))
-        checker.doubt(("mechanism", "links", least), f"{told}, a thousand times apart; are both in one unit?")
+        sentence = " and ".join(f"{name} is {f'{positive[name]:.6g} {unit}'.strip()} long" for name in (least, most))
+        checker.doubt(("mechanism", "links", least), f"{sentence}, a thousand times apart; are both in one unit?")
 
 
 def _pivots(checker: Checker, ground: Link, description: Description) -> None:
@@ -118,10 +118,10 @@ def _tolerances(checker: Checker, section: ReliabilitySection) -> None:
     for name, dimension in section.dimensions.items():
         low, high = map(float, dimension.ends(checker.size(name)))
         width = max(-low, high, dimension.sigma or 0.0)
-        slopes = parameters.derivatives(name) if name in parameters.known() else {}
+        slopes = parameters.derivatives(name) if name in parameters.names() else {}
         for place in lengths & slopes.keys():
             size = checker.places[place].nominal
             if width * abs(float(slopes[place])) > size:
-                told = f"a tolerance of {width:g} is larger than {place} itself, {size:g}"
-                checker.doubt(("reliability", "dimensions", name), f"{told}; is it in another unit?")
+                sentence = f"a tolerance of {width:g} is larger than {place} itself, {size:g}"
+                checker.doubt(("reliability", "dimensions", name), f"{sentence}; is it in another unit?")
                 break

@@ -29,7 +29,7 @@ def number_at(keys: KeyPath, parameters: Collection[str], places: Collection[str
     if kind == "parameters":
         return str(owner) if owner in parameters else ""
     if kind == "links" and rest:
-        rest = ["length"] if rest == [2] else [each for each in rest if each != "points"]
+        rest = ["length"] if rest == [2] else [part for part in rest if part != "points"]
         rest[-1] = "x" if rest[-1] == 0 else "y" if rest[-1] == 1 else rest[-1]
     place = ".".join(map(str, ([kind] if kind == "limits" else []) + [owner, *rest]))
     return place if place in places else ""
@@ -92,7 +92,7 @@ def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSecti
         own, keys = _named(name, variable, checker)
         varied.add(keys, name, path)
         variables[own] = variable
-        if own in parameters.known():
+        if own in parameters.names():
             above.append(own)
             _check_number(own, variable, path, checker)
         elif len(kinds := kinds_of(keys)) == 1:
@@ -102,12 +102,12 @@ def check_variables(section: OptimizeSection, checker: Checker) -> OptimizeSecti
 
 def _named(name: str, variable: Variable, checker: Checker) -> tuple[str, KeyPath]:
     """The name of a design variable, that of its parameter or dimension if it is one, and a path that identifies it."""
-    known, path = checker.parameters.known(), ("optimize", "variables", name)
-    if name in known:
+    names, path = checker.parameters.names(), ("optimize", "variables", name)
+    if name in names:
         return name, ("", name)
     if name.partition(".")[0] not in _DESIGNED:
-        what = "parameter or dimension" if "." not in name else "parameter, dimension or entry"
-        checker.known(name, known, what, path, at_key=True)
+        noun = "parameter or dimension" if "." not in name else "parameter, dimension or entry"
+        checker.check_name(name, names, noun, path, at_key=True)
         return name, ("", name)
     try:
         keys = entry(checker.reporter.document.data, name)

@@ -95,7 +95,7 @@ def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, mov
         for key, given in (("at", (load.at,)), ("between", load.between or ())):
             for point in given:
                 if point is not None:
-                    checker.known(point, points, "point", (*path, key))
+                    checker.check_name(point, points, "point", (*path, key))
         if load.between is not None and len({end.rpartition(".")[2] for end in load.between}) == 1:
             message = (
                 f"{load.between[0]!r} and {load.between[1]!r} are one place: a force between them has no direction"
@@ -103,7 +103,7 @@ def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, mov
             checker.report((*path, "between"), message)
         for key, link in (("in", load.in_), ("link", load.link)):
             if link is not None:
-                checker.known(link, mechanism.links, "link", (*path, key))
+                checker.check_name(link, mechanism.links, "link", (*path, key))
         if load.link == GROUND:
             checker.report((*path, "link"), "the ground does not move: a moment on it does nothing; leave it out")
         for keys, quantity, kind in load.numbers:

@@ -172,16 +172,16 @@ def read_column(folder: Folder, file: str, name: str | None) -> Floats:
         place = first.index(name)
     elif len(first) > 1:
         raise StudyError(f"{file} has {len(first)} columns: say by 'column' which one, by its name in the first line")
-    found = []
+    values = []
     for number, row in rows:
         value = _number(row[place]) if place < len(row) <= len(first) else None
         if value is not None and math.isfinite(value):
-            found.append(value)
+            values.append(value)
         elif row is not first or (name is None and value is not None):
-            what = f" of column {name!r}" if name is not None else ""
+            of_column = f" of column {name!r}" if name is not None else ""
             hint = "; a decimal is written with a point" if any("," in cell for cell in row) else ""
-            raise StudyError(f"{file}:{number}: the line has no finite number{what}{hint}")
-    return np.array(found)
+            raise StudyError(f"{file}:{number}: the line has no finite number{of_column}{hint}")
+    return np.array(values)
 
 
 def read_cells(folder: Folder, file: str) -> list[tuple[int, list[str]]]:

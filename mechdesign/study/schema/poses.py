@@ -143,13 +143,13 @@ class PoseSection(fields.Model):
         for index, pose in enumerate(self.poses or ()):
             checker.coordinates(pose, (self.command, "poses", index))
         checker.coordinates(self.sweep or (), (self.command, "sweep"))
-        for name, given in (self.path or {}).items():
+        for name, path in (self.path or {}).items():
             if name in checker.mechanism.owners:
                 continue
             place: KeyPath = (self.command, "path", name)
-            if checker.coordinate(name, place, at_key=True) is not None and (given.spline or given.shape is not None):
-                what = "spline" if given.spline else f"{given.shape}"
-                checker.report(place, f"{name!r} is no point: a {what} is the path of a point", at_key=True)
+            if checker.coordinate(name, place, at_key=True) is not None and (path.spline or path.shape is not None):
+                shape = "spline" if path.spline else f"{path.shape}"
+                checker.report(place, f"{name!r} is no point: a {shape} is the path of a point", at_key=True)
         return self
 
 
@@ -208,7 +208,7 @@ class MotionSection(PoseSection):
             _check_rates(checker, self)
         return super().checked(checker)
 
-    def of_given(self, drives: Collection[str]) -> bool:
+    def inverse(self, drives: Collection[str]) -> bool:
         """Whether its rates are those of the coordinates that the poses give rather than of the drives."""
         return self.speed is not None or not {*self.rates, *self.accelerations, *(self.motion or ())} <= {*drives}
 
@@ -242,24 +242,24 @@ def _check_rates(checker: Checker, section: MotionSection) -> None:
     given = _sets(checker, source)
     one = given[0] if len(given) == 1 else set()
     parts = (("rates", section.rates), ("accelerations", section.accelerations))
-    of_given = any(name in one and name not in drives for _, values in parts for name in values)
+    inverse = any(name in one and name not in drives for _, values in parts for name in values)
     for key, values in parts:
         for name in values:
-            if name not in checker.mechanism.coordinates or name in (one if of_given else drives):
+            if name not in checker.mechanism.coordinates or name in (one if inverse else drives):
                 continue
             message = f"{name!r} is not a drive: {key} are those of {', '.join(drives)}"
-            if of_given:
+            if inverse:
                 message = f"{name!r} is not among what the poses give: {key} are those of {', '.join(sorted(one))}"
             elif one and not one <= set(drives):
                 message += f", or of all coordinates that the poses give, {', '.join(sorted(one))}"
             elif len(given) > 1:
                 message += " where poses give different coordinates"
             checker.report((section.command, key, name), message, at_key=True)
-        missing = sorted(one - set(values)) if of_given and values else []
+        missing = sorted(one - set(values)) if inverse and values else []
         if missing:
             message = f"{', '.join(missing)} missing: {key} are those of all coordinates that the poses give"
             checker.report((section.command, key), message, at_key=True)
-        if values and not of_given and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
+        if values and not inverse and len(drives) > 1 and one and not one <= set(drives) and _moves(source):
             others = ", ".join(sorted(one))
             message = (
                 f"rates of drives that do not change are not those of this motion, which {others} give: say 'speed', "

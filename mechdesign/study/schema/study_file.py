@@ -58,10 +58,10 @@ class StudyFile(fields.Model):
 
 def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of a study file, with which editors complete and check."""
-    found = StudyFile.model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
-    name_forms(found)
+    form = StudyFile.model_json_schema(by_alias=True, schema_generator=Generator, mode="validation")
+    name_forms(form)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mechdesign study"}
-    return head | {key: value for key, value in found.items() if key not in head}
+    return head | {key: value for key, value in form.items() if key not in head}
 
 
 # Longest dotted name of an override, in characters.
@@ -111,9 +111,9 @@ def _apply(document: Document, text: str, label: str) -> None:
     else:
         holder[key] = parsed.data
     mark = Mark(label)
-    for known in (document.keys, document.values):
-        for old in [place for place in known if place[: len(path)] == path]:
-            del known[old]
+    for marks in (document.keys, document.values):
+        for old in [place for place in marks if place[: len(path)] == path]:
+            del marks[old]
     document.keys[path] = document.values[path] = mark
     document.spoiled = {place for place in document.spoiled if place[: len(path)] != path}
     if not there:
@@ -182,9 +182,9 @@ def entry(data: Any, name: str) -> KeyPath:
     _, path = _descend(Document("", data), segments, "", making=False)
     here = data
     for k, key in enumerate(path):
-        known = schema_fields(StudyFile, path[:k])
-        if not has(here, key) and key not in known:
-            names = [*known, *(here if isinstance(here, dict) else ())]
+        keys = schema_fields(StudyFile, path[:k])
+        if not has(here, key) and key not in keys:
+            names = [*keys, *(here if isinstance(here, dict) else ())]
             hint = suggestion(str(key), names) or "; give it a value there first"
             raise StudyError(f"the study has no {dotted(path[: k + 1])}{hint}")
         here = (here[key] if has(here, key) else None) or {}

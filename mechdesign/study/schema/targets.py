@@ -50,30 +50,30 @@ class Target:
         return tuple(sorted(self.expression.names)) if self.expression is not None else ()
 
 
-def check(checker: Checker, wanted: Mapping[str, Wanted]) -> dict[str, Target]:
+def check(checker: Checker, written: Mapping[str, Wanted]) -> dict[str, Target]:
     """Targets without mistakes; the mistakes of the others are reported."""
-    found: dict[str, Target] = {}
-    seen: dict[str, str] = {}
-    for owner, value in wanted.items():
+    targets: dict[str, Target] = {}
+    owners: dict[str, str] = {}
+    for owner, value in written.items():
         path: KeyPath = (*ROOT, owner)
         point = owner in checker.mechanism.owners
         if not point and checker.coordinate(owner, path, at_key=True) is None:
             continue
         coordinates = checker.mechanism.coordinates_of(owner)
-        for name in [name for name in coordinates if name in seen][:1]:
-            checker.report(path, f"{name} has a target already, by {seen[name]!r}", at_key=True)
-        seen.update(dict.fromkeys(coordinates, owner))
+        for name in [name for name in coordinates if name in owners][:1]:
+            checker.report(path, f"{name} has a target already, by {owners[name]!r}", at_key=True)
+        owners.update(dict.fromkeys(coordinates, owner))
         quantity = "length" if point else checker.mechanism.coordinates[owner]
         if not isinstance(value, Expression):
             table = _table(checker, owner, value, path, len(coordinates), quantity)
             if table is not None:
                 moved = () if isinstance(value, str) or not any(own_numbers(value)) else value
-                found[owner] = Target(owner, coordinates, table=table, rows=moved)
+                targets[owner] = Target(owner, coordinates, table=table, rows=moved)
         elif _right(checker, owner, value, path, point):
             if quantity != "none":
                 checker.kind(path, quantity)
-            found[owner] = Target(owner, coordinates, value)
-    return found
+            targets[owner] = Target(owner, coordinates, value)
+    return targets
 
 
 def _right(checker: Checker, owner: str, expression: Expression, path: KeyPath, point: bool) -> bool:
@@ -101,8 +101,8 @@ def _table(checker: Checker, owner: str, value: Any, path: KeyPath, count: int, 
         return None
     columns = table.shape[1]
     if columns not in (count, count + 1):
-        what = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
-        checker.report(path, f"a row of the target of {owner!r} is {what}, not {columns} numbers")
+        form = "[x, y] or [drive, x, y]" if count == 2 else "[value] or [drive, value]"
+        checker.report(path, f"a row of the target of {owner!r} is {form}, not {columns} numbers")
         return None
     if not isinstance(value, str) and quantity != "none":
         for index, place in np.ndindex(len(table), count):

@@ -24,9 +24,9 @@ def template_path(name: str = BUILT_IN) -> Path:
     StudyError
         If there is none of that name.
     """
-    known = templates()
-    if name not in known:
-        raise StudyError(f"there is no template {name!r}{suggestion(name, known)}; there are {', '.join(known)}")
+    names = templates()
+    if name not in names:
+        raise StudyError(f"there is no template {name!r}{suggestion(name, names)}; there are {', '.join(names)}")
     return _FOLDER / f"{name}.yaml"
 
 

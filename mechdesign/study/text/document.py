@@ -223,7 +223,7 @@ class _Builder:
         pairs = list(pairwise(node.value)) if node.flow_style else []
         near = [two.start_mark.index - one.end_mark.index == 1 for one, two in pairs]
         for (one, two), joined in zip(pairs, near, strict=True):
-            if joined and not all(near) and all(_INTEGER.fullmatch(str(each.value)) for each in (one, two)):
+            if joined and not all(near) and all(_INTEGER.fullmatch(str(item.value)) for item in (one, two)):
                 self.document.commas[path] = f"{one.value}.{two.value}"
 
     def _check_lone_key(self, key: Any, path: KeyPath, before: Sequence[Any]) -> None:

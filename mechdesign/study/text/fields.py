@@ -66,9 +66,9 @@ class Context:
 
     def expression(self, text: str) -> Expression:
         """Parse an expression in the study's units and note the names in it."""
-        found = Expression.parse(text, self.units.angle_factor)
-        self.used.update(found.names)
-        return found
+        expression = Expression.parse(text, self.units.angle_factor)
+        self.used.update(expression.names)
+        return expression
 
 
 LOST = Amount(math.nan)
@@ -113,9 +113,9 @@ def read_number(raw: object, context: Context, kind: str | None = None) -> Amoun
         raise failure("too large a number; choose a larger unit") from None
     if not isinstance(raw, str) and not math.isfinite(value):
         raise failure(f"expected a finite number, not {value:g}")
-    largest, what = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")
+    largest, noun = (MAX_LENGTH, "length") if kind == "length" else (MAX_NUMBER, "number")
     if abs(value) > largest:
-        raise failure(f"{shown(raw)} is too large a {what}: none is beyond {largest:g}; choose a larger unit")
+        raise failure(f"{shown(raw)} is too large a {noun}: none is beyond {largest:g}; choose a larger unit")
     return value
 
 
@@ -171,8 +171,8 @@ def read_rows(raw: list[Any], context: Context, most: int, rule: str, empty: str
 def _known_names(name: str, context: Context) -> str:
     if name in context.below:
         return f"; a parameter may use those above it, and {name!r} is below"
-    known = ", ".join(islice(context.parameters, MAX_NAMED))
-    return suggestion(name, context.parameters) or (f"; the parameters are {known}" if known else "")
+    listed = ", ".join(islice(context.parameters, MAX_NAMED))
+    return suggestion(name, context.parameters) or (f"; the parameters are {listed}" if listed else "")
 
 
 def as_list(raw: Any) -> list[Any]:
@@ -180,12 +180,12 @@ def as_list(raw: Any) -> list[Any]:
     return raw if isinstance(raw, list) else [] if raw is None else [raw]
 
 
-def pair_of(what: str) -> BeforeValidator:
+def pair_of(description: str) -> BeforeValidator:
     """Annotation of a list of two, which are described for the message."""
 
     def check(raw: Any) -> Any:
         if not isinstance(raw, list) or len(raw) != 2:
-            raise failure(f"expected {what}, not {shown(raw)}")
+            raise failure(f"expected {description}, not {shown(raw)}")
         return raw
 
     return BeforeValidator(check)
@@ -196,14 +196,14 @@ class Read:
     """Annotation of a value that a function reads, and the JSON Schema of what it accepts.
 
     Of a number `kind` is that of `units.KINDS`, if it is the same everywhere; of a word out of a list `words` are its
-    meanings, and `what` is what they are.
+    meanings, and `title` names them all.
     """
 
     function: Callable[[Any, Context], Any]
     accepted: Form | Callable[[], Form]
     kind: str = ""
     words: Mapping[str, Any] | None = None
-    what: str = ""
+    title: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.with_info_plain_validator_function(
@@ -216,11 +216,11 @@ class Read:
 
 def reads(annotation: Any, metadata: Sequence[Any] = ()) -> Iterator[Read]:
     """The `Read` annotations in an annotation, except those inside models."""
-    for each in (*metadata, *get_args(annotation)):
-        if isinstance(each, Read):
-            yield each
-        elif get_args(each):
-            yield from reads(each)
+    for part in (*metadata, *get_args(annotation)):
+        if isinstance(part, Read):
+            yield part
+        elif get_args(part):
+            yield from reads(part)
 
 
 def number(
@@ -240,8 +240,8 @@ def number(
         if minimum is not None and 0 < size < smallest:
             raise failure(f"{size:g} is too small a number: none but 0 is below {smallest:g}; choose a smaller unit")
         if minimum is not None and (size < minimum or (exclusive and size == minimum)):
-            what = positive(minimum, exclusive=exclusive)
-            raise failure(f"must be {what}, not {size:g}")
+            bound = positive(minimum, exclusive=exclusive)
+            raise failure(f"must be {bound}, not {size:g}")
         size.least, size.exclusive = minimum, exclusive
         return size
 
@@ -265,7 +265,7 @@ def whole(minimum: int = 0, maximum: int | None = None) -> Read:
 
     def read(raw: Any, context: Context) -> int:
         if isinstance(raw, int) and not isinstance(raw, bool):
-            found = raw
+            value = raw
         else:
             size = read_number(raw, context, "none")
             context.fixed.update(size.expression.names if size.expression else ())
@@ -273,31 +273,31 @@ def whole(minimum: int = 0, maximum: int | None = None) -> Read:
                 return minimum
             if not size.is_integer():
                 raise failure(f"expected a whole number, not {size:g}")
-            found = int(size)
-        if found < minimum:
-            raise failure(f"must be at least {minimum}, not {found}")
-        if maximum is not None and found > maximum:
-            raise failure(f"must be at most {maximum}, not {shown(found)}")
-        return found
+            value = int(size)
+        if value < minimum:
+            raise failure(f"must be at least {minimum}, not {value}")
+        if maximum is not None and value > maximum:
+            raise failure(f"must be at most {maximum}, not {shown(value)}")
+        return value
 
     form = {"type": ["integer", "number", "string"], "minimum": minimum, "title": "whole number"}
     return Read(read, form, "none")
 
 
-def name_of(what: str, pattern: re.Pattern[str] = NAME) -> Read:
-    """Annotation of a name; `what` is for the message: "a point"."""
+def name_of(noun: str, pattern: re.Pattern[str] = NAME) -> Read:
+    """Annotation of a name; the message calls it by `noun`: "a point"."""
 
     def read(raw: Any, context: Context) -> str:
         if isinstance(raw, str) and pattern.fullmatch(raw):
             return raw
         rule = "; a name is letters, digits and underscores, with a letter first" if isinstance(raw, str) else ""
-        raise failure(f"expected the name of {what}, not {shown(raw)}{rule}")
+        raise failure(f"expected the name of {noun}, not {shown(raw)}{rule}")
 
-    return Read(read, {**NAME_FORM, "title": what.partition(" ")[2].partition(" (")[0]})
+    return Read(read, {**NAME_FORM, "title": noun.partition(" ")[2].partition(" (")[0]})
 
 
-def choice(words: Mapping[str, Any], what: str) -> Read:
-    """Annotation of a word out of a list, each with its meaning (or what has one); `what` is what they are."""
+def choice(words: Mapping[str, Any], title: str) -> Read:
+    """Annotation of a word out of a list, each with its meaning (or what has one); `title` names them all."""
 
     def read(raw: Any, context: Context) -> str:
         if isinstance(raw, str) and raw in words:
@@ -306,9 +306,9 @@ def choice(words: Mapping[str, Any], what: str) -> Read:
         raise failure(f"expected one of {', '.join(words)}, not {shown(raw)}{hint}")
 
     def form() -> Form:
-        return {"title": what, "enum": list(words), "enumDescriptions": [meaning(words[word]) for word in words]}
+        return {"title": title, "enum": list(words), "enumDescriptions": [meaning(words[word]) for word in words]}
 
-    return Read(read, form, words=words, what=what)
+    return Read(read, form, words=words, title=title)
 
 
 def meaning(declared: Any) -> str:
@@ -326,8 +326,8 @@ class OrShort:
         self.forms = forms
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        found = handler(schema)
-        return {"anyOf": [found, *(self.forms or [found["items"]])]}
+        form = handler(schema)
+        return {"anyOf": [form, *(self.forms or [form["items"]])]}
 
 
 class Misfit(NamedTuple):
@@ -348,7 +348,7 @@ class Misfit(NamedTuple):
 
     def message(self, design: int = 0) -> str:
         """The text with the numbers of one design."""
-        return self.text.format(*(written(each[design] if np.ndim(each) else each) for each in self.numbers))
+        return self.text.format(*(written(number[design] if np.ndim(number) else number) for number in self.numbers))
 
 
 class KeyText(NamedTuple):
@@ -362,17 +362,17 @@ def parts_of(part: Any, key: str) -> Iterator[tuple[str, Any]]:
     """The sections and numbers in a part of a study, itself among them, with their keys."""
     if isinstance(part, Model | Amount):
         yield key, part
-    for name, each in _inside(part):
-        yield from parts_of(each, f"{key}.{name}")
+    for name, inner in _inside(part):
+        yield from parts_of(inner, f"{key}.{name}")
 
 
 def own_numbers(part: Any) -> Iterator[Amount]:
     """The numbers of a part of a study that follow parameters, without those of sections inside it."""
     if isinstance(part, Amount) and part.expression is not None:
         yield part
-    for _, each in _inside(part):
-        if not isinstance(each, Model):
-            yield from own_numbers(each)
+    for _, inner in _inside(part):
+        if not isinstance(inner, Model):
+            yield from own_numbers(inner)
 
 
 def _inside(part: Any) -> Iterator[tuple[Any, Any]]:
@@ -413,9 +413,9 @@ def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
 
     They are read where a reference or a JSON Schema is asked for only: pydantic would read them at every start.
     """
-    found = {}
+    texts = {}
     tree = ast.parse(inspect.getsource(sys.modules[module]))
-    for holder in (each for each in tree.body if isinstance(each, ast.ClassDef)):
+    for holder in (node for node in tree.body if isinstance(node, ast.ClassDef)):
         for key, below in pairwise(holder.body):
             if not isinstance(key, ast.AnnAssign) or not isinstance(key.target, ast.Name):
                 continue
@@ -423,8 +423,8 @@ def _texts(module: str) -> Mapping[tuple[str, str], KeyText]:
                 continue
             text, *examples = " ".join(str(below.value.value).split()).split(_EXAMPLE)
             text = _CONSTANT.sub(lambda name: str(getattr(sys.modules[module], name[1])), text)
-            found[holder.name, key.target.id] = KeyText(quoted(text), tuple(examples))
-    return found
+            texts[holder.name, key.target.id] = KeyText(quoted(text), tuple(examples))
+    return texts
 
 
 def quoted(text: str) -> str:
@@ -500,14 +500,14 @@ class Model(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        found = handler(schema)
-        form = handler.resolve_ref_schema(found)
+        reference = handler(schema)
+        form = handler.resolve_ref_schema(reference)
         form["description"] = cls.said_of_all()
         for key in cls.fields_by_key():
             text, examples = cls.said(key)
-            told = {"description": text, "examples": [read(example.encode(), key).data for example in examples]}
-            form["properties"][key].update({name: value for name, value in told.items() if value})
-        return {"anyOf": [dict(form), *cls.short]} if cls.short else found
+            entries = {"description": text, "examples": [read(example.encode(), key).data for example in examples]}
+            form["properties"][key].update({name: value for name, value in entries.items() if value})
+        return {"anyOf": [dict(form), *cls.short]} if cls.short else reference
 
 
 Number = Annotated[float, number()]

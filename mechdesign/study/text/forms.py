@@ -33,18 +33,18 @@ class Generator(GenerateJsonSchema):
 
     def model_schema(self, schema: core_schema.ModelSchema) -> Form:
         """The schema of a model, without its title."""
-        found = super().model_schema(schema)
-        found.pop("title", None)
-        return found
+        form = super().model_schema(schema)
+        form.pop("title", None)
+        return form
 
     def dict_schema(self, schema: core_schema.DictSchema) -> Form:
         """The schema of a mapping, whose keys and values keep their titles."""
-        found = super().dict_schema(schema)
+        form = super().dict_schema(schema)
         if "keys_schema" in schema and schema["keys_schema"]["type"] != "str":
-            found["propertyNames"] = self.generate_inner(schema["keys_schema"])
+            form["propertyNames"] = self.generate_inner(schema["keys_schema"])
         if "values_schema" in schema:
-            found["additionalProperties"] = self.generate_inner(schema["values_schema"])
-        return found
+            form["additionalProperties"] = self.generate_inner(schema["values_schema"])
+        return form
 
 
 def name_forms(schema: Form) -> None:
@@ -56,26 +56,26 @@ def name_forms(schema: Form) -> None:
 
 def properties(model: Form) -> dict[str, Form]:
     """The schema of each key of a model; with short forms, the model is the first alternative."""
-    found: dict[str, Form] = model.get("anyOf", [model])[0]["properties"]
-    return found
+    properties: dict[str, Form] = model.get("anyOf", [model])[0]["properties"]
+    return properties
 
 
-def in_words(form: Form, known: Mapping[str, Form]) -> str:
-    """The values that a form accepts, as written in a study; `known` are the models that it refers to."""
+def in_words(form: Form, models: Mapping[str, Form]) -> str:
+    """The values that a form accepts, as written in a study; `models` are those that it refers to."""
     if "title" in form:
         return str(form["title"])
     if "$ref" in form:
-        return in_words(known[form["$ref"].rpartition("/")[2]], known)
+        return in_words(models[form["$ref"].rpartition("/")[2]], models)
     if arms := form.get("anyOf", form.get("oneOf")):
-        return " or ".join(dict.fromkeys(in_words(arm, known) for arm in arms if arm.get("type") != "null"))
+        return " or ".join(dict.fromkeys(in_words(arm, models) for arm in arms if arm.get("type") != "null"))
     if "const" in form or "enum" in form:
         return " or ".join(map(str, form.get("enum", [form.get("const")])))
     if "prefixItems" in form:
-        return f"[{', '.join(in_words(part, known) for part in form['prefixItems'])}]"
+        return f"[{', '.join(in_words(part, models) for part in form['prefixItems'])}]"
     if "items" in form:
-        each = in_words(form["items"], known)
-        return f"[{each}, {each}]" if form.get("maxItems") == 2 else f"[{each}, ...]"
+        item = in_words(form["items"], models)
+        return f"[{item}, {item}]" if form.get("maxItems") == 2 else f"[{item}, ...]"
     if isinstance(form.get("additionalProperties"), dict):
-        by = in_words(form.get("propertyNames", fields.NAME_FORM), known)
-        return f"{{{by}: {in_words(form['additionalProperties'], known)}, ...}}"
+        by = in_words(form.get("propertyNames", fields.NAME_FORM), models)
+        return f"{{{by}: {in_words(form['additionalProperties'], models)}, ...}}"
     return "mapping" if form.get("type") == "object" else _TYPES[form["type"]]

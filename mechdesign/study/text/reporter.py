@@ -35,9 +35,9 @@ _EXPECTED = defaultdict(
 _MAPPINGS = ("dict_type", "model_type", "model_attributes_type")
 
 
-def unknown_key(name: str, known: Iterable[str]) -> str:
+def unknown_key(name: str, names: Iterable[str]) -> str:
     """Message of an unknown key, with the most similar key."""
-    return f"unknown key{suggestion(name, known)}"
+    return f"unknown key{suggestion(name, names)}"
 
 
 class Reporter:
@@ -55,28 +55,28 @@ class Reporter:
         """Mistakes found so far, each once."""
         return list(self._problems)
 
-    def known(
-        self, name: str, known: Iterable[str], what: str, path: Iterable[str | int], *, at_key: bool = False
+    def check_name(
+        self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int], *, at_key: bool = False
     ) -> bool:
-        """Whether a name is known; if not, report it with the most similar name."""
-        candidates = list(known)
+        """Whether a name is among the names; if not, report it with the most similar of them."""
+        candidates = list(names)
         if name in candidates:
             return True
         hint = suggestion(name, candidates)
         if candidates and not hint:
             hint = f"; there are {', '.join(candidates[:MAX_NAMED])}"
-        self.report(tuple(path), f"there is no {what} {name!r}{hint}", at_key=at_key)
+        self.report(tuple(path), f"there is no {noun} {name!r}{hint}", at_key=at_key)
         return False
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Report a mistake at a path of the data, which may go through the long form of a short one."""
-        found = self.written(path)
-        above = [found[:length] for length in range(len(found) + 1)]
+        place = self.written(path)
+        above = [place[:length] for length in range(len(place) + 1)]
         if not self.document.spoiled.isdisjoint(above):
             return
         comma = next((self.document.commas[part] for part in above if part in self.document.commas), None)
         hint = f"; a decimal is written with a point: {comma}" if comma is not None else ""
-        self._problems[self._placed(found, message + hint, at_key)] = None
+        self._problems[self._placed(place, message + hint, at_key)] = None
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Report quantities at or below a path of the data whose unit is of another kind."""
@@ -90,27 +90,27 @@ class Reporter:
                 except QuantityError as error:
                     self.report((*path, *keys), str(error))
 
-    def unused(self, path: KeyPath, what: str, others: Iterable[str]) -> None:
+    def unused(self, path: KeyPath, noun: str, others: Iterable[str]) -> None:
         """Warn of a name that nothing uses; if an override added it, report it as misspelt."""
         name = path[-1]
         if path in self.document.added:
             hint = suggestion(str(name), others)
-            self.report(path, f"the study has no {what} {name!r}, and nothing uses one{hint}", at_key=True)
+            self.report(path, f"the study has no {noun} {name!r}, and nothing uses one{hint}", at_key=True)
         else:
-            self.doubt(path, f"nothing uses {what} {name!r}", at_key=True)
+            self.doubt(path, f"nothing uses {noun} {name!r}", at_key=True)
 
     def doubt(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Warn of what is likely a mistake at a path of the data."""
         self.warnings.append(self._placed(self.written(path), message, at_key))
 
-    def _placed(self, found: KeyPath, message: str, at_key: bool) -> Problem:
-        known = found
-        while known and known not in self.document.values:
-            known = known[:-1]
-        mark = self.document.values[known]
-        if (at_key or known != found) and known in self.document.keys:
-            mark = self.document.keys[known]
-        return mark.problem(message, dotted(found))
+    def _placed(self, path: KeyPath, message: str, at_key: bool) -> Problem:
+        nearest = path
+        while nearest and nearest not in self.document.values:
+            nearest = nearest[:-1]
+        mark = self.document.values[nearest]
+        if (at_key or nearest != path) and nearest in self.document.keys:
+            mark = self.document.keys[nearest]
+        return mark.problem(message, dotted(path))
 
     def done(self) -> None:
         """Raise all problems, in the order of the text.
@@ -140,27 +140,27 @@ class Reporter:
     def written(self, path: Sequence[str | int]) -> KeyPath:
         """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
         data: Any = self.document.data
-        found: list[str | int] = []
+        keys: list[str | int] = []
         remaining = list(path)
         while remaining:
             segment = remaining.pop(0)
             if has(data, segment):
-                found.append(segment)
+                keys.append(segment)
                 data = data[segment]
-            elif data is None or not found:
+            elif data is None or not keys:
                 # An empty or missing section has no short forms.
-                return (*found, segment, *remaining)
+                return (*keys, segment, *remaining)
             elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
-                found.append(LIST_FORM[str(segment)])
+                keys.append(LIST_FORM[str(segment)])
                 data = data[LIST_FORM[str(segment)]]
             elif isinstance(data, list) and segment in data:
-                found.append(data.index(segment))
+                keys.append(data.index(segment))
                 data = segment
             elif remaining or not isinstance(data, dict):
                 continue
             else:
-                found.append(segment)
-        return tuple(found)
+                keys.append(segment)
+        return tuple(keys)
 
     def report_validation(self, error: ValidationError, root: type[Model], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
@@ -171,8 +171,8 @@ class Reporter:
                 location = location[:-1]
             kind = item["type"]
             if kind == "extra_forbidden":
-                known = schema_fields(root, location[:-1])
-                self.report(location, unknown_key(str(location[-1]), known), at_key=True)
+                names = schema_fields(root, location[:-1])
+                self.report(location, unknown_key(str(location[-1]), names), at_key=True)
             elif kind == "missing":
                 self.report(location, f"is missing{_meaning(root, location)}", at_key=True)
             else:

@@ -289,7 +289,7 @@ def kind_of(value: object) -> str | None:
     """Name in `KINDS` of the quantity as which a number was written; None for a bare number and any other quantity."""
     text = text_of(value)
     powers = measure(text)[1] if text else None
-    return next((name for name, known in KINDS.items() if known == powers), None)
+    return next((name for name, exponents in KINDS.items() if exponents == powers), None)
 
 
 # Common units with their kind and SI value, read without pint's registry, which takes long to build.
@@ -321,8 +321,8 @@ def check_unit(kind: str, name: str) -> None:
     with contextlib.suppress(QuantityError):
         if (kind, name) == ("length", "dimensionless") or measure(f"1 {name}")[1] == KINDS[kind]:
             return
-    known = ", ".join(unit for unit, (what, _) in _COMMON.items() if what == kind)
-    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {known}")
+    examples = ", ".join(unit for unit, (unit_kind, _) in _COMMON.items() if unit_kind == kind)
+    raise QuantityError(f"{name!r} is not a unit of {kind}; for example {examples}")
 
 
 def _masses(powers: Powers) -> int:
@@ -386,8 +386,8 @@ def _unit(unit: str) -> tuple[Powers, float]:
         parsed = registry.parse_units(power.replace("^", "**").replace("·", "*"))
         base = registry.Quantity(1.0, parsed).to_base_units()
     except Exception:  # pint raises errors of many classes
-        known = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
-        near = _MEANT.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *known))
+        defined = (line.partition("=")[0].strip() for line in _DEFINITIONS.split("\n"))
+        near = _MEANT.get(unit.replace(" ", "").casefold()) or nearest(unit, (*_COMMON, *defined))
         raise QuantityError(f"unknown unit {unit!r}" + f"; did you mean {near!r}?" * (near is not None)) from None
     dimensions = {str(name): power for name, power in base.dimensionality.items()}
     mass, length = dimensions.get("[mass]", 0), dimensions.get("[length]", 0)
@@ -410,8 +410,8 @@ def _registry() -> Any:
 
 def _describe(powers: Powers) -> str:
     """Name a kind of quantity for a message."""
-    for name, known in KINDS.items():
-        if known == powers:
+    for name, exponents in KINDS.items():
+        if exponents == powers:
             article = "an" if name[0] in "aeiou" else "a"
             return "a pure number" if name == "none" else f"{article} {name.replace('_', ' ')}"
     names = ("length", "angle", "time", "force")

@@ -53,12 +53,12 @@ def main_effects(view: CasesView) -> Figure | None:
     columns = min(len(across), _fitting())
     blocks = [across[k : k + columns] for k in range(0, len(across), columns)]
     down = results[: max(1, MOST_ROWS // len(blocks))]
-    alone = all(which.sum() == 1 for each in across for _, which in each.groups())
-    gathered = any(len(each.distinct) > MOST_VALUES for each in across)
+    alone = all(which.sum() == 1 for axis in across for _, which in axis.groups())
+    gathered = any(len(axis.distinct) > MOST_VALUES for axis in across)
     by = f"value, many values in {CLASSES} classes of as many cases" if gathered else "value"
     shown = "each case" if alone else f"mean (dot) and range (bar) of the cases of each {by}"
     words = f"main effects over {counted(count, 'case')}: {shown}"
-    if any(each.limits for each in down):
+    if any(axis.limits for axis in down):
         words += "; grey: not met"
     words += without_number(down, count) + left_out(entries, across, "entry") + left_out(results, down, "result")
     head, top = title(words)
@@ -109,7 +109,7 @@ def scatter(view: CasesView) -> Figure | None:
     side = min(_SQUARE, (style.width() - _MARGINS["left"] - _MARGINS["right"] - (size - 1) * _ACROSS) / size)
     kinds, (drawn, dot) = kinds_of(table, required=required), sample(table, MOST_DRAWN)
     cases = "cases" if len(drawn) == len(table) else f"an even sample of {len(drawn):,} of {len(table):,} cases"
-    limits = "; grey: not met" if any(each.limits for each in taken) else ""
+    limits = "; grey: not met" if any(axis.limits for axis in taken) else ""
     omitted = left_out(entries, taken, "entry") + left_out(results, taken, "result")
     head, top = title(f"{cases}: every two quantities against each other{limits}{omitted}")
     columns = 1 if style.narrow() else 2

@@ -60,10 +60,10 @@ def response(view: CasesView) -> Figure | None:
     pairs = (Plane.of(x, y, others=len(entries) > 2) for x, y in combinations(numbers[:MOST_ENTRIES], 2))
     most = MOST_BELOW if style.narrow() else MOST_MAPS
     planes = [plane for plane in pairs if plane is not None][:most]
-    asked = sorted((result for result in results if result.ends), key=lambda each: each.name not in goals)
-    if not planes or not asked:
+    ranked = sorted((result for result in results if result.ends), key=lambda axis: axis.name not in goals)
+    if not planes or not ranked:
         return None
-    taken, limited = asked[: most // len(planes)], [result for result in results if result.limits]
+    taken, limited = ranked[: most // len(planes)], [result for result in results if result.limits]
     gates = [Gates.of(plane, limited, table) for plane in planes if limited]
     met = table["exit_code"] == 0
     counts = [met | gate.nearest for gate in gates] or [met] * len(planes)
@@ -96,8 +96,8 @@ def response(view: CasesView) -> Figure | None:
             kind.draw(axes, plane.x.values, plane.y.values, drawn, size)
         frame(axes, plane.x, plane.y, _room(panels), _TALL - 1)
     keys += [
-        Line2D([], [], color=style.INK, linestyle=_dashes(k), linewidth=1.4, label=_limits_in_words(each))
-        for k, each in enumerate(limited)
+        Line2D([], [], color=style.INK, linestyle=_dashes(k), linewidth=1.4, label=_limits_in_words(axis))
+        for k, axis in enumerate(limited)
         if any(gate.crossed(k) for gate in gates)
     ]
     words = [f"response maps over {len(table):,} cases"]
@@ -105,7 +105,7 @@ def response(view: CasesView) -> Figure | None:
     words += [f"in {plane.classes} classes of each entry" for plane in planes[:1] if plane.classes]
     words += ["of the cases that meet every requirement, else of the nearest miss"] * bool(len(entries) > 2 and limited)
     words += ["hatched: what is required is not met"] * any(gate.unmet for gate in gates)
-    heading = "; ".join(words) + without_number(taken, len(table)) + left_out(asked, taken, "result")
+    heading = "; ".join(words) + without_number(taken, len(table)) + left_out(ranked, taken, "result")
     heading = style.folded(heading + left_out(numbers, numbers[:MOST_ENTRIES], "entry"), TITLE, style.width() - 0.2)
     figure.suptitle(heading, x=0.01, ha="left", fontsize=TITLE)
     columns = 1 if style.narrow() else 2
@@ -133,8 +133,8 @@ def _room(panels: Sequence[Axes]) -> float:
 
 def _norm(fields: Sequence[Floats], met: Floats) -> BoundaryNorm:
     """Levels over the values of cases that meet every requirement and somewhat beyond, without any over all."""
-    known, inside = (values[np.isfinite(values)] for values in (np.concatenate(fields), met))
-    low, high = float(known.min()), float(known.max())
+    finite, inside = (values[np.isfinite(values)] for values in (np.concatenate(fields), met))
+    low, high = float(finite.min()), float(finite.max())
     ends = low, high
     if inside.size:
         around = _AROUND * np.ptp(inside)

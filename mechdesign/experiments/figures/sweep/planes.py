@@ -24,9 +24,9 @@ Reduction = Callable[[Floats, Ints], Floats]
 
 
 def _mean(values: Floats, starts: Ints) -> Floats:
-    known = np.isfinite(values)
-    number = np.add.reduceat(known.astype(float), starts)
-    total = np.add.reduceat(np.where(known, values, 0.0), starts)
+    finite = np.isfinite(values)
+    number = np.add.reduceat(finite.astype(float), starts)
+    total = np.add.reduceat(np.where(finite, values, 0.0), starts)
     return np.asarray(np.where(number > 0, total / np.maximum(number, 1.0), np.nan))
 
 
@@ -65,7 +65,7 @@ class Plane:
     def of(cls, x: Axis, y: Axis, *, others: bool) -> Plane | None:
         """The plane of two entries, beside which others vary or not; None where the cases lie on a line."""
         steps = (x.distinct, y.distinct)
-        across, up = (np.searchsorted(step, each.values) for step, each in zip(steps, (x, y), strict=True))
+        across, up = (np.searchsorted(step, axis.values) for step, axis in zip(steps, (x, y), strict=True))
         plane = cls(x, y, steps, *np.unique(across * len(steps[1]) + up, return_inverse=True))
         if len(steps[0]) * len(steps[1]) <= 2 * len(plane.cells):
             return plane
@@ -159,7 +159,7 @@ class Gates:
     @classmethod
     def of(cls, plane: Plane, limited: Sequence[Axis], table: Table) -> Gates:
         """What results with limits make of a plane."""
-        every = [_margin(each, table[f"{each.name}_met"] == 1) for each in limited]
+        every = [_margin(axis, table[f"{axis.name}_met"] == 1) for axis in limited]
         single = [plane.over(plane.reduced(margin, np.fmax.reduceat)) for margin in every]
         margin = np.min(every, axis=0)
         most = plane.reduced(margin, np.fmax.reduceat)

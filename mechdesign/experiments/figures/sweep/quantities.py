@@ -53,7 +53,7 @@ class Axis:
         """The axis of a column."""
         name = short(column.name)
         if column.numeric:
-            low, high = (None if each is None else Amount.of(each).within(column.unit) for each in (low, high))
+            low, high = (None if bound is None else Amount.of(bound).within(column.unit) for bound in (low, high))
             return cls(name, column.unit, column.values.astype(float), (), low, high, varied)
         words = tuple(dict.fromkeys(map(str, column.values)))
         return cls(name, "", np.array([words.index(str(word)) for word in column.values], dtype=float), words)
@@ -71,8 +71,8 @@ class Axis:
     @property
     def ends(self) -> list[float]:
         """The smallest and the largest value; empty where there is none."""
-        known = self.distinct[np.isfinite(self.distinct)]
-        return [float(known[0]), float(known[-1])] if len(known) else []
+        finite = self.distinct[np.isfinite(self.distinct)]
+        return [float(finite[0]), float(finite[-1])] if len(finite) else []
 
     def label(self, room: float) -> str:
         """Name and unit in lines of so many inches; a long name is broken after its points, or cut in front."""
@@ -86,8 +86,8 @@ class Axis:
 
     def span(self) -> tuple[float, float]:
         """From the lowest to the highest value or limit, and some room."""
-        known = [*self.ends, *self.limits]
-        low, high = (min(known), max(known)) if known else (0.0, 1.0)
+        ends = [*self.ends, *self.limits]
+        low, high = (min(ends), max(ends)) if ends else (0.0, 1.0)
         room = _ROOM_AROUND * (high - low) or 0.5 * max(abs(low), 1e-12)
         return (-0.5, len(self.words) - 0.5) if self.words else (low - room, high + room)
 
@@ -207,13 +207,13 @@ def title(words: str) -> tuple[str, float]:
     return folded, style.line(TITLE) * (folded.count("\n") + 1) + 2 * GAP
 
 
-def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], what: str) -> str:
-    """How many entries or results (`what`) have no room, in words."""
-    left = len([each for each in all_of if each not in shown])
-    return f"; {left} more {what if left == 1 else PLURALS[what]} in sweep.csv" if left else ""
+def left_out(all_of: Sequence[Axis], shown: Sequence[Axis], noun: str) -> str:
+    """How many entries or results (by their `noun`) have no room, in words."""
+    left = len([axis for axis in all_of if axis not in shown])
+    return f"; {left} more {noun if left == 1 else PLURALS[noun]} in sweep.csv" if left else ""
 
 
 def without_number(shown: Sequence[Axis], count: int) -> str:
     """How many cases lack a number, in words."""
-    lost = int(np.isnan([each.values for each in shown]).any(axis=0).sum())
+    lost = int(np.isnan([axis.values for axis in shown]).any(axis=0).sum())
     return f"; {lost} of {counted(count, 'case')} without a number left out" if lost else ""

@@ -97,7 +97,7 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
 def _worst(view: DynamicsView) -> int | None:
     """Which of the shown poses has the largest joint force; None where no joint bears any."""
     rows = view.drawn.shown.rows
-    forces = [np.nan_to_num(view.column(name)[rows]) for name in view.asked.forces]
+    forces = [np.nan_to_num(view.column(name)[rows]) for name in view.question.forces]
     if not forces or not np.any(forces):
         return None
     return int(np.max(forces, axis=0).argmax())

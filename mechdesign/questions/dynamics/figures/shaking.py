@@ -25,7 +25,7 @@ _LOOK = {"color": style.BLUE, "linestyle": "-"}
 def shaking_figure(view: DynamicsView) -> Figure | None:
     """Shaking force and moment of a motion; None of poses at rest, and where both stay the same."""
     over = view.swept
-    if over is None or not view.asked.moves:
+    if over is None or not view.question.moves:
         return None
     force, moment = view.force("shaking."), view.column("shaking_moment")
     joints, _ = view.joints

@@ -9,7 +9,7 @@ import numpy as np
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.question import ForceQuestion
-from mechdesign.questions.dynamics.tables import STILL, asked_of
+from mechdesign.questions.dynamics.tables import STILL, question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
 from mechdesign.report.figures.pictures import PosesView
 from mechdesign.study.poses import Poses
@@ -24,9 +24,9 @@ class DynamicsView(PosesView):
         return DrawnForces.of(self.result)
 
     @property
-    def asked(self) -> ForceQuestion:
-        """What was asked of the forces."""
-        return asked_of(self.drawn.motion)
+    def question(self) -> ForceQuestion:
+        """The question about the forces."""
+        return question_of(self.drawn.motion)
 
     @property
     def poses(self) -> Poses:
@@ -47,8 +47,8 @@ class DynamicsView(PosesView):
     def moves(self, name: str) -> bool:
         """Whether a column is more than rounding, and not the same everywhere."""
         values = self.column(name)
-        known = values[np.isfinite(values)]
-        return len(known) > 0 and float(np.ptp(known)) > STILL * float(np.abs(known).max())
+        finite = values[np.isfinite(values)]
+        return len(finite) > 0 and float(np.ptp(finite)) > STILL * float(np.abs(finite).max())
 
     def force(self, name: str) -> Complexes:
         """A joint's force at every pose, by its name, or the shaking force."""
@@ -58,7 +58,7 @@ class DynamicsView(PosesView):
     def joints(self) -> tuple[list[Joint], list[Joint]]:
         """Joints that bear a force, and joints that bear a moment, the most loaded first."""
         forces, moments = [], []
-        for name, contact in zip(self.asked.forces, self.asked.joints.contacts, strict=True):
+        for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             words = f"on {contact.on} by {contact.by}"
             called = name.replace("_force", "", 1).replace("_on_", " on ")
             forces.append(Joint(called, words, self.force(f"{name}.f")[:, None]))

@@ -82,7 +82,7 @@ def centrodes_figure(view: MotionView) -> Figure | None:
 def centrodes(sweep: Sweep, table: Table) -> list[Centrodes]:
     """Those of every pair whose instant centre moves, at the pose that shows it nearest to the mechanism's middle."""
     middle, *sides = extent(sweep.extent)
-    found = []
+    pairs = []
     for name in table.names:
         pair, _, column = name.rpartition(".")
         if column != "x":
@@ -92,13 +92,15 @@ def centrodes(sweep: Sweep, table: Table) -> list[Centrodes]:
         centre = np.where(np.isfinite(centre), centre, complex(np.nan, np.nan))
         frames = {link: _frame(sweep, link) for link in (moving, fixed)}
         local = {link: (centre - origin) / turn for link, (origin, turn) in frames.items()}
-        known = np.isfinite(centre) & sweep.configuration.valid
-        if not known.any() or any(np.abs(z[known] - z[known][0]).max() <= _STILL * max(sides) for z in local.values()):
+        finite = np.isfinite(centre) & sweep.configuration.valid
+        if not finite.any() or any(
+            np.abs(z[finite] - z[finite][0]).max() <= _STILL * max(sides) for z in local.values()
+        ):
             continue
-        pose = int(np.where(known, np.abs(centre - middle), np.inf).argmin())
+        pose = int(np.where(finite, np.abs(centre - middle), np.inf).argmin())
         paths = [frames[link][0][pose] + frames[link][1][pose] * local[link] for link in (fixed, moving)]
-        found.append(Centrodes(moving, fixed, pose, complex(centre[pose]), *paths))
-    return found
+        pairs.append(Centrodes(moving, fixed, pose, complex(centre[pose]), *paths))
+    return pairs
 
 
 def _frame(sweep: Sweep, link: str) -> tuple[Complexes, Complexes]:

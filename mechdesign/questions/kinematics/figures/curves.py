@@ -174,7 +174,7 @@ def _rows(poses: Poses, swept: str, values: Floats) -> Floats:
 def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
     """Columns by kind and unit, in the order of `_RANKS`, the most informative first."""
     section, mechanism, units = study.kinematics, study.mechanism, study.units
-    asked = section is not None and section.outputs
+    outputs = section is not None and section.outputs
     sizes = {units.label("angle"): 2 * np.pi / units.angle_factor, units.label("length"): mechanism.size}
     # The condition of a single number is 1, that of each pose is for its table.
     left_out = {"conditioning"} | ({"inverse_condition"} if len(mechanism.drives) == 1 else set())
@@ -193,7 +193,7 @@ def _panels(study: Study, table: Table, swept: str, x: Floats) -> list[_Panel]:
         if order in ("position", "velocity", "acceleration") and swept and _still(values - x, float(np.ptp(x))):
             continue  # the sweep over itself
         # Of what stands still only the position is drawn, and only where it is an output.
-        always = order in ("error", "effort") or (order == "position" and asked and of not in mechanism.drives)
+        always = order in ("error", "effort") or (order == "position" and outputs and of not in mechanism.drives)
         if not always and _still(values, sizes.get(position.unit if position is not None else "", 1.0)):
             continue
         groups.setdefault((order, column.unit), []).append(_Curve(column, of, order))
@@ -252,14 +252,14 @@ def _flattened(curves: Sequence[_Curve]) -> bool:
 
 
 def _still(values: Floats, size: float) -> bool:
-    known = values[np.isfinite(values)]
-    return not len(known) or float(np.ptp(known)) <= _STILL * max(float(np.abs(known).max()), size)
+    finite = values[np.isfinite(values)]
+    return not len(finite) or float(np.ptp(finite)) <= _STILL * max(float(np.abs(finite).max()), size)
 
 
 def _coincide(one: Floats, other: Floats) -> bool:
-    known = np.isfinite(one) & np.isfinite(other)
-    span = max(float(np.ptp(one[known])), float(np.ptp(other[known]))) if known.any() else 0.0
-    return bool(np.all(np.abs(one[known] - other[known]) <= _HIDDEN * span))
+    finite = np.isfinite(one) & np.isfinite(other)
+    span = max(float(np.ptp(one[finite])), float(np.ptp(other[finite]))) if finite.any() else 0.0
+    return bool(np.all(np.abs(one[finite] - other[finite]) <= _HIDDEN * span))
 
 
 def _runs(invalid: Flags, x: Floats, limits: Floats) -> list[tuple[float, float]]:
@@ -301,14 +301,14 @@ def _draw(axis: Axes, panel: _Panel, x: Floats, units: Units, colors: dict[tuple
         title = kinds.get(first.column.unit, "value")
     title = title.replace("inverse ", "inverse\n")
     axis.set_ylabel(style.axis_label(title, first.column.unit).replace(" [", "\n["))
-    known = np.concatenate([values[np.isfinite(values)] for values in shown])
-    if _still(known, 1.0):
+    finite = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if _still(finite, 1.0):
         # What stands still is drawn straight, not by its rounding.
-        middle = float(known.mean())
+        middle = float(finite.mean())
         axis.set_ylim(middle - max(0.1 * abs(middle), 0.1), middle + max(0.1 * abs(middle), 0.1))
     elif first.order != "position":
-        low, high = np.percentile(known, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
-        if np.ptp(known) > _PEAK_RATIO * (high - low) > 0:
+        low, high = np.percentile(finite, (_TAIL_PERCENT, 100 - _TAIL_PERCENT))
+        if np.ptp(finite) > _PEAK_RATIO * (high - low) > 0:
             # Near a dead centre rates grow without bound: what they are elsewhere stays legible.
             axis.set_ylim(low - 0.5 * (high - low), high + 0.5 * (high - low))
     if len(panel.curves) > 1 or first.of != first.order:

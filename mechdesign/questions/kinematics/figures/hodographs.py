@@ -61,8 +61,8 @@ def hodographs_figure(view: MotionView) -> Figure | None:
 def _draw(axes: Axes, table: Table, points: Sequence[str], order: str, steps: Steps | None) -> None:
     """One order of rates of some points, with dots at equal steps of what is swept."""
     rates = {point: _rates(table, point, order) for point in points}
-    known = np.concatenate([z[np.isfinite(z)] for z in rates.values()])
-    usual = known[np.abs(known) <= _BEYOND * np.quantile(np.abs(known), _USUAL)] if len(known) else known
+    finite = np.concatenate([z[np.isfinite(z)] for z in rates.values()])
+    usual = finite[np.abs(finite) <= _BEYOND * np.quantile(np.abs(finite), _USUAL)] if len(finite) else finite
     window = np.append(usual, 0.0)
     size = max(float(np.ptp(window.real)), float(np.ptp(window.imag)), 1e-300)
     middle = complex(window.real.min() + window.real.max(), window.imag.min() + window.imag.max()) / 2

@@ -90,13 +90,13 @@ def paths_figure(
     The boldest paths have ticks at equal steps of the swept coordinate, with its value beside some; `kinds` are words
     about its loops. A study before it lies under it in grey dashes. `above` it, inches are left for a title.
     """
-    wanted = [
+    goals = [
         target.table[:, -2] + 1j * target.table[:, -1]
         for target in sweep.study.targets.values()
         if target.table is not None and len(target.coordinates) == 2
     ]
     earlier = Sweep.of(DrawnMotion.of(before.result).shown) if before is not None else None
-    places = np.concatenate([sweep.extent, *wanted, *([earlier.extent] if earlier is not None else [])])
+    places = np.concatenate([sweep.extent, *goals, *([earlier.extent] if earlier is not None else [])])
     steps = steps_of(sweep)
     room = style.width() - LEFT - RIGHT - _LEGEND_SYMBOL
     kinds = [style.folded(kind, 9, room) for kind in kinds]
@@ -109,7 +109,7 @@ def paths_figure(
     for kind in kinds:
         axes.plot([], [], " ", label=kind)
     numbers = _draw_steps(axes, sweep, steps) if steps is not None else []
-    for path in wanted:
+    for path in goals:
         axes.plot(
             path.real, path.imag, "o", color=style.VERMILION, linewidth=1.2, linestyle=(0, (1, 2.5)), markersize=3,
             zorder=3.7,
@@ -162,11 +162,11 @@ def steps_of(sweep: Sweep) -> Steps | None:
     rows = np.arange(0, len(values) - sweep.closed, stride)
     bold = list(ranks(sweep.study).values())
     most = max(_MOST_NUMBERS // bold.count(max(bold)), _FEWEST_NUMBERS)
-    each = -(-len(rows) // most)
+    spacing = -(-len(rows) // most)
     if unit == "deg":
-        each = next((k for k in range(each, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), each)
+        spacing = next((k for k in range(spacing, len(rows)) if round(k * step, 6) in _ROUND_ANGLES), spacing)
     degree = "\N{DEGREE SIGN}" * (unit == "deg")
-    written = {k: f"{values[k]:.4g}{degree}" for k in rows[::each].tolist()}
+    written = {k: f"{values[k]:.4g}{degree}" for k in rows[::spacing].tolist()}
     return Steps(rows, f"every {words}; numbers: {name}", written)
 
 
@@ -258,7 +258,7 @@ def modes_figure(view: MotionView) -> Figure | None:
     if "modes" not in view.result.tables:
         return None
     study, table, count = view.study, view.result.tables["modes"], view.result.counts["modes"]
-    shown = [(title, Sweep.of(each)) for title, each in view.drawn.modes.items()]
+    shown = [(title, Sweep.of(motion)) for title, motion in view.drawn.modes.items()]
     moving = int((table["valid"].reshape(count, -1) > 0).any(axis=1).sum())
     notes = []
     if moving > len(shown):

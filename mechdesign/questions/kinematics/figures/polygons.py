@@ -36,11 +36,11 @@ _NAME = 9.0  # points
 @picture(MotionView, "polygons", order=70)
 def polygons_figure(view: MotionView) -> Figure | None:
     """A row for each of a few poses, or of the listed ones, with both polygons; where the study asks for it."""
-    known = [each for each in view.drawn.special.shown if np.isfinite(list(each.velocities.values())).all()]
-    if not view.asks_for("polygons") or not known:
+    regular = [special for special in view.drawn.special.shown if np.isfinite(list(special.velocities.values())).all()]
+    if not view.asks_for("polygons") or not regular:
         return None
     # Where links are in line their velocities are, too: other poses tell more.
-    shown = ([each for each in known if not each.what] or known)[: 1 if style.narrow() else MOST_POSES]
+    shown = ([special for special in regular if not special.event] or regular)[: 1 if style.narrow() else MOST_POSES]
     columns, count = 1 if style.narrow() else 2, len(shown)
     figure, panels = style.page(2 * count, columns, _TALL, left=_LEFT, right=_RIGHT, top=_TOP, bottom=_BELOW,
                                 across=_BETWEEN, down=_DOWN)  # fmt: skip
@@ -49,14 +49,14 @@ def polygons_figure(view: MotionView) -> Figure | None:
     words = style.folded(words, 9, style.width() - _LEFT)
     style.grow(figure, above=style.line(9) * max(words.count("\n") - 1, 0))
     figure.text(_LEFT / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=9)
-    for k, each in enumerate(shown):
+    for k, special in enumerate(shown):
         for order, kind in enumerate(KINDS):
             axes = panels[2 * k + order]
             unit = view.study.units.label(kind.name)
-            axes.set_title(style.folded(f"{kind.name} at {each.where}", 9, _WIDE), loc="left", fontsize=9)
+            axes.set_title(style.folded(f"{kind.name} at {special.where}", 9, _WIDE), loc="left", fontsize=9)
             axes.set_xlabel(style.axis_label(f"{kind.name} x", unit))
             axes.set_ylabel(style.axis_label(f"{kind.name} y", unit))
-            _draw(view, axes, each, order)
+            _draw(view, axes, special, order)
     colors = link_colors(view.study.mechanism)
     handles = [Line2D([], [], color=colors[link], linewidth=1.8, label=link) for link in images(view, shown[0], 0)]
     names = [str(handle.get_label()) for handle in handles]
@@ -66,22 +66,22 @@ def polygons_figure(view: MotionView) -> Figure | None:
     return figure
 
 
-def images(view: MotionView, each: SpecialPose, order: int) -> Mapping[str, dict[str, complex]]:
+def images(view: MotionView, special: SpecialPose, order: int) -> Mapping[str, dict[str, complex]]:
     """The rates of every link's points at a pose by link and point, where it has two or more; the ground's are zero."""
-    links, rates = view.study.mechanism.description.links, rates_of(each, order)
+    links, rates = view.study.mechanism.description.links, rates_of(special, order)
     still = dict.fromkeys(link_points(links[GROUND]), 0j)
     own = {name: {point: complex((rates | still)[point]) for point in link_points(link)}
            for name, link in links.items() if name != GROUND}  # fmt: skip
     return {name: points for name, points in own.items() if len(points) > 1}
 
 
-def _draw(view: MotionView, axes: Axes, each: SpecialPose, order: int) -> None:
+def _draw(view: MotionView, axes: Axes, special: SpecialPose, order: int) -> None:
     """The polygon of one order of rates: arrows from the pole, and the image of each link."""
     mechanism, kind = view.study.mechanism, KINDS[order]
     colors, tips = link_colors(mechanism), dict[str, complex]()
-    for points in (links := images(view, each, order)).values():
+    for points in (links := images(view, special, order)).values():
         tips |= points
-    parts = _parts(view, each, links) if order else {}
+    parts = _parts(view, special, links) if order else {}
     places = np.array([0j, *tips.values(), *(path[1] for path in parts.values())])
     largest = float(np.abs(places).max())
     box, figure = axes.get_position(), axes.get_figure(root=True)
@@ -111,19 +111,19 @@ def _draw(view: MotionView, axes: Axes, each: SpecialPose, order: int) -> None:
     place_labels(axes, labels, covered(axes), order=5.2)
 
 
-def _parts(view: MotionView, each: SpecialPose, links: Mapping[str, dict[str, complex]]) -> dict[str, Complexes]:
+def _parts(view: MotionView, special: SpecialPose, links: Mapping[str, dict[str, complex]]) -> dict[str, Complexes]:
     """By link, the acceleration of its second point from that of its first, over -omega^2 r; of links of one length."""
     described, parts = view.study.mechanism.description.links, {}
     for link, points in links.items():
         one, other, *_ = points
         if not described[link].telescopic:
-            corner = points[one] + centripetal(each, one, other)
+            corner = points[one] + centripetal(special, one, other)
             parts[link] = np.array([points[one], corner, points[other]])
     return parts
 
 
-def centripetal(each: SpecialPose, one: str, other: str) -> complex:
+def centripetal(special: SpecialPose, one: str, other: str) -> complex:
     """Acceleration of one point of a link towards another that it turns about: -omega^2 times its arm."""
-    arm = place_of(each, other) - place_of(each, one)
-    slip = complex(each.velocities.get(other, 0j)) - complex(each.velocities.get(one, 0j))
+    arm = place_of(special, other) - place_of(special, one)
+    slip = complex(special.velocities.get(other, 0j)) - complex(special.velocities.get(one, 0j))
     return -(abs(slip) ** 2) * arm / abs(arm) ** 2

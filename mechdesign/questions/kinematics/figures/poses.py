@@ -84,16 +84,16 @@ def poses_figure(view: MotionView) -> Figure | None:
     if not chosen.shown or not (chosen.special or chosen.rates or centres or sweep.poses.listed):
         return None
     mechanism, points = study.mechanism, pointing(study)
-    places = [mechanism_places(sweep, each) for each in chosen.shown]
+    places = [mechanism_places(sweep, special) for special in chosen.shown]
     middle, wide, tall = extent(np.concatenate(places))
     side = max(wide, tall)
     # Lengths of arrows by their rates.
     scales = [_scale(chosen.shown, points, order, side) for order in range(len(KINDS))]
-    for each in chosen.shown:
+    for special in chosen.shown:
         for order, scale in enumerate(scales):
-            tips = [place_of(each, point) + scale * rates_of(each, order)[point] for point in points]
+            tips = [place_of(special, point) + scale * rates_of(special, order)[point] for point in points]
             places.append(np.array(tips, dtype=complex))
-        places.append(np.array([z for z in each.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
+        places.append(np.array([z for z in special.centres.values() if abs(z - middle) <= _NEAR * side], dtype=complex))
     everything, count = np.concatenate(places), len(chosen.shown)
     rows = _key_rows(centres)
     arrows = sum(map(bool, scales)) if style.narrow() else int(any(scales))  # rows of the key
@@ -103,7 +103,7 @@ def poses_figure(view: MotionView) -> Figure | None:
     # Lower panels may stand in more columns, and narrower ones have more lines above them.
     for _ in range(_TRIES):
         columns, window = tiled(everything, count, _MAX_COLUMNS, gap=_GAP, pads=(_PAD, _PAD), page=page, least=least)
-        titles = [_title(each, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for each in chosen.shown]
+        titles = [_title(special, chosen.rates, int(window.width * _LETTERS_AN_INCH)) for special in chosen.shown]
         above = _TITLE_ROOM + _TITLE * max(title.count("\n") + 1 for title in titles)
         lines = -(-count // columns)
         room = style.tallest() - top - BELOW - lines * above
@@ -111,7 +111,7 @@ def poses_figure(view: MotionView) -> Figure | None:
             break
         page, least = room, _LOWEST
     figure, grid = windows(window, study.units.label("length"), count, columns, gap=_GAP, above=above, top=top)
-    for axes, title, each in zip(grid, titles, chosen.shown, strict=True):
+    for axes, title, special in zip(grid, titles, chosen.shown, strict=True):
         axes.set_title(title, loc="left", fontsize=_TITLE_SIZE)
         axes.locator_params(nbins=5)
         # The last number of a panel would lie over the first of the next.
@@ -119,65 +119,65 @@ def poses_figure(view: MotionView) -> Figure | None:
         edge = _TICK_EDGE * (high - low)
         axes.set_xticks([tick for tick in axes.get_xticks().tolist() if low + edge <= tick <= high - edge])
         for order, scale in enumerate(scales):
-            _draw_arrows(axes, each, points, order, scale, side, window.scale)
-        _draw_centres(axes, each, centres, int(window.width * _LETTERS_AN_INCH))
-        draw_mechanism(axes, mechanism, each.configuration, each.index, drives=False, travel=sweep.travel,
+            _draw_arrows(axes, special, points, order, scale, side, window.scale)
+        _draw_centres(axes, special, centres, int(window.width * _LETTERS_AN_INCH))
+        draw_mechanism(axes, mechanism, special.configuration, special.index, drives=False, travel=sweep.travel,
                        size=_SYMBOLS)  # fmt: skip
     _draw_key(figure, study, heading, scales, window.scale, side, rows)
     return figure
 
 
-def mechanism_places(sweep: Sweep, each: SpecialPose) -> np.ndarray:
+def mechanism_places(sweep: Sweep, special: SpecialPose) -> np.ndarray:
     """Points and guides of a pose."""
-    scene = pose(sweep.mechanism, each.configuration, each.index)
+    scene = pose(sweep.mechanism, special.configuration, special.index)
     return np.array([] if scene is None else scene.places(sweep.travel), dtype=complex)
 
 
 def pointing(study: Study) -> list[str]:
     """Points whose rates are drawn: those asked for, else those that tell most."""
     section, ranked = study.kinematics, ranks(study)
-    asked = dict.fromkeys(name.split(".")[0] for name in (section and section.outputs) or ())
-    return [name for name in asked if name in ranked] or [
+    points = dict.fromkeys(name.split(".")[0] for name in (section and section.outputs) or ())
+    return [name for name in points if name in ranked] or [
         name for name, rank in ranked.items() if rank == max(ranked.values())
     ]
 
 
-def rates_of(each: SpecialPose, order: int) -> Any:
-    return each.accelerations if order else each.velocities
+def rates_of(special: SpecialPose, order: int) -> Any:
+    return special.accelerations if order else special.velocities
 
 
-def place_of(each: SpecialPose, point: str) -> complex:
-    return complex(each.configuration.point(point)[each.index])
+def place_of(special: SpecialPose, point: str) -> complex:
+    return complex(special.configuration.point(point)[special.index])
 
 
 def _scale(shown: Sequence[SpecialPose], points: Sequence[str], order: int, side: float) -> float:
     """Length of an arrow over its rate, 0 where nothing moves."""
-    sizes = np.array([abs(rates_of(each, order)[point]) for each in shown for point in points])
-    fastest = np.array([abs(rate) for each in shown for rate in rates_of(each, order).values()])
+    sizes = np.array([abs(rates_of(special, order)[point]) for special in shown for point in points])
+    fastest = np.array([abs(rate) for special in shown for rate in rates_of(special, order).values()])
     largest = float(np.nanmax(sizes, initial=0.0))
     usual = float(np.nanmax(fastest, initial=0.0))
     if order:
         # At velocities v over the size of the mechanism accelerations are about v^2 / size, however small by chance.
-        speeds = np.array([abs(rate) for each in shown for rate in each.velocities.values()])
+        speeds = np.array([abs(rate) for special in shown for rate in special.velocities.values()])
         usual = max(usual, float(np.nanmax(speeds, initial=0.0)) ** 2 / side)
     moves = largest > _STILL * usual
     return _LONGEST * side / largest if moves else 0.0
 
 
-def _title(each: SpecialPose, rates: bool, letters: int) -> str:
-    lost = rates and not np.isfinite(list(each.velocities.values())).all()
-    what = "; ".join([part for part in (each.what, "singular, no rates" if lost else "") if part])
-    return "\n".join(textwrap.fill(line, letters) for line in (each.where, what) if line)
+def _title(special: SpecialPose, rates: bool, letters: int) -> str:
+    lost = rates and not np.isfinite(list(special.velocities.values())).all()
+    remark = "; ".join([part for part in (special.event, "singular, no rates" if lost else "") if part])
+    return "\n".join(textwrap.fill(line, letters) for line in (special.where, remark) if line)
 
 
 def _heading(chosen: SpecialPoses, *, listed: bool) -> str:
     heading = "Poses asked for" if listed else "Poses spread evenly over the motion"
     if chosen.special:
-        ends = [each.what.startswith(LIMIT) for each in chosen.shown if each.what]
-        singular = [each.what.startswith(SINGULAR) for each in chosen.shown if each.what]
+        ends = [special.event.startswith(LIMIT) for special in chosen.shown if special.event]
+        singular = [special.event.startswith(SINGULAR) for special in chosen.shown if special.event]
         parts = ["limits of the motion"] * any(ends) + ["singular poses"] * any(singular)
         parts += ["links that come into line"] * (sum(ends) + sum(singular) < len(ends))
-        parts += ["poses between"] * any(not each.what for each in chosen.shown)
+        parts += ["poses between"] * any(not special.event for special in chosen.shown)
         heading = ", ".join(parts)
     return heading + (f"; the first {len(chosen.shown)}, and {chosen.left_out} more" if chosen.left_out else "")
 
@@ -195,19 +195,19 @@ def arrow(base: complex, along: complex, kind: _Kind, inches: float, **more: Any
 
 
 def _draw_arrows(
-    axes: Axes, each: SpecialPose, points: Sequence[str], order: int, scale: float, side: float, inches: float
+    axes: Axes, special: SpecialPose, points: Sequence[str], order: int, scale: float, side: float, inches: float
 ) -> None:  # fmt: skip
     kind = KINDS[order]
     for point in points:
-        along = scale * rates_of(each, order)[point]
+        along = scale * rates_of(special, order)[point]
         if np.isfinite(along) and abs(along) > _SHORTEST * _LONGEST * side:
-            axes.add_line(arrow(place_of(each, point), along, kind, inches, label=f"{kind.name} of {point}"))
+            axes.add_line(arrow(place_of(special, point), along, kind, inches, label=f"{kind.name} of {point}"))
 
 
-def _draw_centres(axes: Axes, each: SpecialPose, centres: Sequence[Centre], letters: int) -> None:
+def _draw_centres(axes: Axes, special: SpecialPose, centres: Sequence[Centre], letters: int) -> None:
     away, (left, right), (low, high) = list[str](), axes.get_xlim(), axes.get_ylim()
     for centre, shape in zip(centres, _SHAPES * len(centres), strict=False):
-        z = each.centres[centre]
+        z = special.centres[centre]
         if left < z.real < right and low < z.imag < high:
             axes.plot([z.real], [z.imag], **centre_look(shape), label=f"instant centre {centre.name}")
         else:

@@ -69,17 +69,17 @@ def transmission_figure(view: MotionView) -> Figure | None:
     over = abscissa(study, sweep.poses, section.speed if section is not None else None)
     x = over.values[sweep.rows]
     loops = transmissions(study, tables.get("loops"), sweep, over)
-    asked = list((section.mechanical_advantage if section is not None else {}).items())
-    names = asked[:MOST_ADVANTAGES]
+    advantages = list((section.mechanical_advantage if section is not None else {}).items())
+    names = advantages[:MOST_ADVANTAGES]
     if not loops and not names:
         return None
     notes = []
     if len(loops) > MOST_LOOPS:
         notes.append(f"the {MOST_LOOPS} of {len(loops)} loops that come nearest to a straight line")
-    if len(asked) > len(names):
-        notes.append(f"{len(names)} of {len(asked)} mechanical advantages")
+    if len(advantages) > len(names):
+        notes.append(f"{len(names)} of {len(advantages)} mechanical advantages")
     heading = " and ".join(["transmission angle"] * bool(loops) + ["mechanical advantage"] * bool(names)).capitalize()
-    loops = sorted(loops, key=lambda each: _off(each.worst))[:MOST_LOOPS]
+    loops = sorted(loops, key=lambda loop: _off(loop.worst))[:MOST_LOOPS]
     labels = [GOOD_WORDS, *map(_label, loops)] if loops else []
     rows = -(-(len(labels) + 1) // fitting(labels)) if labels else 0  # with the worst of them
     rows += sum(label.count("\n") for label in labels)
@@ -89,13 +89,13 @@ def transmission_figure(view: MotionView) -> Figure | None:
         _draw_angles(axes[0], x, loops, over)
         legend_below(figure, *axes[0].get_legend_handles_labels())
     toggles = tables.get("toggles")
-    known = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
+    toggle_places = toggles[over.name] if toggles is not None and over.name in toggles else np.empty(0)
     motion = tables["motion"]
-    for axis, (output, given) in zip(axes[bool(loops) :], names, strict=True):
+    for axis, (output, input_name) in zip(axes[bool(loops) :], names, strict=True):
         column = motion.column(f"{output}_advantage")
-        large = _draw_advantage(axis, over, column.values, known)
-        forces = ["moment" if study.mechanism.quantity(name) == "angle" else "force" for name in (output, given)]
-        axis.set_title(f"{forces[0]} of {output} over {forces[1]} put in at {given}", loc="left", fontsize=9.5)
+        large = _draw_advantage(axis, over, column.values, toggle_places)
+        forces = ["moment" if study.mechanism.quantity(name) == "angle" else "force" for name in (output, input_name)]
+        axis.set_title(f"{forces[0]} of {output} over {forces[1]} put in at {input_name}", loc="left", fontsize=9.5)
         words = "size of the\nmechanical advantage" if large else "mechanical advantage"
         axis.set_ylabel(style.axis_label(words, column.unit))
     axes[-1].set_xlim(*(x[[0, -1]] if x[0] < x[-1] else x[[-1, 0]]))
@@ -117,8 +117,8 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
         place = float(table["transmission_min_at"][k]) if over.name else np.nan
         nearest = int(np.nanargmax(np.abs(angle - 90)))
         if np.isfinite(place):
-            known = np.where(np.isfinite(angle), np.abs(over.values[sweep.rows] - place), np.inf)
-            nearest = int(known.argmin())
+            distance = np.where(np.isfinite(angle), np.abs(over.values[sweep.rows] - place), np.inf)
+            nearest = int(distance.argmin())
         else:
             place = float(over.values[sweep.rows][nearest])
         least = float(np.degrees(table["transmission_min"][k] * study.units.angle_factor))
@@ -128,9 +128,9 @@ def transmissions(study: Study, table: Table | None, sweep: Sweep, over: Along) 
     return angles
 
 
-def _label(each: Transmission) -> str:
+def _label(loop: Transmission) -> str:
     """The name of a loop and its class, as wide as the page at most."""
-    return style.folded(f"{each.loop.name}: {each.kind}", 9, style.width() - _LEGEND_SYMBOL)
+    return style.folded(f"{loop.loop.name}: {loop.kind}", 9, style.width() - _LEGEND_SYMBOL)
 
 
 def _off(angle: float) -> float:
@@ -159,17 +159,17 @@ def _draw_angles(axis: Axes, x: Floats, loops: list[Transmission], over: Along) 
 def _draw_advantage(axis: Axes, over: Along, values: Floats, toggles: Floats) -> bool:
     """Draw its curve; on a logarithmic axis, which is returned, its size, where it is boundless or spans `_WIDE`."""
     x, sizes = over.values, np.abs(values)
-    known = sizes[np.isfinite(sizes) & (sizes > 0)]
-    if not len(known):
+    finite = sizes[np.isfinite(sizes) & (sizes > 0)]
+    if not len(finite):
         axis.text(0.5, 0.5, "no finite value", transform=axis.transAxes, ha="center")
         return False
     places = boundless(x, values, toggles)
-    large = len(places) > 0 or bool(known.max() > _WIDE * known.min())
+    large = len(places) > 0 or bool(finite.max() > _WIDE * finite.min())
     if large:
         every, above = _towards(x, sizes, places)
         axis.set_yscale("log")
         axis.plot(every, above, color=style.BLUE, linewidth=1.8)
-        axis.set_ylim(known.min() / 1.5, known.max() * 1.5)
+        axis.set_ylim(finite.min() / 1.5, finite.max() * 1.5)
     else:
         axis.plot(x, values, color=style.BLUE, linewidth=1.8)
     for place in places:

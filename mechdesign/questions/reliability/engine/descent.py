@@ -66,11 +66,11 @@ def descend(
         with np.errstate(over="ignore"):
             g, slope = margins[rows, k] / scale[rows], is_normal * gradients[rows, :, k].T / scale[rows]
             size = (slope**2).sum(axis=0)
-        known = np.isfinite(g) & np.isfinite(size) & (size > 0)
-        active[lanes[~known]] = False
-        if not known.any():
+        finite = np.isfinite(g) & np.isfinite(size) & (size > 0)
+        active[lanes[~finite]] = False
+        if not finite.any():
             continue
-        lanes, g, slope, size = lanes[known], g[known], slope[:, known], size[known]
+        lanes, g, slope, size = lanes[finite], g[finite], slope[:, finite], size[finite]
         at = u[:, lanes]
         step = slope * (((slope * at).sum(axis=0) - g) / size) - is_normal * at
         normal[:, lanes] = -slope / np.sqrt(size)

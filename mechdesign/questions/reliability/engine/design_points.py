@@ -65,7 +65,7 @@ class DesignPoints:
         Unit vectors towards failure; zero where the directions alone decide.
     pull : ndarray, shape (points, directions, 2)
         Directions in which the limit is nearest, with the concentration of the failures about them as their length.
-    seen : ndarray, shape (dimension, n)
+    failures : ndarray, shape (dimension, n)
         Failures among the explored samples.
     always : bool
         Whether all explored samples break a limit that has no design point.
@@ -75,7 +75,7 @@ class DesignPoints:
     limit: Ints
     normal: Floats
     pull: Floats
-    seen: Floats
+    failures: Floats
     always: bool
 
     @property
@@ -100,9 +100,9 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
     limits = np.arange(len(margins))
     starts = np.concatenate([np.tile(near, len(limits)), starts[:, limit >= 0]], axis=1)
     limit = np.concatenate([np.repeat(limits, near.shape[1]), limit[limit >= 0]])
-    found = [_worst(problem, limit, starts, sizes(problem)), _ended(problem, ends, rng)]
-    seen, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
-    points = _distinct(problem, found, seen, lost)
+    parts = [_worst(problem, limit, starts, sizes(problem)), _ended(problem, ends, rng)]
+    failures, lost = u[:, failed(margins)], np.flatnonzero(~(margins >= 0).any(axis=1))
+    points = _distinct(problem, parts, failures, lost)
     for _ in range(0 if len(problem.circles) else _SEARCHES):
         u = np.concatenate([u[:, failed(margins)], _exchanged(problem, points)], axis=1)
         starts = _apart(problem, u[:, ~_explained(points, u)], _STARTS)
@@ -114,10 +114,10 @@ def find(problem: Problem, rng: np.random.Generator) -> DesignPoints:
         nearest, normal, good = descend(problem, limit, starts, sizes(problem), together=False)
         # Where margins jump, the way to the mean is not along their slope.
         good &= (nearest * normal).sum(axis=0) >= _SAME_COSINE * np.linalg.norm(nearest, axis=0)
-        found.append((nearest[:, good], limit[good], normal[:, good], np.zeros((int(good.sum()), 0, 2))))
-        good |= _explained(_distinct(problem, found, seen, lost), starts)
-        found.append(_ended(problem, starts[:, ~good], rng))
-        before, points = points, _distinct(problem, found, seen, lost)
+        parts.append((nearest[:, good], limit[good], normal[:, good], np.zeros((int(good.sum()), 0, 2))))
+        good |= _explained(_distinct(problem, parts, failures, lost), starts)
+        parts.append(_ended(problem, starts[:, ~good], rng))
+        before, points = points, _distinct(problem, parts, failures, lost)
         if points.near.sum() == before.near.sum():
             break
         u = _explored(problem, rng)
@@ -176,9 +176,9 @@ def _edges(problem: Problem, limit: Ints, far: Floats) -> Floats:
     is_normal = problem.is_normal[:, None]
     for _ in range(_HALVINGS if len(limit) else 0):
         middle = 0.5 * (low + high)
-        found = problem.margins(np.where(is_normal, middle * far, far))
+        margins = problem.margins(np.where(is_normal, middle * far, far))
         out = np.where(
-            limit < 0, failed(found), np.isnan(found).any(axis=0) | (found[limit, np.arange(len(limit))] < 0)
+            limit < 0, failed(margins), np.isnan(margins).any(axis=0) | (margins[limit, np.arange(len(limit))] < 0)
         )
         high, low = np.where(out, middle, high), np.where(out, low, middle)
     return np.where(is_normal, high * far, far)
@@ -193,8 +193,8 @@ def _nearer(problem: Problem, ends: Floats, rng: np.random.Generator) -> Floats:
     about = max(_WALK_POINTS, 4 * d)
     for _ in range(_WALKS if count else 0):
         shift = rng.standard_normal((d, count, about)) * problem.is_normal[:, None, None]
-        found = problem.margins((ends[:, :, None] + _WALK_SPREAD * shift).reshape(d, -1))
-        gone = failed(found).reshape(count, about)
+        margins = problem.margins((ends[:, :, None] + _WALK_SPREAD * shift).reshape(d, -1))
+        gone = failed(margins).reshape(count, about)
         steep = np.einsum("dca,ca->dc", shift, gone - gone.mean(axis=1, keepdims=True))
         size = (steep * steep).sum(axis=0)
         # A little beyond the nearest point of the tangent plane.
@@ -221,10 +221,10 @@ def _apart(problem: Problem, u: Floats, most: int) -> Floats:
     return u[:, chosen]
 
 
-def _distinct(problem: Problem, found: Sequence[_Found], seen: Floats, lost: Ints) -> DesignPoints:
+def _distinct(problem: Problem, parts: Sequence[_Found], failures: Floats, lost: Ints) -> DesignPoints:
     """Design points, the nearest first and each once; `lost` are limits that every explored sample breaks."""
-    u, normal = (np.concatenate([part[k] for part in found], axis=1) for k in (0, 2))
-    limit, pull = (np.concatenate([part[k] for part in found]) for k in (1, 3))
+    u, normal = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 2))
+    limit, pull = (np.concatenate([part[k] for part in parts]) for k in (1, 3))
     order = np.argsort((u * normal).sum(axis=0), kind="stable")
     kept: list[int] = []
     for k in order.tolist():
@@ -233,7 +233,7 @@ def _distinct(problem: Problem, found: Sequence[_Found], seen: Floats, lost: Int
         if not any(alike(problem, u[:, k], u[:, j]) and _along(normal[:, k], normal[:, j]) for j in kept):
             kept.append(k)
     always = bool(np.setdiff1d(lost, limit[kept]).size)
-    return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], seen, always)
+    return DesignPoints(u.T[kept], limit[kept], normal.T[kept], pull[kept], failures, always)
 
 
 def _along(one: Floats, other: Floats) -> bool:
@@ -255,13 +255,13 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
     Arguments are those of `descend`, results those of `DesignPoints`, but `u` and `normal` of shape (dimension,
     points). Where the directions alone break a limit, all normal variables of the point are at their means.
     """
-    found, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
+    points, at, normal = _points(problem, limit, _turned(problem, limit, u)[0], scale)
     if not len(problem.circles):
-        return found, at, normal, np.zeros((len(at), 0, 2))
+        return points, at, normal, np.zeros((len(at), 0, 2))
     for _ in range(_TURNS):
-        turned = _turned(problem, at, found)[0]
-        moved = np.linalg.norm(turned - found, axis=0).max(initial=0.0)
-        found, at, normal = _points(problem, at, turned, scale)
+        turned = _turned(problem, at, points)[0]
+        moved = np.linalg.norm(turned - points, axis=0).max(initial=0.0)
+        points, at, normal = _points(problem, at, turned, scale)
         if moved < _NO_TURN:
             break
     # Failures by the directions alone, all normal variables at their means.
@@ -269,17 +269,17 @@ def _worst(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> _Found:
     for _ in range(_TURNS):
         alone, margin, _ = _turned(problem, limit, alone)
     alone, by = alone[:, margin < 0], limit[margin < 0]
-    found, at = np.concatenate([found, alone], axis=1), np.concatenate([at, by])
+    points, at = np.concatenate([points, alone], axis=1), np.concatenate([at, by])
     normal = np.concatenate([normal, np.zeros_like(alone)], axis=1)
-    _, margin, slope = _turned(problem, at, found)
+    _, margin, slope = _turned(problem, at, points)
     steep = np.linalg.norm(slope[problem.normals], axis=0)
     # The concentration of failures about a direction is the slope of the logarithm of their probability by the
     # direction: the margin's slope by the direction over that by the distance, times the logarithm's slope by the
     # distance.
-    away = (found * normal).sum(axis=0)
+    away = (points * normal).sum(axis=0)
     width = np.where(away > 0, steep / _hazard(away), steep * (1.0 - away) + np.maximum(-margin, 0.0))
     pull = np.moveaxis(-slope[problem.circles], 2, 0) / np.where(width > 0, width, 1.0)[:, None, None]
-    return found, at, normal, pull
+    return points, at, normal, pull
 
 
 def _points(problem: Problem, limit: Ints, u: Floats, scale: Floats) -> tuple[Floats, Ints, Floats]:

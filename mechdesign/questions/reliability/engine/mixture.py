@@ -86,17 +86,17 @@ class Mixture:
 
         normal, directions = u[self.problem.normals], u[self.problem.circles.ravel()]
         half = 0.5 * (normal * normal).sum(axis=0)
-        found = np.empty((len(self.weight) + 1, u.shape[1]))
+        logs = np.empty((len(self.weight) + 1, u.shape[1]))
         size = np.linalg.norm(self.heading, axis=2)
         constant = np.log(self.weight) - np.log(np.diagonal(self.root, axis1=1, axis2=2)).sum(axis=1)
         constant -= (np.log(i0e(size)) + size).sum(axis=1)
-        for k, (row, one) in enumerate(zip(found, constant, strict=False)):
+        for k, (row, one) in enumerate(zip(logs, constant, strict=False)):
             z = self.inverse[k] @ normal
             z -= (self.inverse[k] @ self.centre[k])[:, None]
             row[:] = one + half - 0.5 * np.einsum("dn,dn->n", z, z) + self.heading[k].ravel() @ directions
         with np.errstate(divide="ignore"):
-            found[-1] = np.where(half >= 0.5 * self.beyond**2, np.log(self.rest / self._outside), -np.inf)
-        return found
+            logs[-1] = np.where(half >= 0.5 * self.beyond**2, np.log(self.rest / self._outside), -np.inf)
+        return logs
 
     def worth(self, u: Floats) -> Floats:
         """Density of the law over that of the mixture, shape (n,)."""

@@ -58,9 +58,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     pairs = list(dict.fromkeys(zip(table["output"].tolist(), table["order"].tolist(), strict=True)))[:MAX_PANELS]
     names = list(dict.fromkeys(table["source"].tolist()))
     sobol = _sobol_pose(table, poses, worst)
-    each = sobol is None and poses.listed and poses.count <= MAX_POSE_BARS
+    per_pose = sobol is None and poses.listed and poses.count <= MAX_POSE_BARS
     blocks = [table.take(table.where(output=output, order=order)) for output, order in pairs]
-    bars = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, each) for block in blocks]
+    bars = [100.0 * _shares(block["share"].reshape(poses.count, -1), sobol, per_pose) for block in blocks]
     largest = np.max([np.nan_to_num(bar).mean(axis=0) for bar in bars], axis=0)
     names, margin, lines = _beside(names)
     columns = max(
@@ -79,7 +79,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     while most > MIN_SOURCES and rows * (_PANEL_GAP + (0.15 + most) * bar) > free:
         most -= 1
     ranked = np.argsort(-largest, kind="stable")[:most]
-    where = "" if each and poses.count > 1 else f"average over {poses.count} poses"
+    where = "" if per_pose and poses.count > 1 else f"average over {poses.count} poses"
     if sobol is not None or poses.count == 1:
         section, pose = study.reliability, sobol or 0
         assert section is not None
@@ -141,16 +141,16 @@ def _sobol_pose(table: Table, poses: Poses, worst: int) -> int | None:
     """The worst pose if it has Sobol' indices, else the first pose that has."""
     if "sobol_first" not in table:
         return None
-    known = np.isfinite(table["sobol_first"]).reshape(poses.count, -1).any(axis=1)
-    return (worst if known[worst] else int(np.argmax(known))) if known.any() else None
+    indexed = np.isfinite(table["sobol_first"]).reshape(poses.count, -1).any(axis=1)
+    return (worst if indexed[worst] else int(np.argmax(indexed))) if indexed.any() else None
 
 
-def _shares(shares: Floats, pose: int | None, each: bool) -> Floats:
+def _shares(shares: Floats, pose: int | None, per_pose: bool) -> Floats:
     """Shares of one pose, of each pose, or averaged over the poses that have them, shape (bars, sources)."""
-    if pose is not None or each:
+    if pose is not None or per_pose:
         return shares if pose is None else shares[[pose]]
-    known = shares[np.isfinite(shares).all(axis=1)]
-    return known.mean(axis=0, keepdims=True) if len(known) else np.zeros((1, shares.shape[1]))
+    complete = shares[np.isfinite(shares).all(axis=1)]
+    return complete.mean(axis=0, keepdims=True) if len(complete) else np.zeros((1, shares.shape[1]))
 
 
 def _mark_sobol(axis: Axes, table: Table, entries: dict[str, Any]) -> None:
@@ -219,13 +219,13 @@ def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
         (margin / style.width(), 1.0 / height, 1 - (margin + 0.2) / style.width(), _FAILURE_HEIGHT / height)
     )
     capable = section.allocate.cpk is not None
-    asked = (section.allocate.cpk if capable else section.allocate.reliability) or 0.0
+    goal = (section.allocate.cpk if capable else section.allocate.reliability) or 0.0
     if capable:
-        _capabilities(below, tables, asked)
+        _capabilities(below, tables, goal)
     else:
-        _failures(below, tables, 1.0 - asked)
+        _failures(below, tables, 1.0 - goal)
     noun = "Cpk" if capable else "reliability"
-    title(figure, f"Cheapest tolerances for a {noun} of {asked:.10g}", note, left=margin)
+    title(figure, f"Cheapest tolerances for a {noun} of {goal:.10g}", note, left=margin)
     handles, labels = (
         [*first, *second] for first, second in zip(
             one.get_legend_handles_labels(), below.get_legend_handles_labels(), strict=True)
@@ -248,16 +248,16 @@ def _failures(axis: Axes, tables: Mapping[str, Table], allowed: float) -> None:
     _sides(axis, worst, "probability that an error leaves its limits, at the pose that fails most")
 
 
-def _capabilities(axis: Axes, tables: Mapping[str, Table], asked: float) -> None:
+def _capabilities(axis: Axes, tables: Mapping[str, Table], goal: float) -> None:
     """The least Cpk of any limit at any pose with the tolerances given and allocated, and what is asked."""
     before, after = tables["capability"], tables["confirmation"]
     given, worst = float(np.nanmin(before["cpk"])), int(np.argmin(after["simulated"]))
-    axis.axvline(asked, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"asked: {number(asked)}")
+    axis.axvline(goal, color=style.VERMILION, linestyle=(0, (5, 2)), label=f"asked: {number(goal)}")
     sides = [[given] * 3, [float(after[name][worst]) for name in ("simulated", "low", "high")]]
     _sides(axis, sides, "least Cpk of any limit at any pose")
 
 
-def _sides(axis: Axes, sides: Sequence[Sequence[float]], what: str) -> None:
+def _sides(axis: Axes, sides: Sequence[Sequence[float]], label: str) -> None:
     """Value, lowest and highest, of the tolerances given and of those allocated."""
     for place, ((value, low, high), color) in enumerate(zip(sides, (style.FAINT, style.BLUE), strict=True)):
         axis.errorbar(value, place, xerr=[[value - low], [high - value]], fmt="o", color=color, capsize=3)
@@ -268,7 +268,7 @@ def _sides(axis: Axes, sides: Sequence[Sequence[float]], what: str) -> None:
     axis.set_yticks([0, 1], ["as given", "allocated"])
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
-    axis.set_xlabel(style.folded(what, 10.0, axis.get_position().width * style.width()))
+    axis.set_xlabel(style.folded(label, 10.0, axis.get_position().width * style.width()))
 
 
 def _pair(axis: Axes, given: Floats, allocated: Floats) -> None:

@@ -45,17 +45,17 @@ Ends = tuple[float, float]
 @picture(ErrorsView, "density_contours", order=80)
 def density_figure(view: ErrorsView) -> Figure | None:
     """Regions that hold shares of the samples, the ellipses of the first order for the same shares, and the limits."""
-    given = view.sampled("density")
-    if given is None:
+    sampled = view.sampled("density")
+    if sampled is None:
         return None
-    samples = given.samples
+    samples = sampled.samples
     assert samples.pair is not None
     labels = [style.axis_label(f"{heading(samples.outputs[k], samples.orders[k])} error", samples.units[k])
               for k in samples.pair]  # fmt: skip
     pair = list(samples.pair)
     errors, units = samples.errors[pair], samples.units[pair]
     ellipses = [_ellipse(samples.mean[pair], samples.covariance[np.ix_(pair, pair)], share) for share in SHARES]
-    limits = _Limits.of(given, ellipses[-1])
+    limits = _Limits.of(sampled, ellipses[-1])
     alike = bool(units[0] == units[1])
     failed = ~samples.kept
     across, up, tall = _view([*ellipses, errors[:, failed][:, :MAX_MARKS], limits.near], alike)
@@ -65,7 +65,7 @@ def density_figure(view: ErrorsView) -> Figure | None:
     if alike:
         axes.set_aspect("equal")
     entries: dict[str, Any] = limits.draw(axes)
-    region, method = smoothed(errors), look(given.method).words
+    region, method = smoothed(errors), look(sampled.method).words
     if region is not None:
         colors = [lighter(style.BLUE, tint) for tint in _TINTS[: len(region.levels)]]
         levels = [*region.levels[::-1], 1.01 * region.density.max()]
@@ -90,7 +90,7 @@ def density_figure(view: ErrorsView) -> Figure | None:
         count += f", {(number := int(failed.sum())):,} of them fail" + f" ({MAX_MARKS} marked)" * (number > MAX_MARKS)
     note = f"{method}: {count}" + (f", smoothed over {region.width:.2f} of their deviation" if region else "")
     note += "; " * bool(limits.far) + limits.far
-    title(figure, f"Two errors of made mechanisms {given.where}", note, left=_LEFT)
+    title(figure, f"Two errors of made mechanisms {sampled.where}", note, left=_LEFT)
     place: dict[str, Any]
     if style.narrow():
         style.grow(figure, below=_LEGEND_ROW * len(entries))
@@ -164,8 +164,8 @@ class _Limits(NamedTuple):
     far: str
 
     @classmethod
-    def of(cls, given: Sampled, outermost: Floats) -> _Limits:
-        samples = given.samples
+    def of(cls, sampled: Sampled, outermost: Floats) -> _Limits:
+        samples = sampled.samples
         assert samples.pair is not None
         pair = samples.pair
         unit = samples.units[pair[0]]
@@ -178,8 +178,8 @@ class _Limits(NamedTuple):
             )
             near = radius * np.array([[-1, 1], [-1, 1]]) if shown else np.empty((2, 0))
             return cls(radius, ((-np.inf, np.inf),) * 2, near, words, "" if shown else f"{words}, outside")
-        known = {channel: (low, high) for channel, low, high in samples.bands}
-        bands = tuple(known.get(channel, (-np.inf, np.inf)) for channel in pair)
+        limits = {channel: (low, high) for channel, low, high in samples.bands}
+        bands = tuple(limits.get(channel, (-np.inf, np.inf)) for channel in pair)
         near, far = np.zeros((2, 4)), []
         for k, (ends, channel) in enumerate(zip(bands, pair, strict=True)):
             for place, end in enumerate(ends):
@@ -187,7 +187,7 @@ class _Limits(NamedTuple):
                     near[k, 2 * k + place] = end
                 elif np.isfinite(end):
                     far.append(f"{end:+g} {samples.units[channel]} of {samples.outputs[channel]}")
-        return cls(None, (bands[0], bands[1]), near, "limits" if known else "",
+        return cls(None, (bands[0], bands[1]), near, "limits" if limits else "",
                    f"limits outside: {', '.join(far)}" if far else "")  # fmt: skip
 
     def draw(self, axes: Axes) -> dict[str, Patch]:
@@ -197,8 +197,8 @@ class _Limits(NamedTuple):
         axes.set_facecolor(_BEYOND)
         # The sides of what is open, or far, lie outside the picture.
         (left, right), (low, high) = (
-            np.clip(ends, 2 * seen[0] - seen[1], 2 * seen[1] - seen[0]).tolist()
-            for ends, seen in zip(self.bands, (axes.get_xlim(), axes.get_ylim()), strict=True)
+            np.clip(ends, 2 * span[0] - span[1], 2 * span[1] - span[0]).tolist()
+            for ends, span in zip(self.bands, (axes.get_xlim(), axes.get_ylim()), strict=True)
         )
         looks: tuple[dict[str, Any], ...] = (
             {"facecolor": "white", "zorder": 0.4},

@@ -72,15 +72,15 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
     """Mean error and three standard deviations to both sides: computed ones as a band, simulated ones as dots."""
     moments = tables["moments"]
     shown = channels(moments)[:MAX_PANELS]
-    known = methods(moments)
+    shown_methods = methods(moments)
     figure, axes = stack(len(shown), "Errors of made mechanisms: mean \N{PLUS-MINUS SIGN} 3 standard deviations",
                          swept.label)  # fmt: skip
     tick_abscissa(axes[-1], swept)
     entries: dict[str, Any] = {}
-    filled = next((method for method in known if not look(method).sampled), None)
+    filled = next((method for method in shown_methods if not look(method).sampled), None)
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         axis.axhline(0.0, color=style.FAINT, linewidth=0.8)
-        for method in known:
+        for method in shown_methods:
             drawn, rows = look(method), moments.where(output=output, order=order, method=method)
             mean = moments["mean"][rows] - moments["nominal"][rows]
             reach = 3.0 * moments["sigma"][rows]
@@ -116,8 +116,8 @@ def _bands(study: Study, tables: Mapping[str, Table], swept: Along) -> Figure:
 
 def _deviations(moments: Table, swept: Along) -> Figure:
     """A panel for each order and unit; outputs by colour, methods by dashes or dots."""
-    panels, known = _grouped(moments), methods(moments)
-    reference, computed = best_moments(moments), [method for method in known if not look(method).sampled]
+    panels, shown_methods = _grouped(moments), methods(moments)
+    reference, computed = best_moments(moments), [method for method in shown_methods if not look(method).sampled]
     compared = computed if look(reference).sampled else []
     note = f"in brackets: difference from {look(reference).words} on average" if compared else ""
     figure, axes = stack(len(panels), "Standard deviation of made mechanisms", swept.label, note=note)
@@ -128,7 +128,7 @@ def _deviations(moments: Table, swept: Along) -> Figure:
         for output, color, mark in zip(outputs, style.PALETTE, _MARKS, strict=False):
             sigma = {
                 method: moments["sigma"][moments.where(output=output, order=order, unit=unit, method=method)]
-                for method in known
+                for method in shown_methods
             }
             for method, values in sigma.items():
                 shown = _line(look(method)) | ({} if single else {"color": color})
@@ -140,17 +140,17 @@ def _deviations(moments: Table, swept: Along) -> Figure:
         _name_outputs(axis, named, [style.INK] if single else style.PALETTE)
         axis.set_ylabel(style.axis_label(order, unit))
         axis.set_ylim(0.0, 1.1 * axis.get_ylim()[1])
-    looks = [_line(look(method)) | ({} if single else {"color": style.INK}) for method in known]
+    looks = [_line(look(method)) | ({} if single else {"color": style.INK}) for method in shown_methods]
     legend_below(figure, [Line2D([], [], markersize=4, **shown) for shown in looks],
-                 [look(method).words for method in known])  # fmt: skip
+                 [look(method).words for method in shown_methods])  # fmt: skip
     clear_of_ticks(figure, axes)
     return figure
 
 
 def _apart(computed: Floats, simulated: Floats) -> str:
     """By how much deviations differ from simulated ones on average, in per cent of these."""
-    known = np.isfinite(computed) & (simulated > 0)
-    return f"{100.0 * np.mean(np.abs(computed[known] / simulated[known] - 1.0)):.2g} %" if known.any() else "unknown"
+    finite = np.isfinite(computed) & (simulated > 0)
+    return f"{100.0 * np.mean(np.abs(computed[finite] / simulated[finite] - 1.0)):.2g} %" if finite.any() else "unknown"
 
 
 def _most_dots() -> int:
@@ -218,19 +218,19 @@ def estimate_figure(view: ErrorsView) -> Figure | None:
     if "reliability" not in view.result.tables or (not few and swept is None):
         return None
     table = view.result.tables["reliability"]
-    known, unseen = methods(table), _unseen(table)
+    shown_methods, unseen = methods(table), _unseen(table)
     count = poses.count if swept is not None else min(poses.count, MAX_LISTED)
     values = np.arange(count, dtype=np.float64) if swept is None else swept.values
-    written = swept is None and count * len(known) <= (MAX_WRITTEN // 2 if style.narrow() else MAX_WRITTEN)
+    written = swept is None and count * len(shown_methods) <= (MAX_WRITTEN // 2 if style.narrow() else MAX_WRITTEN)
     # At listed poses methods stand side by side; along a sweep simulated ones are shifted a little.
-    beside = known if swept is None else [method for method in known if look(method).sampled]
-    step = min(0.3 if written else 0.14, 0.8 / len(known)) if swept is None else 0.2 * np.ptp(values) / count
+    beside = shown_methods if swept is None else [method for method in shown_methods if look(method).sampled]
+    step = min(0.3 if written else 0.14, 0.8 / len(shown_methods)) if swept is None else 0.2 * np.ptp(values) / count
     lines = 1 if swept is not None else min(len(poses.names), 4)
     figure, (axes,) = style.page(1, 1, _HEIGHT, left=_LEFT, right=0.15, top=_ABOVE, bottom=1.0)
     axes.set_ylabel("failure probability")
     floor = _scale(axes, table)
     entries: Legend = {}
-    for method in known:
+    for method in shown_methods:
         rows, drawn = np.flatnonzero(table.where(method=method, scope="pose"))[:count], look(method)
         at = values + (beside.index(method) - (len(beside) - 1) / 2) * step if method in beside else values
         value = table["failure"][rows]
@@ -259,13 +259,13 @@ def estimate_figure(view: ErrorsView) -> Figure | None:
         axes.set_xlabel(swept.label)
         tick_abscissa(axes, swept)
         axes.margins(x=0.02)
-    for method in known:
+    for method in shown_methods:
         _cycle(axes, table, method, entries)
     bottom = 0.45 + 0.15 * lines + 0.2 * -(-len(entries) // fitting(list(entries)))
     height = _ABOVE + _HEIGHT + bottom
     figure.set_figheight(height)
     figure.subplots_adjust(bottom=bottom / height, top=1 - _ABOVE / height)
-    notes = ["whiskers: 99.7 % intervals"] * any(look(method).sampled for method in known)
+    notes = ["whiskers: 99.7 % intervals"] * any(look(method).sampled for method in shown_methods)
     notes += ["open arrows: no failure was seen, upper end of the interval"] * bool(unseen.any())
     title(figure, heading, "; ".join(notes), left=_LEFT)
     legend_below(figure, list(entries.values()), list(entries))
@@ -289,19 +289,19 @@ def _unseen(table: Table) -> Flags:
     return np.asarray((table["failure_low"] == 0) & (table["failure_high"] > 0) & (table["samples"] > 0))
 
 
-def _dots(axes: Axes, table: Table, rows: Ints, at: Floats, asked: str, floor: float, entries: Legend) -> None:
+def _dots(axes: Axes, table: Table, rows: Ints, at: Floats, chosen: str, floor: float, entries: Legend) -> None:
     """Values with intervals, one marker for each method that they come from."""
-    used, unseen, color = table["used"][rows], _unseen(table)[rows], look(asked).color
+    used, unseen, color = table["used"][rows], _unseen(table)[rows], look(chosen).color
     value, low, high = (table[name][rows] for name in ("failure", "failure_low", "failure_high"))
     for method in dict.fromkeys(used.tolist()):
-        own, by, words = used == method, asked, look(asked).words
-        if method != asked and method in METHODS:
+        own, by, words = used == method, chosen, look(chosen).words
+        if method != chosen and method in METHODS:
             by, solved = method, int(table["evaluations"][rows[own]].sum())
             words += f" by {look(method).words}, {solved:,} solved"
-        seen, none = own & ~unseen, own & unseen
+        failing, none = own & ~unseen, own & unseen
         bars = np.abs(np.stack([value - np.maximum(low, floor), high - value]))
         entries[words] = axes.errorbar(
-            at[seen], value[seen], bars[:, seen], fmt=look(by).marker, markersize=5,
+            at[failing], value[failing], bars[:, failing], fmt=look(by).marker, markersize=5,
             capsize=3 if len(at) < 25 else 0, color=color, elinewidth=1.2,
         )  # fmt: skip
         if none.any():

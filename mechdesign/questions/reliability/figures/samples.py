@@ -43,10 +43,10 @@ class _Histogram(NamedTuple):
 @picture(ErrorsView, "histogram", order=40)
 def histogram_figure(view: ErrorsView) -> Figure | None:
     """Each error, the distance from no error where a circle limits it, the limits, and below each its tail."""
-    given = view.sampled("histogram")
-    if given is None:
+    sampled = view.sampled("histogram")
+    if sampled is None:
         return None
-    shown = _histograms(given)
+    shown = _histograms(sampled)
     columns = min(len(shown), 2 if style.narrow() or len(shown) == 4 else 3)
     if style.narrow() and len(shown) < 3:
         columns = 1
@@ -71,19 +71,19 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
             for axis in pair:
                 axis.locator_params(axis="x", nbins=max(1, min(4, int(room / _TICK))))
             pair[1].set_xlabel(style.axis_label("error", block[column].unit))
-    kept, samples = given.samples.kept, given.samples.errors.shape[1]
-    note = f"{look(given.method).words}, {samples:,} samples"
-    note += f", {int((~kept).sum()):,} of them fail" if given.samples.bands or given.samples.discs else ""
+    kept, samples = sampled.samples.kept, sampled.samples.errors.shape[1]
+    note = f"{look(sampled.method).words}, {samples:,} samples"
+    note += f", {int((~kept).sum()):,} of them fail" if sampled.samples.bands or sampled.samples.discs else ""
     title(
-        figure, f"Errors of made mechanisms {given.where}", f"{note}; below: the same on a logarithmic axis", left=0.8
+        figure, f"Errors of made mechanisms {sampled.where}", f"{note}; below: the same on a logarithmic axis", left=0.8
     )
     legend_below(figure, list(entries.values()), list(entries))
     return figure
 
 
-def _histograms(given: Sampled) -> list[_Histogram]:
+def _histograms(sampled: Sampled) -> list[_Histogram]:
     """Distances that a circle limits, then the errors that vary."""
-    samples, table = given.samples, given.tables["histogram"]
+    samples, table = sampled.samples, sampled.tables["histogram"]
     histograms = []
     for x, y, radius in samples.discs:
         distance = np.hypot(samples.errors[x], samples.errors[y])
@@ -156,17 +156,17 @@ def convergence_figure(view: ErrorsView) -> Figure | None:
 
     Not the mean itself: beside large dimensions its changes are lost.
     """
-    given = view.sampled("convergence")
-    if given is None:
+    sampled = view.sampled("convergence")
+    if sampled is None:
         return None
-    table, moments = given.tables["convergence"], given.tables["moments"]
+    table, moments = sampled.tables["convergence"], sampled.tables["moments"]
     shown = channels(table)[:MAX_PANELS]
     figure, axes = stack(len(shown), "Mean error of made mechanisms as samples are added", "samples",
-                         note=f"{given.where}; {look(given.method).words}")  # fmt: skip
+                         note=f"{sampled.where}; {look(sampled.method).words}")  # fmt: skip
     for axis, (output, order, unit) in zip(axes, shown, strict=True):
         rows = table.where(output=output, order=order, unit=unit)
-        row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=given.method))[
-            given.samples.pose
+        row = np.flatnonzero(moments.where(output=output, order=order, unit=unit, method=sampled.method))[
+            sampled.samples.pose
         ]
         samples, mean = table["samples"][rows], table["mean"][rows] - moments["nominal"][row]
         band = 3.0 * moments["sigma"][row] / np.sqrt(samples)
@@ -185,19 +185,19 @@ def convergence_figure(view: ErrorsView) -> Figure | None:
 @picture(ErrorsView, "estimate", order=70)
 def trend_figure(view: ErrorsView) -> Figure | None:
     """Failure probability against the number of samples with its interval, beside what other methods say."""
-    given = view.sampled("estimate")
-    if given is None:
+    sampled = view.sampled("estimate")
+    if sampled is None:
         return None
-    table, reliability = given.tables["estimate"], given.tables["reliability"]
-    known = [method for method in methods(reliability) if method != "monte_carlo"]
-    figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=given.where,
-                            tall=2.8, bottom=0.65 + 0.1 * (len(known) + 3))  # fmt: skip
+    table, reliability = sampled.tables["estimate"], sampled.tables["reliability"]
+    others = [method for method in methods(reliability) if method != "monte_carlo"]
+    figure, (axis,) = stack(1, "Failure probability as samples are added", "samples", note=sampled.where,
+                            tall=2.8, bottom=0.65 + 0.1 * (len(others) + 3))  # fmt: skip
     samples, value, low, high = (table[name] for name in ("samples", "failure", "failure_low", "failure_high"))
     late = len(samples) // 20
     ends = [low[late:].min(), value[-1], high[late:].max()]
     lines: list[tuple[float, dict[str, Any]]] = []
-    for method in known:
-        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[given.samples.pose]
+    for method in others:
+        row = np.flatnonzero(reliability.where(method=method, scope="pose"))[sampled.samples.pose]
         failure = float(reliability["failure"][row])
         if np.isfinite(failure):
             drawn, used = look(method), str(reliability["used"][row])

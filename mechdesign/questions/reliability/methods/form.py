@@ -63,7 +63,7 @@ def form(problem: Problem, points: DesignPoints) -> Estimate:
     It is 0 where no design point was found and no sample failed. It is nan where samples failed although no design
     point was found, or where all samples break one limit, for example one that no random source moves.
     """
-    if points.always or (not len(points.u) and points.seen.shape[1]):
+    if points.always or (not len(points.u) and points.failures.shape[1]):
         return Estimate(math.nan, math.nan, math.nan, problem.evaluations)
     if len(points.u) and len(problem.circles):
         value = _mean(problem, points)
@@ -104,14 +104,14 @@ def _chances(problem: Problem, points: DesignPoints, u: Floats, rng: np.random.G
     normal = np.repeat(points.normal[:_POINTS_BEGUN].T[:, :, None], count, axis=2)
     distance = np.repeat(points.distance[:_POINTS_BEGUN, None], count, axis=1)
     sloped = limit >= 0
-    found, normals, good = descend(
+    ends, normals, good = descend(
         problem, np.repeat(limit[sloped], count), starts[:, sloped].reshape(len(u), -1), sizes(problem), together=False
     )
     shape = (len(u), int(sloped.sum()), count)
     normal[:, sloped] = normals.reshape(shape)
     # Where the descent does not reach the limit, it is broken everywhere or nowhere: the mean tells which.
     broken = np.where(at_mean[limit[sloped]] < 0, -np.inf, np.inf)
-    distance[sloped] = np.where(good.reshape(shape[1:]), (found * normals).reshape(shape).sum(axis=0), broken)
+    distance[sloped] = np.where(good.reshape(shape[1:]), (ends * normals).reshape(shape).sum(axis=0), broken)
     chance = ndtr(-distance)
     total = chance.sum(axis=0)
     # The estimate of `half_spaces`, for each choice of directions.

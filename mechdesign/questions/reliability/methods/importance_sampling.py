@@ -75,13 +75,13 @@ def run(task: Task) -> MethodResult:
 def _at_pose(task: Task, setting: Setting) -> Estimate:
     problem = problem_of(setting, task.sources)
     rng = generator(task.seed, setting.pose, SEARCH, 1)
-    found = importance_sampling(problem, find(problem, rng), rng, task.samples)
-    if found.failures:
-        return found
+    estimate = importance_sampling(problem, find(problem, rng), rng, task.samples)
+    if estimate.failures:
+        return estimate
     sums: dict[int, Sums] = {}
     simulate([setting], task.sources, task.seed, task.samples, sums)
-    found = sums[setting.pose].estimate
-    return replace(found, evaluations=found.evaluations + problem.evaluations)
+    estimate = sums[setting.pose].estimate
+    return replace(estimate, evaluations=estimate.evaluations + problem.evaluations)
 
 
 def importance_sampling(
@@ -100,9 +100,9 @@ def importance_sampling(
     mixture, square, most = _learned(problem, points, rng)
     total = squares = 0.0
     done = failures = invalid = 0
-    wanted = samples if precision is None else min(_FIRST_SAMPLES, samples)
-    while done < wanted:
-        count = min(POINTS_TOGETHER, wanted - done)
+    planned = samples if precision is None else min(_FIRST_SAMPLES, samples)
+    while done < planned:
+        count = min(POINTS_TOGETHER, planned - done)
         u = mixture.draw(rng, count)
         margins = problem.margins(u)
         broken = failed(margins)
@@ -111,11 +111,11 @@ def importance_sampling(
         most = max(most, float(weights.max(initial=0.0)))
         done, failures = done + count, failures + int(broken.sum())
         invalid += int(np.isnan(margins).any(axis=0).sum())
-        if done == wanted < samples and precision is not None and total > 0:
+        if done == planned < samples and precision is not None and total > 0:
             mean = total / done
             if not reached(precision, mean, *weighted(total, max(squares, done * square), most, done)):
                 more = _MARGIN * needed(precision, mean, max(squares / done, square) - mean * mean)
-                wanted = int(min(samples, max(1.2 * done, more)))
+                planned = int(min(samples, max(1.2 * done, more)))
     low, high = weighted(total, max(squares, done * square), most, done)
     # The mean weight of all samples is 1 only in expectation, so that the estimate can exceed 1.
     return Estimate(min(total / done, 1.0), low, high, problem.evaluations, done, failures, invalid)
@@ -137,7 +137,7 @@ def _about(problem: Problem, points: DesignPoints) -> Mixture:
     d = len(problem.normals)
     return Mixture(
         problem, (1.0 - _BEYOND_SHARE) * weight / weight.sum(), centre, np.broadcast_to(np.eye(d), (len(centre), d, d)),
-        points.pull[near], _BEYOND_FROM * _least(np.concatenate([centre.T, points.seen[problem.normals]], axis=1)),
+        points.pull[near], _BEYOND_FROM * _least(np.concatenate([centre.T, points.failures[problem.normals]], axis=1)),
     )  # fmt: skip
 
 
@@ -154,12 +154,12 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
     """
     fixed = _about(problem, points)
     parts = replace(fixed, weight=(1.0 - _LEAST_SHARE) * fixed.weight / fixed.weight.sum())
-    explored = explored_weights(problem, points.seen)
+    explored = explored_weights(problem, points.failures)
     # Failures among the explored samples may show regions that have no design point.
     if float(explored.sum()) ** 2 > _EXPLORED_MANY * float(explored @ explored):
-        parts = _covering(fixed, parts, points.seen, explored, EXPLORED)
+        parts = _covering(fixed, parts, points.failures, explored, EXPLORED)
     count = max(_ROUND_LEAST, (_ROUND_SAMPLES + _PART_SAMPLES * len(fixed.weight)) * problem.dimension)
-    seen, known = [], []
+    points_by_round, weights_by_round = [], []
     for rounds in range(1, _ROUNDS + 1):
         mixture = parts.joined(parts.widened, _WIDE_SHARE).joined(fixed, _FIXED_SHARE)
         u = mixture.draw(rng, count)
@@ -168,9 +168,9 @@ def _learned(problem: Problem, points: DesignPoints, rng: np.random.Generator) -
         # A failure nearer to the mean than all before moves the edge of the part beyond inwards.
         beyond = min(fixed.beyond, _BEYOND_FROM * _least(u[problem.normals]))
         fixed, parts = replace(fixed, beyond=beyond), replace(parts, beyond=beyond)
-        seen.append(u)
-        known.append(weights)
-        failures, worth = np.concatenate(seen, axis=1), np.concatenate(known)
+        points_by_round.append(u)
+        weights_by_round.append(weights)
+        failures, worth = np.concatenate(points_by_round, axis=1), np.concatenate(weights_by_round)
         if worth.sum() > 0:
             parts = _covering(fixed, parts.fitted(failures, worth, _LEAST_SHARE), failures, worth, rounds * count)
         if count * float(weights @ weights) < (1.0 + max(_GOOD_VARIANCE, rounds)) * float(weights.sum()) ** 2:

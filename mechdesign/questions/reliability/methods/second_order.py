@@ -88,9 +88,9 @@ def quadratic(setting: Setting, sources: Sources, steps: Floats) -> Quadratic:
     # Each pin gets a radial clearance of 1, so that its components are its place.
     drawn = np.insert(z, range(len(sources.scalars), count, 2), 1.0, axis=0)
     errors, valid = errors_of(setting, sources.made(drawn), z.shape[1])
-    found = np.where(valid, errors, np.nan)
-    value, ahead, back, both_ahead, both_back = np.split(found, np.cumsum([1, count, count, len(i)]), axis=1)
-    hessian = np.empty((len(found), count, count))
+    values = np.where(valid, errors, np.nan)
+    value, ahead, back, both_ahead, both_back = np.split(values, np.cumsum([1, count, count, len(i)]), axis=1)
+    hessian = np.empty((len(values), count, count))
     diagonal = np.arange(count)
     hessian[:, diagonal, diagonal] = (ahead + back - 2.0 * value) / steps**2
     alone = ahead[:, i] + back[:, i] + ahead[:, j] + back[:, j]
@@ -168,10 +168,10 @@ def _of_pairs(sources: Sources, covariance: Floats) -> Iterator[tuple[tuple[int,
         yield (i, j, j, j), moments.at(rho, 1, 3) - 3.0 * b * c
 
 
-def _terms(found: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:
+def _terms(coefficients: dict[tuple[int, ...], float], order: int) -> tuple[Ints, Floats]:
     terms = [
         (permutation, value)
-        for places, value in found.items()
+        for places, value in coefficients.items()
         if value
         for permutation in sorted(set(permutations(places)))
     ]

@@ -43,8 +43,8 @@ def _grades(raw: Any, context: Context) -> tuple[str, ...]:
         raw = list(USUAL) if raw else []
     names = fields.as_list(raw)
     for name in names:
-        found = _GRADE.fullmatch(name) if isinstance(name, str) else None
-        if found is None or int(found[1]) > _MOST_GRADE:
+        match = _GRADE.fullmatch(name) if isinstance(name, str) else None
+        if match is None or int(match[1]) > _MOST_GRADE:
             raise failure(
                 f"expected true, or grades from IT1 to IT{_MOST_GRADE} such as [IT6, IT7, IT8], not {shown(name)}"
             )
@@ -107,42 +107,42 @@ def half_widths(
 
 
 def check_allocation(
-    checker: Checker, given: Allocate, dimensions: Mapping[str, Dimension], clearances: Mapping[str, Clearance],
+    checker: Checker, allocate: Allocate, dimensions: Mapping[str, Dimension], clearances: Mapping[str, Clearance],
     limits: Mapping[str, ErrorLimit],
 ) -> None:  # fmt: skip
     """Check that something can be allocated, and what is named in `cost`."""
     root: KeyPath = ("reliability", "allocate")
     graded = set()
-    for name, dimension in dimensions.items() if given.grades else ():
+    for name, dimension in dimensions.items() if allocate.grades else ():
         try:
             places, millimetre = checker.places, checker.units.convert("1 mm")
-            half_widths(name, dimension, given.grades, checker.parameters, places, millimetre)
+            half_widths(name, dimension, allocate.grades, checker.parameters, places, millimetre)
             graded.add(name)
         except (ToleranceClassError, QuantityError) as error:
-            if name in given.cost:
+            if name in allocate.cost:
                 checker.report(
                     (*root, "cost", name), f"has no grade: {error}; leave it out, and it is held", at_key=True
                 )
-    for name in given.cost:
+    for name in allocate.cost:
         path: KeyPath = (*root, "cost", name)
         if name in dimensions and dimensions[name].measured is not None:
             checker.report(path, "what is measured is held as it is: its tolerance is not allocated", at_key=True)
-        checker.known(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
-        if name in clearances and given.grades:
+        checker.check_name(name, [*dimensions, *clearances], "dimension or clearance that varies,", path, at_key=True)
+        if name in clearances and allocate.grades:
             checker.report(path, "a clearance has no grade; leave it out, and it is held", at_key=True)
         elif name in clearances and clearances[name].fit is not None:
             message = "a fit is not allocated: its classes come in steps; give 'radial' or 'diametral', or no cost"
             checker.report(path, message, at_key=True)
     if not limits:
         checker.report(root, "tolerances are allocated to keep 'limits'; give some")
-    if given.cpk is not None:
+    if allocate.cpk is not None:
         for name in (name for name, limit in limits.items() if limit.radius is not None):
             message = f"a circle has no Cpk; limit {name}.x and {name}.y, or allocate to a 'reliability'"
             checker.report(("reliability", "limits", name), message, at_key=True)
     wide = any(d.sigma if d.tolerance is None else d.varies(checker.size(name))
                for name, d in dimensions.items() if name not in LOADS)  # fmt: skip
-    if not wide and not given.cost:
+    if not wide and not allocate.cost:
         message = "nothing to allocate: no dimension has a tolerance, and a clearance is held unless 'cost' names it"
         checker.report(root, message)
-    elif given.grades and not graded:
+    elif allocate.grades and not graded:
         checker.report((*root, "grades"), "nothing to allocate: no dimension is a length with a tolerance")

@@ -144,14 +144,14 @@ class Clearance(fields.Model):
         return spread.flaw(self.radius)
 
 
-def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: str | None) -> Clearance | None:
-    """A clearance with the link that its pin moves in, which is not that `meant` by outputs; None without its joint."""
+def check_clearance(checker: Checker, point: str, clearance: Clearance, named: str | None) -> Clearance | None:
+    """A clearance with the link that its pin moves in, not the one `named` by outputs; None without its joint."""
     path: KeyPath = ("reliability", "clearances", point)
     mechanism, report = checker.mechanism, checker.report
     _check_radius(checker, clearance, path)
     if point in mechanism.slides:
         return _check_slide_clearance(checker, clearance, path, tilts=mechanism.joints[point].prismatic is not None)
-    if not checker.known(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
+    if not checker.check_name(point, [*mechanism.owners, *mechanism.slides], "point or slide", path, at_key=True):
         return None
     if clearance.length is not None:
         report((*path, "length"), "is that of a slider in its guide; a pin's clearance has none")
@@ -160,9 +160,9 @@ def check_clearance(checker: Checker, point: str, clearance: Clearance, meant: s
     if len(held) < 2:
         report(path, f"only link {links[0]!r} has point {point!r}: no pin, no clearance", at_key=True)
     # By default the pin moves in the last link that no output or limit names.
-    link = clearance.link or ([link for link in links if link != meant] or links)[-1]
+    link = clearance.link or ([link for link in links if link != named] or links)[-1]
     if link not in links:
-        checker.known(link, links, f"link at point {point!r} named", (*path, "link"))
+        checker.check_name(link, links, f"link at point {point!r} named", (*path, "link"))
     elif clearance.effect == "length":
         binary = mechanism.links[link]
         if point not in (binary.from_, binary.to) or binary.telescopic:

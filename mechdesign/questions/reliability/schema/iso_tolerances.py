@@ -129,8 +129,8 @@ _FIT = re.compile(r"[⌀Øø]?\s*(\d+(?:\.\d+)?)(?:\s*mm)?\s*([A-Za-z]+\d+)\s*/\
 
 def is_class(text: str) -> bool:
     """Whether a text is written as a tolerance class, of either standard."""
-    found = _CLASS.fullmatch(text.strip())
-    named = found is not None and (found[1].islower() or found[1].isupper()) and found[1].lower() in LETTERS
+    match = _CLASS.fullmatch(text.strip())
+    named = match is not None and (match[1].islower() or match[1].isupper()) and match[1].lower() in LETTERS
     return named or text.strip().upper().startswith("ISO")
 
 
@@ -158,9 +158,9 @@ def deviations(text: str, size: ArrayLike) -> tuple[Number, Number]:
     most = _LENGTH_ENDS[-2] if general[1] == "f" else _LENGTH_ENDS[-1]
     wrong = (size < _SMALLEST_LENGTH) | (size > _LENGTH_ENDS[-1]) | np.isnan(half)
     if wrong.any():
-        given = size[wrong][0]
+        first = size[wrong][0]
         raise ToleranceClassError(
-            f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {given:g} mm; give it in numbers"
+            f"{text.strip()} is of lengths from {least:g} to {most:g} mm, not of {first:g} mm; give it in numbers"
         )
     return -half, half
 
@@ -189,13 +189,13 @@ def _width(grade: int, size: Floats) -> Floats:
     """Standard tolerances, micrometres."""
     wrong = ~((size > 0) & (size <= _ENDS[-1]))
     if wrong.any():
-        given, most = size[wrong][0], _ENDS[-1]
+        first, most = size[wrong][0], _ENDS[-1]
         raise ToleranceClassError(
-            f"ISO 286 gives classes of sizes above 0 up to {most:g} mm, not of {given:g} mm; give it in numbers"
+            f"ISO 286 gives classes of sizes above 0 up to {most:g} mm, not of {first:g} mm; give it in numbers"
         )
     if grade >= _COARSE and (size <= 1).any():
-        given = size[size <= 1][0]
-        raise ToleranceClassError(f"ISO 286 gives grades from {_COARSE} on of sizes above 1 mm, not of {given:g} mm")
+        first = size[size <= 1][0]
+        raise ToleranceClassError(f"ISO 286 gives grades from {_COARSE} on of sizes above 1 mm, not of {first:g} mm")
     return np.asarray(_GRADES[grade - 1][np.searchsorted(_ENDS, size)])
 
 
@@ -206,19 +206,19 @@ def _of_general(letter: str, table: Mapping[str, Floats]) -> Floats:
 
 
 def _by_class(text: str, size: Floats) -> tuple[Number, Number]:
-    found = _CLASS.fullmatch(text)
-    letter, grade = (found[1].lower(), int(found[2])) if found else ("", 0)
-    if found is None or found[1] not in (letter, letter.upper()) or letter not in LETTERS or grade > len(_GRADES):
+    match = _CLASS.fullmatch(text)
+    letter, grade = (match[1].lower(), int(match[2])) if match else ("", 0)
+    if match is None or match[1] not in (letter, letter.upper()) or letter not in LETTERS or grade > len(_GRADES):
         raise ToleranceClassError(
             f"{text!r} is no tolerance class: those are a letter ({', '.join(LETTERS)}; of holes capitals) and a grade "
             f"from 1 to {len(_GRADES)}, such as h7, js9 or H7; or ISO 2768-m"
         )
-    width, hole = _width(grade, size), found[1].isupper()
+    width, hole = _width(grade, size), match[1].isupper()
     nearest = -0.5 * width if letter == "js" else 0.0 * width if letter == "h" else _nearest(letter, grade, hole, size)
     none = np.isnan(nearest)
     if none.any():
-        given, known = size[none][0], _given(letter, grade, hole)
-        raise ToleranceClassError(f"ISO 286 gives no {text} of {given:g} mm here; {known}")
+        first, hint = size[none][0], _given(letter, grade, hole)
+        raise ToleranceClassError(f"ISO 286 gives no {text} of {first:g} mm here; {hint}")
     above = letter == "js" or (letter in _CLEARANCE) == hole
     low, high = (nearest, nearest + width) if above else (nearest - width, nearest)
     return low * 1e-3, high * 1e-3
@@ -244,17 +244,17 @@ def _nearest(letter: str, grade: int, hole: bool, size: Floats) -> Floats:
     if coarse:
         none = ((letter == "k") & (part > 0)) | ((letter == "n") & (size <= 1))
         return np.where(none, math.nan, np.where((letter == "n") & (part > 0), 0.0 * number, -number))
-    found = -number + np.where(part > 0, _GRADES[grade - 1][part] - _GRADES[grade - 2][part], 0.0)
+    limit = -number + np.where(part > 0, _GRADES[grade - 1][part] - _GRADES[grade - 2][part], 0.0)
     special = (letter == "m") & (grade == 6) & (size > 250) & (size <= 315)
-    return np.where(special, -9.0, found)
+    return np.where(special, -9.0, limit)
 
 
 def _given(letter: str, grade: int, hole: bool) -> str:
     """The sizes for which a class is given."""
-    known = _FINE_ENDS[~np.isnan(_nearest(letter, grade, hole, _FINE_ENDS))]
-    if len(known):
-        low = max([0.0, *_FINE_ENDS[known[0] > _FINE_ENDS]]) or (1.0 if letter in ("a", "b", "n") else 0.0)
-        return f"it is given of sizes above {low:g} up to {known[-1]:g} mm"
+    sizes = _FINE_ENDS[~np.isnan(_nearest(letter, grade, hole, _FINE_ENDS))]
+    if len(sizes):
+        low = max([0.0, *_FINE_ENDS[sizes[0] > _FINE_ENDS]]) or (1.0 if letter in ("a", "b", "n") else 0.0)
+        return f"it is given of sizes above {low:g} up to {sizes[-1]:g} mm"
     if letter == "j":
         return f"{'J6, J7 and J8' if hole else 'j5, j6, j7 and (up to 3 mm) j8'} are given"
     return "holes from K on are given from grade 3 on"
@@ -268,10 +268,10 @@ def fit_deviations(text: str) -> tuple[float, tuple[Number, Number], tuple[Numbe
     ToleranceClassError
         Where it is no fit, or one of its classes is not given for the size.
     """
-    found = _FIT.fullmatch(text.strip())
-    if found is None or not found[2].isupper() or not found[3].islower():
+    match = _FIT.fullmatch(text.strip())
+    if match is None or not match[2].isupper() or not match[3].islower():
         raise ToleranceClassError(
             f"{text!r} is no fit: those are a size in mm, the hole's class and the shaft's, such as 20 H7/g6"
         )
-    size = np.asarray(found[1], dtype=float)
-    return float(size), _by_class(found[2], size), _by_class(found[3], size)
+    size = np.asarray(match[1], dtype=float)
+    return float(size), _by_class(match[2], size), _by_class(match[3], size)

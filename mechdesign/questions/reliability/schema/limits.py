@@ -17,10 +17,10 @@ HELP_PAGE = "theory/reliability"
 SUFFIXES = ("", "_velocity", "_acceleration")
 
 
-def split_order(name: str, known: Callable[[str], bool]) -> tuple[str, int]:
+def split_order(name: str, is_name: Callable[[str], bool]) -> tuple[str, int]:
     """The coordinate (or point) that a name is about, and whether it means the position, velocity or acceleration."""
     for order, suffix in enumerate(SUFFIXES):
-        if not known(name) and name.endswith(suffix) and known(name.removesuffix(suffix)):
+        if not is_name(name) and name.endswith(suffix) and is_name(name.removesuffix(suffix)):
             return name.removesuffix(suffix), order
     return name, 0
 
@@ -60,7 +60,7 @@ class ErrorLimit(fields.Model):
 
     @model_validator(mode="after")
     def _some(self) -> ErrorLimit:
-        kinds = [given for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (given := self.given(*keys))]
+        kinds = [present for keys in (("min", "max"), ("lsl", "usl"), ("radius",)) if (present := self.given(*keys))]
         if not kinds:
             raise failure("a limit needs a number, 'min', 'max', 'lsl', 'usl' or 'radius'")
         if len(kinds) > 1:

@@ -136,18 +136,18 @@ class ReliabilitySection(MotionSection):
     def checked(self, checker: Checker) -> Self:
         """Check what varies and what is limited as well; wildcards and the clearances' links are filled in."""
         columns = _columns_of_dynamics(checker, self)
-        meant = _links_of_points(checker, self)
+        named_links = _links_of_points(checker, self)
         dimensions = check_dimensions(checker, self.dimensions)
         clearances = {
             point: right
             for point, clearance in self.clearances.items()
-            if (right := check_clearance(checker, point, clearance, meant.get(point))) is not None
+            if (right := check_clearance(checker, point, clearance, named_links.get(point))) is not None
         }
         for name, limit in self.limits.items():
             _limit(checker, self, name, limit, columns)
         for index, correlated in enumerate(self.correlation):
             for place, name in enumerate((correlated.one, correlated.other)):
-                checker.known(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
+                checker.check_name(name, dimensions, "varying dimension", ("reliability", "correlation", index, place))
         pairs = [frozenset(pair[:2]) for pair in self.correlation]
         for index, pair in enumerate(pairs):
             if pair in pairs[:index]:
@@ -197,14 +197,14 @@ def split_link(mechanism: MechanismSection, name: str) -> tuple[str, str, str]:
 
 def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str, str]:
     """The link named for each point with a clearance; contradictions are reported."""
-    found: dict[str, str] = {}
-    given: list[tuple[KeyPath, str, bool]] = [
+    chosen: dict[str, str] = {}
+    named: list[tuple[KeyPath, str, bool]] = [
         *((("reliability", "outputs", k), name, False) for k, name in enumerate(section.outputs or ())),
         *((("reliability", "limits", name), name, True) for name in section.limits),
     ]
     if (workspace := checker.parts.get("workspace")) is not None:
-        given.append((("workspace", "point"), workspace.point, False))
-    for path, part, at_key in [(path, part, key) for path, name, key in given for part in _parts(checker, name)]:
+        named.append((("workspace", "point"), workspace.point, False))
+    for path, part, at_key in [(path, part, key) for path, name, key in named for part in _parts(checker, name)]:
         link, _, point = split_link(checker.mechanism, part)
         if not link:
             continue
@@ -212,8 +212,8 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
         if link not in links:
             message = f"link {link!r} has no point {point!r}; it belongs to {' and '.join(links)}"
             checker.report(path, message, at_key=at_key)
-        elif own is not None and found.setdefault(point, link) != link:
-            message = f"{point!r} is that of link {found[point]!r} elsewhere; all outputs and limits mean one of them"
+        elif own is not None and chosen.setdefault(point, link) != link:
+            message = f"{point!r} is that of link {chosen[point]!r} elsewhere; all outputs and limits mean one of them"
             checker.report(path, message, at_key=at_key)
         if own is not None and link in links and (own.link == link or len(links) < 2):
             message = (
@@ -221,7 +221,7 @@ def _links_of_points(checker: Checker, section: ReliabilitySection) -> dict[str,
                 "those of what else it joins; give reliability.clearances another 'link', or none"
             )
             checker.report(path, message, at_key=at_key)
-    return found
+    return chosen
 
 
 def _parts(checker: Checker, name: str) -> list[str]:
@@ -266,7 +266,7 @@ def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[
     dynamics: DynamicsSection | None = checker.parts.get("dynamics")
     joints = (dynamics or DynamicsSection()).joints(compiled)
     pace = pace_of(section, dynamics, checker.parts.get("kinematics"))
-    own = pace.motion is not None or pace.of_given(compiled.drives)
+    own = pace.motion is not None or pace.inverse(compiled.drives)
     elsewhere = own and source_of(checker, pace) is not source_of(checker, section)
     still = column_kinds(compiled, joints, moving=False)
     kinds = {
@@ -312,17 +312,17 @@ def _limit(
         if columns[name]:
             checker.kind(path, columns[name])
         return
-    known = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
+    names = mechanism.owners if limit.radius is not None else {**mechanism.coordinates, **mechanism.owners}
     name = split_link(mechanism, name)[1]
-    base, order = split_order(name, known.__contains__)
+    base, order = split_order(name, names.__contains__)
     if order and not section.rated:
         report(path, "a limit of a velocity or an acceleration needs 'rates', a 'speed' or a 'motion'", at_key=True)
     if limit.radius is not None:
-        if checker.known(base, mechanism.owners, "point", path, at_key=True):
+        if checker.check_name(base, mechanism.owners, "point", path, at_key=True):
             checker.kind(path, ORDERS["length"][order])
     elif base in mechanism.owners:
         report(path, f"{name!r} is a point: limit {name}.x and {name}.y, or {{radius: r}}", at_key=True)
-    elif base not in known and base.partition(".")[0] in COMMANDS:
+    elif base not in names and base.partition(".")[0] in COMMANDS:
         message = (
             "a limit is of the error of a coordinate in one pose, not of a result; of a swing or a stroke draw the "
             "linkage twice, at both ends, and limit a measure between, e.g. mechanism.measures: {swing: {angle: "
@@ -335,12 +335,12 @@ def _limit(
 
 def others(section: ReliabilitySection | None, graph: Graph) -> Mapping[str, tuple[str, list[str]]]:
     """Of each point with a clearance the link that its pin moves in, and those whose point its coordinates are."""
-    found: dict[str, tuple[str, list[str]]] = {}
+    joined: dict[str, tuple[str, list[str]]] = {}
     for point, clearance in (section.clearances if section is not None else {}).items():
         if point in graph.slides:
             continue
-        found[point] = clearance.link or "", [link for link in graph.links_at(point) if link != clearance.link]
-    return found
+        joined[point] = clearance.link or "", [link for link in graph.links_at(point) if link != clearance.link]
+    return joined
 
 
 def links_meant(
@@ -351,12 +351,12 @@ def links_meant(
     Of a pin that gives these are all, and it lies midway; but where the ground has it, or the stiffness section asks it
     of a link, that one.
     """
-    meant: dict[str, list[str]] = {}
+    linked: dict[str, list[str]] = {}
     if stiffness is not None:
         bodies = {stiffness.at: [stiffness.link]} if stiffness.link is not None else {}
         pins = {point: links for point in stiffness.bearings if (links := graph.links_at(point))}
-        meant = {point: [GROUND] if GROUND in links else bodies.get(point, links) for point, links in pins.items()}
-    return meant | {point: rest for point, (_, rest) in others(section, graph).items()}
+        linked = {point: [GROUND] if GROUND in links else bodies.get(point, links) for point, links in pins.items()}
+    return linked | {point: rest for point, (_, rest) in others(section, graph).items()}
 
 
 def in_words(section: ReliabilitySection | None, graph: Graph, sizes: Mapping[str, float]) -> list[str]:
@@ -383,8 +383,8 @@ def in_words(section: ReliabilitySection | None, graph: Graph, sizes: Mapping[st
             )
     classes: dict[tuple[str, tuple[Number, Number]], list[str]] = {}
     for name, dimension in section.dimensions.items():
-        if isinstance(given := dimension.tolerance, ToleranceClass):
-            classes.setdefault((given.text, dimension.ends(sizes[name])), []).append(name)
+        if isinstance(tolerance := dimension.tolerance, ToleranceClass):
+            classes.setdefault((tolerance.text, dimension.ends(sizes[name])), []).append(name)
     lines += [
         f"tolerance: {text} of {', '.join(names)}: {low:+.6g} to {high:+.6g}"
         for (text, (low, high)), names in classes.items()

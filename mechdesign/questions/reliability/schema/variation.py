@@ -82,7 +82,7 @@ def _tolerance(raw: Any, context: Context) -> tuple[float, float]:
         return Amount.by("-half", half=half), half
     if len(raw) != 2:
         raise failure(f"expected a half-width or two bounds such as [-0.1, 0.3], not {shown(raw)}")
-    low, high = (read_number(each, context) for each in raw)
+    low, high = (read_number(bound, context) for bound in raw)
     if low > high:
         raise failure(f"the lowest deviation {low:g} is above the highest {high:g}")
     return low, high
@@ -204,7 +204,7 @@ class Dimension(Distribution, _Width):
 
 def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> dict[str, Dimension]:
     """Dimensions with wildcards expanded; a dimension that is named itself wins over a wildcard."""
-    found: dict[str, Dimension] = {}
+    checked: dict[str, Dimension] = {}
     parameters, report = checker.parameters, checker.report
     for name, dimension in dimensions.items():
         path: KeyPath = ("reliability", "dimensions", name)
@@ -216,15 +216,15 @@ def check_dimensions(checker: Checker, dimensions: Mapping[str, Dimension]) -> d
                 )
             for place in matching:
                 if place not in dimensions:
-                    found[place] = _check_dimension(checker, place, dimension, path)
+                    checked[place] = _check_dimension(checker, place, dimension, path)
             continue
         if name in parameters.formulas:
             message = f"parameter {name!r} follows from others by its expression; give those a tolerance"
             report(path, message, at_key=True)
-        known = [*parameters.known(), *checker.mechanism.driven_kinds, *LOADS]
-        if checker.known(name, known, "parameter, dimension or drive", path, at_key=True):
-            found[name] = _check_dimension(checker, name, dimension, path)
-    return found
+        names = [*parameters.names(), *checker.mechanism.driven_kinds, *LOADS]
+        if checker.check_name(name, names, "parameter, dimension or drive", path, at_key=True):
+            checked[name] = _check_dimension(checker, name, dimension, path)
+    return checked
 
 
 def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: KeyPath) -> Dimension:
@@ -246,20 +246,20 @@ def _check_dimension(checker: Checker, name: str, dimension: Dimension, path: Ke
     return dimension
 
 
-def _check_class(checker: Checker, name: str, given: object, leg: float | None) -> None:
+def _check_class(checker: Checker, name: str, tolerance: object, leg: float | None) -> None:
     """Check that a tolerance class stands for a length or an angle."""
-    if not isinstance(given, ToleranceClass):
+    if not isinstance(tolerance, ToleranceClass):
         return
     kinds = quantities(name, checker.parameters, checker.places)
     if len(kinds) != 1 or not kinds <= {"length", "angle"}:
-        raise ToleranceClassError(f"{given.text} is of a length or an angle of the drawing; give a number here")
+        raise ToleranceClassError(f"{tolerance.text} is of a length or an angle of the drawing; give a number here")
     if kinds == {"length"} and leg is not None:
         raise ToleranceClassError("the leg is that of an angle; a length has its own size")
     if kinds == {"angle"} and leg is None:
-        given.of_angle(given.millimetre)
+        tolerance.of_angle(tolerance.millimetre)
         raise ToleranceClassError(
-            f"{given.text} of an angle goes by the length of its shorter leg; say which: "
-            f"{{tolerance: {given.text}, leg: 50}}"
+            f"{tolerance.text} of an angle goes by the length of its shorter leg; say which: "
+            f"{{tolerance: {tolerance.text}, leg: 50}}"
         )
 
 

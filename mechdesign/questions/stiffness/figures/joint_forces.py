@@ -68,7 +68,7 @@ def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
     kinds = {"force": forces[:MAX_JOINTS], "moment": moments[:MAX_JOINTS]}
     return {
         "joint_forces": joint_curves(study, HEADING, kinds, loads, over),
-        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, what="static force"),
+        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, noun="static force"),
     }
 
 

@@ -118,9 +118,9 @@ def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = sl
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
     assert study.workspace is not None
     point, local = study.workspace.point, region.local
-    given: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
-    plan = study.mechanism.plan(tuple(given))
-    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in given.items()]
+    coordinates: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
+    plan = study.mechanism.plan(tuple(coordinates))
+    values = [radians(study, study.mechanism.coordinate(name), value) for name, value in coordinates.items()]
     return plan.solve(np.broadcast_arrays(*values), limits=False)
 
 
@@ -132,15 +132,15 @@ def inscribed_figure(view: WorkspaceView) -> Figure | None:
         return None
     shown, unit = some(view.regions), study.units.label("length")
     places = np.concatenate([region.places() for region in shown])
-    found = [_inscribed(table, region, unit) for region in shown]
+    by_region = [_inscribed(table, region, unit) for region in shown]
     # In small panels the sizes would lie over each other.
     titles = [region.title for region in shown]
     if len(shown) > 1:
         titles = ["\n".join([title, *(words for *_, words in shapes)])
-                  for title, shapes in zip(titles, found, strict=True)]  # fmt: skip
+                  for title, shapes in zip(titles, by_region, strict=True)]  # fmt: skip
     title = f"largest circle and rectangle in the workspace{left_out(view.regions)}"
     page = sheet(study, places, titles, title, bar=False)
-    for axes, region, shapes in zip(page.axes, shown, found, strict=True):
+    for axes, region, shapes in zip(page.axes, shown, by_region, strict=True):
         fill(axes, region.local)
         for shape, place, color, words in shapes:
             shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)

@@ -82,7 +82,7 @@ def ellipses_figure(view: WorkspaceView) -> Figure | None:
     if style.narrow():
         for handle in handles:
             handle.set_label(style.folded(str(handle.get_label()), 9.0, style.width() - LEFT - 0.5))
-        style.grow(page.figure, below=style.line(9.0) * sum(str(each.get_label()).count("\n") for each in handles))
+        style.grow(page.figure, below=style.line(9.0) * sum(str(entry.get_label()).count("\n") for entry in handles))
     height = page.figure.get_figheight()
     page.figure.legend(handles=handles, loc="lower left", borderaxespad=0.3,
                        bbox_to_anchor=(LEFT / style.width() - 0.02, _ABOVE_ENDS / height))  # fmt: skip
@@ -101,4 +101,4 @@ def _scale(half: Floats, spacing: float) -> tuple[float, float, float]:
     lengths = [round_down(fits / part) for part in (1.0, 2.2, 5.0)]
     # For each length the next round value above, so that no ellipse that should fit is larger.
     scales = [(length, 1 / round_down(fits / (length * usual))) for length in lengths]
-    return (*max(scales, key=lambda each: each[0] / each[1]), fits)
+    return (*max(scales, key=lambda pair: pair[0] / pair[1]), fits)

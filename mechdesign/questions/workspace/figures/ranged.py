@@ -67,14 +67,14 @@ def _region(
     mechanism, tables = study.mechanism, [table for _, table in shown]
     reached = np.concatenate([*map(places, tables), sketch_places(study), places_before(before)])
     page = sheet(study, reached, titles, title, bar=False, pad=ROOM)
-    seen: set[str] = set()
+    kinds: set[str] = set()
     for axes, (held, table) in zip(page.axes, shown, strict=True):
         draw_before(axes, before, held)
         axes.add_patch(PathPatch(_area(table), facecolor=PALE, linewidth=0, zorder=0.5))
-        seen |= outline_of(axes, table)
+        kinds |= outline_of(axes, table)
         alone = len(tables) == 1
         draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=alone, drives=False, faint=not alone)
-    page.legend(seen)
+    page.legend(kinds)
     name_both(page.figure, before)
     return page.figure
 

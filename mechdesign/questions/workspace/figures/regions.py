@@ -141,13 +141,13 @@ def fate(kind: str, at: str) -> str:
 
 def outline(axes: Axes, region: Region) -> set[str]:
     """Draw a region's boundary by what ends it, and faintly the pieces left out; returns the keys of `LOOKS` drawn."""
-    seen = outline_of(axes, region.boundary)
+    kinds = outline_of(axes, region.boundary)
     if region.others is not None:
         local, boundary = region.others
         fill(axes, local, LEFT_OUT, zorder=0.9)
         _draw(axes, boundary, list(curves(boundary)), color=style.FAINT, linewidth=0.8, zorder=2.8)
-        seen.add("other")
-    return seen
+        kinds.add("other")
+    return kinds
 
 
 def outline_of(axes: Axes, boundary: Table) -> set[str]:
@@ -243,10 +243,10 @@ class Sheet:
         panels = list(zip(self.axes, regions, strict=True))
         self.legend(set().union(*(outline(*panel) | loci(*panel) for panel in panels)))
 
-    def legend(self, seen: set[str]) -> None:
+    def legend(self, kinds: set[str]) -> None:
         """Entries in one row below the panels for what `outline` and `loci` have drawn."""
         entries = [Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=words)
-                   for name, (color, dashes, width, words) in LOOKS.items() if name in seen]  # fmt: skip
+                   for name, (color, dashes, width, words) in LOOKS.items() if name in kinds]  # fmt: skip
         if entries:
             legend_at_left(self.figure, entries, 4, columnspacing=1.4, borderaxespad=0.3)
 

@@ -21,7 +21,7 @@ def prepare(study: Study) -> Evaluate:
     StudyError
         Where nothing is limited, or a velocity whose drives' rates are not known.
     """
-    from mechdesign.questions.kinematics.rates import constant_rates, of_given
+    from mechdesign.questions.kinematics.rates import constant_rates
     from mechdesign.questions.reliability.deflection import elasticity
     from mechdesign.questions.reliability.first_order import linear_errors, linear_margins, nominal_values
     from mechdesign.questions.reliability.forces import force_model, pace
@@ -38,7 +38,7 @@ def prepare(study: Study) -> Evaluate:
     question, section = question.narrowed, pace(study)
     rates = constant_rates(study, section, mechanism.drives)
     forces = force_model(study) if question.columns else None
-    if (of_given(study, section) or section.motion is not None) and question.moving:
+    if (section.inverse(study.mechanism.drives) or section.motion is not None) and question.moving:
         message = "the index 'reliability' of velocities needs 'rates' of the drives: a path or a motion has none here"
         raise StudyError((study.problem(message, "reliability", "limits"),))
     bent = elasticity(study)[0]
