@@ -20,6 +20,7 @@ from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.model import Description, Limit, Term
 from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, locate
+from mechdesign.mechanism.wheels import Mesh, meshes
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,11 @@ class Core:
         self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+
+    @cached_property
+    def meshes(self) -> list[Mesh]:
+        """Wheels that make its couplings."""
+        return meshes(self.description, self.graph, self.couplings, self.sketch_configuration)
 
     @cached_property
     def size(self) -> float:

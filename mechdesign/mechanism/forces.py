@@ -80,6 +80,15 @@ class Forces:
         between: Vector = other - one
         return between
 
+    def plus(self, other: Forces) -> Forces:
+        """The sum of two systems of forces."""
+        both = Forces(self.configuration)
+        both.nodes = [plus(one, 1, more) for one, more in zip(self.nodes, other.nodes, strict=True)]
+        both.bodies = dict(self.bodies)
+        for body, (force, moment) in other.bodies.items():
+            both.on_body(body, force, moment)
+        return both
+
     @property
     def total(self) -> tuple[Vector, Value]:
         """Sum of all forces, and of their moments about the origin."""

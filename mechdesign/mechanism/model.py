@@ -161,12 +161,15 @@ class Coupling:
     """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
-    is a parameter as in a `Measure`, or a place of the coupling's own.
+    is a parameter as in a `Measure`, or a place of the coupling's own. Of wheels a `belt` joins them, or they mesh with
+    a `pressure_angle` (radians).
     """
 
     name: str
     sets: str
     of: Expression
+    belt: bool = False
+    pressure_angle: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
 from mechdesign.mechanism.outputs import pulled
 from mechdesign.mechanism.structure import Group
+from mechdesign.mechanism.wheels import Mesh
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"
@@ -51,12 +52,40 @@ class Balance:
 
 
 @quiet
-def balance(linear: Linearization, forces: Forces) -> Balance:
+def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) -> Balance:
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite.
+    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth.
     """
+    held = _balance(linear, forces)
+    if not meshes:
+        return held
+    # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
+    teeth = Forces(linear.configuration)
+    for mesh in meshes:
+        engage(teeth, mesh, held.couplings[mesh.index])
+    return _balance(linear, forces.plus(teeth))
+
+
+def engage(teeth: Forces, mesh: Mesh, effort: Value) -> None:
+    """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
+
+    Teeth press each other apart by their pressure angle; a belt only pulls, and its pretension is not known.
+    """
+    configuration = teeth.configuration
+    place, along = mesh.contact(configuration)
+    radius = mesh.radii(configuration)[0]
+    force = along * (effort if mesh.slide >= 0 else effort / radius)
+    inwards = 1j * along
+    inwards = inwards * np.where(dot(inwards, place - configuration.nodes[mesh.axes[1]]) > 0, 1.0, -1.0)
+    force = force + np.abs(force) * np.tan(mesh.pressure_angle) * inwards
+    for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
+        teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
+
+
+@quiet
+def _balance(linear: Linearization, forces: Forces) -> Balance:
     structure, bodies = linear.structure, linear.graph.bodies
     nodes = list(forces.nodes)
     frames: list[Value] = [0.0] * linear.graph.classes

@@ -53,6 +53,21 @@ class Guide:
 
 
 @dataclass(frozen=True)
+class Wheels:
+    """Pitch circles of two links, or of a wheel and the line of a rack, where they touch.
+
+    `radii` and `axes` are those of both links; the radius of a rack is 0, and its axis where it slides.
+    """
+
+    links: tuple[str, str]
+    axes: tuple[complex, complex]
+    radii: tuple[float, float]
+    touch: complex
+    along: complex
+    belt: bool
+
+
+@dataclass(frozen=True)
 class Scene:
     """One pose of a mechanism: places of the points, unit vectors of the links' x axes, lines of the slides.
 
@@ -64,6 +79,7 @@ class Scene:
     rotations: Mapping[str, complex]
     guides: tuple[Guide, ...]
     span: float
+    wheels: tuple[Wheels, ...] = ()
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
@@ -145,7 +161,13 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
     drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])
     span = max(float(np.ptp(drawn.real)), float(np.ptp(drawn.imag))) or 1.0  # of slides alone one unit of length
-    return Scene(description, points, rotations, tuple(guides), span)
+    wheels = []
+    for mesh in mechanism.meshes:
+        touch, along = (pick(value) for value in mesh.contact(configuration))
+        one, other = (pick(configuration.nodes[node]) for node in mesh.axes)
+        first, second = (float(pick(radius).real) for radius in mesh.radii(configuration))
+        wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, mesh.belt))
+    return Scene(description, points, rotations, tuple(guides), span, tuple(wheels))
 
 
 def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:

@@ -40,6 +40,8 @@ from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount
 
 
+# Of teeth as ISO 53 has them (radians).
+PRESSURE_ANGLE = np.radians(20.0)
 # Rows from which a cubic spline is told.
 FEWEST_ROWS = 4
 
@@ -354,7 +356,9 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
         if sets in function.names:
             builder.report(path, f"{given.set_!r} cannot follow itself")
             continue
-        couplings[name] = Coupling(name, sets, function)
+        angle = given.pressure_angle
+        pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
+        couplings[name] = Coupling(name, sets, function, given.belt, 0.0 if given.belt else pressure)
     return couplings
 
 

@@ -324,6 +324,11 @@ class Coupling(fields.Model):
     cubic spline. It repeats if it spans a turn and ends as it begins. Example: lift.csv
     """
 
+    belt: bool = False
+    """Whether a belt or chain joins the two wheels of a ratio between angles, not their teeth."""
+    pressure_angle: fields.Angle | None = None
+    """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
+
     @model_validator(mode="after")
     def _consistent(self) -> Coupling:
         if self.to is not None and self.of is not None:
