@@ -40,6 +40,18 @@ class Coordinate:
     turn: float = 0.0
 
     @property
+    def linear(self) -> bool:
+        """Whether an expression is linear in angles and slides, whatever its parameters."""
+        if self.expression is None or any(part.kind not in ("angle", "slide", "parameter") for part in self.parts):
+            return False
+        unit = self.expression.angle_unit
+        values = {
+            part.name: 1.0 if part.kind == "parameter" else Expression(part.name, (("name", part.name),), unit)
+            for part in self.parts
+        }
+        return self.expression.substituted(values).is_linear()
+
+    @property
     def ends(self) -> tuple[tuple[str, int], ...]:
         """Link and node of each point that the coordinate or a part of it is measured at."""
         nodes = {"x": (self.node,), "y": (self.node,), "distance": (self.node, self.other)}.get(self.kind, ())

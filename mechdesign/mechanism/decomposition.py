@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mechdesign.errors import MechanismError
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
@@ -134,7 +134,10 @@ def compile_structure(
         if unknowns == [("value", k) for k in own]:
             groups.append(Group("coupled", (), (), (), (), tuple(own)))
         else:
-            groups.append(_group(edges, ties, inner, unknowns, numbers, own))
+            group = _group(edges, ties, inner, unknowns, numbers, own)
+            single = not inner and not group.bases and group.unknowns == len(own) == 1
+            linear = single and own[0] >= len(given) and couplings[own[0] - len(given)].gap.linear
+            groups.append(replace(group, form="linear") if linear else group)
         before = {part_of[other] for row, other in arcs if part_of[row] == k} - {k}
         chains.append(frozenset([k]).union(*(chains[other] for other in before)))
     return Structure(

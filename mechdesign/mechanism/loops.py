@@ -140,6 +140,18 @@ class Loops:
             if number == k:
                 self.slides[slide] = self.given[k]
 
+    def solve_linear_condition(self, group: Group) -> None:
+        """Solve a group's condition, which is linear in its one unknown."""
+        self.count_turns(group)
+        self.put(group, [0.0])
+        ((slope,),), (gap,) = self.condition_rows(group), self.gaps(group)
+        self.put(group, [-gap / slope])
+
+    def gaps(self, group: Group) -> list[Value]:
+        """What a group's conditions miss their values by."""
+        configuration = self.pose()
+        return [configuration.value(self.structure.values[k]) - self.given[k] for k in group.conditions]
+
     def count_turns(self, group: Group) -> None:
         """Count the turns of the angles in a group's conditions that are sums of values."""
         if group.conditions:
@@ -204,9 +216,8 @@ class Loops:
             errors += [gap.real, gap.imag]
         if group.conditions:
             self.place(group)
-            configuration = self.pose()
             rows += self.condition_rows(group)
-            errors += [configuration.value(self.structure.values[k]) - self.given[k] for k in group.conditions]
+            errors += self.gaps(group)
         return rows, errors
 
     def condition_rows(self, group: Group) -> list[list[Value]]:

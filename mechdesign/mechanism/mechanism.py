@@ -56,6 +56,11 @@ class Mechanism(Core):
         self.drives: tuple[str, ...] = tuple(description.drives)  #: names of what is given, as many as the mobility
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
+        if self.couplings:
+            # What follows from others may be drawn roughly: assembly modes are read from where it really is.
+            drawn = self.sketch_configuration
+            nodes, rotations, slides = [*drawn.nodes], [*drawn.rotations], [*drawn.slides]
+            self.sketch = replace(self.sketch, nodes=nodes, rotations=rotations, slides=slides)
 
     @property
     def mobility(self) -> int:

@@ -161,14 +161,14 @@ class Coupling:
     """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
-    is a parameter as in a `Measure`, or a place of the coupling's own. Of wheels a `belt` joins them, or they mesh with
-    a `pressure_angle` (radians).
+    is a parameter as in a `Measure`, or a place of the coupling's own. Its `wheels` are gears, whose teeth have a
+    `pressure_angle` (radians), or pulleys of a belt.
     """
 
     name: str
     sets: str
     of: Expression
-    belt: bool = False
+    wheels: str = "gears"
     pressure_angle: float = 0.0
 
 

@@ -48,13 +48,16 @@ class Plan:
         # Angles in given expressions and in couplings; their turns are counted on the way from the sketch, unless they
         # follow from values.
         inner = angles_of(c for c in structure.values if c.kind == "expression")
-        self.angles = tuple(
+        left = [
             angle for name, angle in inner.items()
             if name not in self.counted and structure.counted(angle, core.graph) is None
-        )  # fmt: skip
-        self.iterative = any(group.form == "newton" for group in structure.groups) or bool(
-            structure.functions and self.angles
-        )
+        ]  # fmt: skip
+        self.iterative = any(group.form == "newton" for group in structure.groups)
+        if structure.functions and left and not self.iterative:
+            # Turns are those of a motion of the drives; in the plane of outputs they would depend on the way.
+            self.iterative = {c.name for c in structure.given} == core.description.drives.keys()
+        self.angles = tuple(left) if self.iterative or not structure.functions else ()
+        self.unfollowed = tuple(left) if not self.angles else ()
         self.followers = tuple(coupling.follower for coupling in core.couplings)
 
     @cached_property
@@ -92,7 +95,7 @@ class Plan:
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
         state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
-        state.near = {**state.near, **self._given_angles(given)}
+        state.near = {**state.near, **self._given_angles(given), **self._drawn_turns}
         return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
@@ -221,6 +224,11 @@ class Plan:
 
     def _given_angles(self, given: Sequence[Value]) -> dict[str, Value]:
         return {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_turns(self) -> dict[str, Value]:
+        """Angles in couplings whose turns are not counted, in the sketch."""
+        return {angle.name: self.core.sketch_configuration.value(angle) for angle in self.unfollowed}
 
     @cached_property
     def _drawn_angles(self) -> dict[str, float]:

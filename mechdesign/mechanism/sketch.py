@@ -19,7 +19,7 @@ from mechdesign.mechanism.structure import Group, Structure, whole
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
 # Forms of groups without an assembly mode: with a single assembly, or with one that is searched for.
-_WITHOUT_MODE = ("place", "coupled", "newton", "two slides")
+_WITHOUT_MODE = ("place", "coupled", "linear", "newton", "two slides")
 
 
 @dataclass

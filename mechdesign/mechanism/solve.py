@@ -173,6 +173,8 @@ def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, beg
             solve_newton(state, index, guess[state.structure.unknowns[index]])
         elif group.form == "coupled":
             state.couple(group)
+        elif group.form == "linear":
+            state.solve_linear_condition(group)
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)

@@ -15,7 +15,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import Edge, Graph
 
 Form = Literal[
-    "place", "coupled", "two angles", "angle and fixed slide", "angle and turning slide", "two slides", "newton"
+    "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides", "newton"
 ]  # fmt: skip
 # Of a ``value`` the index in `Structure.values`.
 Variable = tuple[Literal["angle", "slide", "x", "y", "value"], int]
@@ -53,7 +53,8 @@ class Group:
     Their equations are `loops` between nodes that are already placed, and `conditions`: indices of values
     that are equations of this group. The edges of `tree`, each with its sign, then place the group's nodes in order. A
     base is the first node of a part that no loop but only conditions hold. A ``coupled`` group has no equation to be
-    solved: the one condition is the value that follows from others.
+    solved: the one condition is the value that follows from others. Of a ``linear`` one the condition is linear in the
+    only unknown.
     """
 
     form: Form

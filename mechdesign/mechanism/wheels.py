@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import Value, Vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, Coupled
@@ -96,21 +95,22 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
     found = []
     for index, coupling in enumerate(couplings):
         given = description.couplings[coupling.name]
+        if given.wheels == "none":
+            continue
         axes = _rack(description, graph, coupling) if coupling.follower.kind == "slide" else None
         axes = axes or _wheels(description, graph, coupling, drawn)
         if axes is not None:
             links, carrier, nodes = axes
             slide = coupling.follower.slide
             equal = slide < 0 and abs(float(_ratio(_rates(coupling.gap, drawn), links[1], carrier)) - 1.0) < SAME_RATE
-            found.append(
-                Mesh(index, coupling.gap, links, carrier, nodes, slide, given.belt or equal, given.pressure_angle)
-            )
+            belt = given.wheels == "belt" or equal
+            found.append(Mesh(index, coupling.gap, links, carrier, nodes, slide, belt, given.pressure_angle))
     return found
 
 
 def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Configuration) -> Axes | None:
     follower = coupling.follower
-    if follower.kind != "angle" or not _linear(coupling.function):
+    if follower.kind != "angle" or not coupling.function.linear:
         return None
     rates = _rates(coupling.gap, drawn)
     others = [body for body in rates if body not in (follower.body, GROUND)]
@@ -134,7 +134,7 @@ def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Co
 def _rack(description: Description, graph: Graph, coupling: Coupled) -> Axes | None:
     angles = [part for part in coupling.function.parts if part.kind != "parameter"]
     name = graph.slides[coupling.follower.slide]
-    if len(angles) != 1 or angles[0].kind != "angle" or name not in description.joints or not _linear(coupling.function):
+    if len(angles) != 1 or angles[0].kind != "angle" or name not in description.joints or not coupling.function.linear:
         return None
     wheel, (guide, *sliders) = angles[0], description.joints[name].links
     axis = _axis(graph, wheel.body, guide)
@@ -162,14 +162,3 @@ def _rates(gap: Coordinate, configuration: Configuration) -> dict[str, Value]:
 def _ratio(rates: Mapping[str, Value], driving: str, carrier: str) -> Value:
     return 1.0 + rates.get(carrier, 0.0) if driving == GROUND else -1.0 * rates.get(driving, 0.0)
 
-
-def _linear(function: Coordinate) -> bool:
-    """Whether a function is linear in angles, whatever its parameters."""
-    assert function.expression is not None
-    unit = function.expression.angle_unit
-    values = {
-        part.name: 1.0 if part.kind == "parameter" else Expression(part.name, (("name", part.name),), unit)
-        for part in function.parts
-    }
-    angles = all(part.kind in ("angle", "parameter") for part in function.parts)
-    return angles and function.expression.substituted(values).is_linear()

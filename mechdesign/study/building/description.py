@@ -358,7 +358,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
             continue
         angle = given.pressure_angle
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
-        couplings[name] = Coupling(name, sets, function, given.belt, 0.0 if given.belt else pressure)
+        couplings[name] = Coupling(name, sets, function, given.wheels, pressure)
     return couplings
 
 

@@ -285,6 +285,11 @@ class Spring(fields.Model):
         return self
 
 
+_WHEELS = {
+    "gears": "wheels with teeth, whose force acts where the pitch circles touch; or a pinion and its rack",
+    "belt": "pulleys with a belt or chain, or with crossed ones for a negative ratio",
+    "none": "a controller or what is not drawn: moments alone act on the links",
+}
 _TABLE_FORM: fields.Form = {"type": ["string", "object", "array"], "title": "table"}
 
 
@@ -324,8 +329,8 @@ class Coupling(fields.Model):
     cubic spline. It repeats if it spans a turn and ends as it begins. Example: lift.csv
     """
 
-    belt: bool = False
-    """Whether a belt or chain joins the two wheels of a ratio between angles, not their teeth."""
+    wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
+    """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
     pressure_angle: fields.Angle | None = None
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
 
