@@ -58,11 +58,7 @@ def questions(study: Study) -> tuple[str, ...]:
     """
     judged = {command_of(requirement) for requirement in study.requirements}
     commands = [command for command in COMMANDS if command in study.questions or command in judged]
-    cases = [
-        question.name
-        for question in (SWEEP, SENSITIVITIES)
-        if getattr(study, question.section or question.name) is not None
-    ]
+    cases = [case.name for case in (SWEEP, SENSITIVITIES) if getattr(study, case.section or case.name) is not None]
     return (*(commands or ["kinematics"]), *cases)
 
 

@@ -196,9 +196,8 @@ def _junit(comparison: Comparison, command: str) -> str:
     from junitparser import Failure, JUnitXml, TestCase, TestSuite
 
     report = JUnitXml("mechdesign")
-    cases = dict.fromkeys(
-        [*comparison.cases, *((difference.folder, difference.table) for difference in comparison.differences)]
-    )
+    moved = [(difference.folder, difference.table) for difference in comparison.differences]
+    cases = dict.fromkeys([*comparison.cases, *moved])
     for folder in dict.fromkeys(folder for folder, _ in cases):
         suite = TestSuite(folder)
         for table in [name for where, name in cases if where == folder]:

@@ -65,14 +65,12 @@ def commands(group: Mapping[str, Any]) -> Iterator[Entry]:
     """Entries of commands and their options, as Typer has them."""
     options: dict[tuple[str, str], Entry] = {}
     for name, command in group.items():
-        for parameter in command.params:
-            flags = [*parameter.opts, *parameter.secondary_opts] if parameter.param_type_name == "option" else []
+        for item in command.params:
+            flags = [*item.opts, *item.secondary_opts] if item.param_type_name == "option" else []
             for flag in flags:
-                before = options[flag, parameter.help].where if (flag, parameter.help) in options else ()
-                takes = "" if parameter.is_flag else f"{flag} {parameter.metavar or parameter.type.name.upper()}"
-                options[flag, parameter.help] = Entry(
-                    flag, "option", parameter.help, takes=takes, where=(*before, name)
-                )
+                before = options[flag, item.help].where if (flag, item.help) in options else ()
+                takes = "" if item.is_flag else f"{flag} {item.metavar or item.type.name.upper()}"
+                options[flag, item.help] = Entry(flag, "option", item.help, takes=takes, where=(*before, name))
         arguments = [param.metavar for param in command.params if param.param_type_name == "argument"]
         some = ["[OPTIONS]"] * (len(command.params) > len(arguments))
         usage = " ".join(["mechdesign", name, *arguments, *some])

@@ -140,12 +140,12 @@ class Sheet:
         if good.any():
             follows = any(getattr(bound, "expression", None) for bound in (requirement.at_least, requirement.at_most))
             own = group.rows.tolist() if follows else group.rows[:1].tolist()
-            judgement = judged(group, [designs.required(row)[k] for row in own])
-            self._units[len(self._results) + k] = judgement.unit
+            scores = judged(group, [designs.required(row)[k] for row in own])
+            self._units[len(self._results) + k] = scores.unit
             for column, values in (
-                (self._worst, judgement.worst),
-                (self._margins, judgement.margin),
-                (self._met, judgement.met),
+                (self._worst, scores.worst),
+                (self._margins, scores.margin),
+                (self._met, scores.met),
             ):
                 column[rows[good], k] = values[good]
         margins = _ordered(self._margins[:, k])

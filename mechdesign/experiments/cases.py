@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.commands import COMMANDS
 from mechdesign.errors import AssemblyError, Problem, StudyError
-from mechdesign.experiments import batches, compiled
+from mechdesign.experiments import batches
 from mechdesign.experiments.answered import Answered, Sheet
 from mechdesign.experiments.wanted import Wanted
 from mechdesign.numerics.arrays import Ints
@@ -18,7 +18,7 @@ from mechdesign.questions.together import Group
 from mechdesign.report import requirements
 from mechdesign.report.requirements import command_of
 from mechdesign.rows import UnknownColumnError
-from mechdesign.study import Study
+from mechdesign.study import Study, forms
 from mechdesign.study.designs import Designs
 from mechdesign.study.variants import Changes, with_entries
 from mechdesign.work.chunks import map_chunks
@@ -65,14 +65,14 @@ class Answer:
         sheet = Sheet(self.study, self.results, len(cases))
         alike: dict[str, list[int]] = {}
         for k, case in enumerate(cases):
-            alike.setdefault(compiled.form_of(case), []).append(k)
+            alike.setdefault(forms.form_of(case), []).append(k)
         for members in alike.values():
             self._alike(sheet, np.array(members), [cases[k] for k in members])
         return sheet.answered()
 
     def _alike(self, sheet: Sheet, rows: Ints, cases: Sequence[Changes]) -> None:
         """Answer cases that differ in numbers alone."""
-        form = compiled.compiled(self.study, cases[0], self.first)
+        form = forms.compiled(self.study, cases[0], self.first)
         designs = form.designs(cases) if form is not None else None
         if designs is not None and len(designs.study.requirements) != len(self.study.requirements):
             designs = None

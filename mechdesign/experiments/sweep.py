@@ -172,12 +172,10 @@ def _warnings(study: Study, tally: Tally, ranked: Flags | None) -> Iterator[Caut
         yield Caution("suspect", words)
     if isinstance(cases, Listed):
         first: dict[str, int] = {}
-        twice = [
-            (k, earlier) for k, row in enumerate(cases.rows) if (earlier := first.setdefault(json.dumps(row), k)) != k
-        ]
+        twice = [(k, prior) for k, row in enumerate(cases.rows) if (prior := first.setdefault(json.dumps(row), k)) != k]
         if twice:
-            k, earlier = twice[0]
-            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {earlier + 1} once more"
+            k, prior = twice[0]
+            words = f"{len(twice)} of {len(cases)} cases are repeated; {tally.named(k)} is case {prior + 1} once more"
             yield Caution("suspect", words, "sweep", pose=tally.named(k))
     for kind, warned in tally.warned.items():
         case = tally.named(warned.case)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import reduce
+from operator import add
 from typing import TypeVar, overload
 
 import numpy as np
@@ -57,6 +59,11 @@ def plus(total: Either, sign: int, term: Either) -> Either:
     if isinstance(total, float | complex) and total == 0:
         return term if sign > 0 else -1.0 * term
     return total + term if sign > 0 else total - term
+
+
+def added(*terms: Vector) -> Vector:
+    """Sum of many terms from left to right, whose type a checker finds at once: it tries all kinds of each ``+``."""
+    return reduce(add, terms)
 
 
 def times(a: Value, b: Either) -> Either:

@@ -67,7 +67,7 @@ class Bound:
                 margin = half - np.abs(away)
                 if smooth:
                     turns = counted & np.asarray(self.drive | whole)
-                    margin = np.where(turns, half * half - away * away, np.cos(away) - np.cos(half))
+                    margin = np.where(turns, np.square(half) - np.square(away), np.cos(away) - np.cos(half))
                 if not counted:
                     # A full turn leaves nothing out; its margin is a number, for margins are interpolated.
                     margin = np.where(whole, np.pi, margin)

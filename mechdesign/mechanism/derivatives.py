@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Either, Value, Vector, cross, norm2, plus, quiet, times, vector
+from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, norm2, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
@@ -243,7 +243,7 @@ class Linearization(Loops):
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             m_z, m1 = w_z + s[k] * d_z + s_z[k] * d, s1[k] * d
             arms.append((m, m_z, m1, d, d_z))
-            here = 1j * omega * m_z + s1[k] * d_z + 1j * turn_z * (m1 + 1j * omega * m)
+            here = added(1j * omega * m_z, s1[k] * d_z, 1j * turn_z * added(m1, 1j * omega * m))
             rest.append(self.turned(here, edge.frame))
         velocity_z = self._solve(
             none, rest, derived=lambda pose, c, rates: second(pose, c, velocity, position, rates)
@@ -254,9 +254,9 @@ class Linearization(Loops):
             omega, turn_z = velocity.angles[edge.frame], position.angles[edge.frame]
             alpha, omega_z = acceleration.angles[edge.frame], velocity_z.angles[edge.frame]
             m1_z, bend = s1_z[k] * d + s1[k] * d_z, 1j * alpha - omega * omega
-            here = (
-                s2[k] * d_z + 2j * omega_z * m1 + 2j * omega * m1_z - 2 * omega * omega_z * m + bend * m_z
-                + 1j * turn_z * (s2[k] * d + 2j * omega * m1 + bend * m)
+            here = added(
+                s2[k] * d_z, 2j * omega_z * m1, 2j * omega * m1_z, -2 * omega * omega_z * m, bend * m_z,
+                1j * turn_z * added(s2[k] * d, 2j * omega * m1, bend * m),
             )  # fmt: skip
             rest[k] = self.turned(here, edge.frame)
         return velocity_z, self._solve(

@@ -92,7 +92,8 @@ class Geometry:
                 total = total + turn.sign * self.term(turn.term, values)
             else:
                 link, a, b = turn.towards
-                total = total + turn.sign * np.angle(self.place(link, b, values) - self.place(link, a, values))
+                line = np.subtract(self.place(link, b, values), self.place(link, a, values))
+                total = total + turn.sign * np.angle(line)
         return total
 
     def _offset_of(self, edge: Edge) -> tuple[str, ...]:

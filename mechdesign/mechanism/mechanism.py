@@ -90,7 +90,8 @@ class Mechanism(Core):
         """
         offsets = self.geometry.vectors(places).offsets
         for a, b, turns in self.graph.ties:
-            gap = np.abs(np.angle(offsets[a] * rotation(self.geometry.angle(turns, places)) / offsets[b]))
+            turned = np.multiply(offsets[a], rotation(self.geometry.angle(turns, places)))
+            gap = np.abs(np.angle(turned / offsets[b]))
             yield a, b, np.where(gap > TIE_ROUNDING, gap, 0.0)
 
     def _check_ties(self) -> None:

@@ -240,10 +240,8 @@ class Joints:
             assert isinstance(joint, Prismatic | Slot)
             line = joint.line
             guide = self.graph.holder(line.link, line.through or origin_of(line.link))
-            guides[slide] = (
-                guide,
-                self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None,
-            )
+            slider = self.graph.holder(joint.slider, joint.point) if isinstance(joint, Prismatic) else None
+            guides[slide] = guide, slider
         return guides
 
     def _slides(self) -> list[Contact]:

@@ -77,10 +77,8 @@ class Group:
 
     def _of(self, table: Table, k: int, end: End) -> Table:
         counts = self.uneven.get(table.name)
-        per_design = len(table) // len(self.ends)
-        begin, number = (
-            (k * per_design, per_design) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
-        )
+        size = len(table) // len(self.ends)
+        begin, number = (k * size, size) if counts is None else (int(np.sum(counts[:k], dtype=int)), int(counts[k]))
         columns = tuple(
             Column(c.name, c.values[begin : begin + number], c.unit, c.meaning, c.kind) for c in table.columns
         )

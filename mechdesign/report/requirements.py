@@ -245,9 +245,7 @@ def _of_number(terms: Chosen | Sum, requirement: Requirement) -> Verdict:
 
 
 def _bounds(chosen: Chosen | Sum, requirement: Requirement) -> Bounds:
-    low, high = (
-        None if limit is None else chosen.bound(limit) for limit in (requirement.at_least, requirement.at_most)
-    )
+    low, high = (None if end is None else chosen.bound(end) for end in (requirement.at_least, requirement.at_most))
     return low, high
 
 

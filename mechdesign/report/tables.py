@@ -93,9 +93,7 @@ def from_csv(text: str, name: str, columns: Sequence[Mapping[str, Any]], meaning
     _, *rows = csv.reader(io.StringIO(text))
     texts = zip(*rows, strict=True) if rows else [()] * len(columns)
     return Table(
-        name,
-        tuple(Column(**column, values=_values(cells)) for column, cells in zip(columns, texts, strict=True)),
-        meaning,
+        name, tuple(Column(**head, values=_values(cells)) for head, cells in zip(columns, texts, strict=True)), meaning
     )
 
 

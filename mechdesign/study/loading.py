@@ -373,7 +373,7 @@ def load_document(
         kinds=reporter.kinds,
         fixed=frozenset(context.fixed),
         folder=source.folder,
-        warnings=tuple(reporter.warnings),
+        warnings=reporter.warnings,
     )
 
 
@@ -439,13 +439,14 @@ def _validated(data: Mapping[str, Any], context: Context, reporter: Reporter) ->
         if key == "mechanism" and isinstance(raw, dict):
             # The parameters have been read by `_context`.
             raw = {name: value for name, value in raw.items() if name != "parameters" or not isinstance(value, dict)}
+        adapter = _adapter(key)
         try:
-            parts[key] = _adapter(key).validate_python(raw, context=context)
+            parts[key] = adapter.validate_python(raw, context=context)
         except ValidationError as error:
             reporter.report_validation(error, StudyFile, (key,))
             # If only numbers and keys are wrong, the names in this part can still be checked.
             with contextlib.suppress(ValidationError):
-                parts[key] = _adapter(key).validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
+                parts[key] = adapter.validate_python(reporter.mended(error, StudyFile, key, raw), context=context)
     return parts
 
 

@@ -6,14 +6,12 @@ tolerances that go by the size of a dimension, are found anew from the data.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
 
 from mechdesign.errors import StudyError, printable
-from mechdesign.expressions import Expression, ExpressionError
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Fixed
 from mechdesign.study.building.section import LINK_KEYS
@@ -48,14 +46,13 @@ def with_entries(study: Study, changes: Changes, parameters: Mapping[str, Any] |
         If the entries make no study; every mistake in one go.
     """
     data = plain({key: value for key, value in study.resolved.items() if key not in _OF_OTHERS})
+    texts = overrides(changes)
     document = Document.of(data)
-    override(document, overrides(changes))
+    override(document, texts)
     if parameters:
         data["mechanism"].setdefault("parameters", {}).update(parameters)
-    return load_document(
-        document, study.source, (*study.overrides, *overrides(changes)),
-        original=study.mechanism if same_sketch(data, study.resolved) else None,
-    )  # fmt: skip
+    original = study.mechanism if same_sketch(data, study.resolved) else None
+    return load_document(document, study.source, (*study.overrides, *texts), original=original)
 
 
 def faults(study: Study, name: str, values: Iterable[Any]) -> Iterator[tuple[int, str]]:
@@ -88,12 +85,11 @@ def entry_unit(study: Study, name: str) -> str:
 
 def remeasured(study: Study, names: Collection[str]) -> bool:
     """Whether dimensions measured in the sketch depend on these parameters or places."""
-    if not study.parameters.measured:
+    parameters = study.parameters
+    if not parameters.measured:
         return False
-    sketch = study.resolved["mechanism"].get("sketch")
-    return _mentions(sketch, study.parameters.moved(names)) or not _drawing(study).isdisjoint(
-        study.parameters.moved_places(names)
-    )
+    drawn_anew = not parameters.sketched.isdisjoint(parameters.moved(names))
+    return drawn_anew or not _drawing(study).isdisjoint(parameters.moved_places(names))
 
 
 def _drawing(study: Study) -> set[str]:
@@ -109,15 +105,6 @@ def _drawing(study: Study) -> set[str]:
     placed = [(name, point) for name in owners for point in links[name].points]
     placed += [(GROUND, point) for point in links[GROUND].points if point in points]
     return lengths | {f"{name}.{point}.{axis}" for name, point in placed for axis in "xy"}
-
-
-def _mentions(data: Any, names: Collection[str]) -> bool:
-    """Whether a text in the data is an expression with one of the names."""
-    for _, text in leaves(data) if names else ():
-        with contextlib.suppress(ExpressionError):
-            if isinstance(text, str) and not Expression.parse(text).names.isdisjoint(names):
-                return True
-    return False
 
 
 def changed_data(study: Study, changed: Mapping[str, float]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 
 from mechdesign.experiments.sweep import sweep
 from mechdesign.questions.kinematics.analysis import kinematics
@@ -15,7 +16,6 @@ from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.figures import style
-from mechdesign.report.figures.pictures import figures
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.headlines import headlines
 from mechdesign.report.page.page import Answered, report
@@ -60,8 +60,7 @@ PICTURES = {"four_bar": ("transmission", "paths"), "five_bar": ("inscribed",)}
 def drawn(study, result, names):
     """Pictures of a result as they stand in a page."""
     with style.context():
-        gallery = figures(study, result)
-        return {name: picture(gallery[name], f"{result.command}-{name}", name) for name in names}
+        return {name: picture(figure_of(study, result, name), f"{result.command}-{name}", name) for name in names}
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,8 @@ from mechdesign.cli import terminal
 from mechdesign.cli.execution import Outcome
 from mechdesign.cli.live_table import LiveTable, ProgressNote
 from mechdesign.cli.summary import summary
+from mechdesign.report.figures import pictures, style
+from mechdesign.report.figures.rendering import Gallery
 
 from .conftest import SLIDER, answer
 
@@ -151,7 +153,15 @@ def test_a_great_job_is_announced_without_a_bar(folder, analysis, invoke):
     assert invoke(*arguments, "--quiet").stderr == ""
 
 
+def one_picture(*given):
+    """In place of all pictures of a motion, which take a second."""
+    gallery = Gallery()
+    gallery["paths"] = style.new_figure(1.0)
+    return gallery
+
+
 def test_a_command_ends_with_the_picture_or_page_to_open(folder, invoke, monkeypatch):
+    monkeypatch.setattr(pictures, "figures", one_picture)
     monkeypatch.setattr(terminal, "_is_terminal", lambda: True)
     (folder / "swing it.yaml").write_text(SLIDER)
     swing = "results/swing it"

@@ -105,7 +105,9 @@ def test_huge_numbers_give_huge_forces(folder, invoke, old, new) -> None:
         assert invoke("dynamics", "study.yaml", "--no-plots").exit_code == 0
 
 
-@pytest.mark.parametrize("size", ["1/(theta - theta)", "sqrt(B.x - 1000)", "exp(theta*1000)"])
+@pytest.mark.parametrize(
+    "size", ["1/(theta - theta)", "sqrt(B.x - 1000)", pytest.param("exp(theta*1000)", marks=pytest.mark.nightly)]
+)
 def test_a_load_without_a_value_is_told(folder, invoke, size) -> None:
     (folder / "study.yaml").write_text(STUDY.replace(LOAD, f"{{at: B, force: ['{size}', 2]}}"))
     done = invoke("dynamics", "study.yaml", "--no-plots")

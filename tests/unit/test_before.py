@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 from typer.testing import CliRunner
 
@@ -53,7 +54,7 @@ def test_names_are_drawn_letter_by_letter():
     )
     result, before = overlaid("kinematics", now, then)
     with style.context():
-        figure = figures(now, result, before)["paths"]
+        figure = figure_of(now, result, "paths", before)
         drawn = style.encoded(figure, "svg").decode()
     (legend,) = figure.legends
     assert legend.get_texts()[1].get_text() == r"study, name=\$\frac\$ \u202e (before)"
@@ -98,7 +99,7 @@ def test_the_boundary_before_is_in_the_picture_of_the_workspace():
     now, then = (study_of(ARM.format(lower=lower)) for lower in (30, 40))
     result, before = overlaid("workspace", now, then)
     with style.context():
-        figure = figures(now, result, before)["workspace"]
+        figure = figure_of(now, result, "workspace", before)
         figure.canvas.draw()
     grey = [line.get_xydata() for line in figure.axes[0].lines if line.get_color() == COLOR]
     radii = np.hypot(*np.concatenate([line for line in grey if len(line) > 3]).T)

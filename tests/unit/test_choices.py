@@ -175,6 +175,24 @@ def test_choices_of_structures_places_of_the_sketch_and_numbers_that_are_read_on
     assert {row["kinematics.B.x"] > 0 for row in found} == {True, False}
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "stiffness.sections.tube.E: {from: 70 GPa, to: 210 GPa, number: 2}",
+        "stiffness.sweep.theta.step: {choices: [30, 40]}",
+        # The study has no such number; the next is whole and read once.
+        "stiffness.characteristic_length: {choices: [50, 80]}",
+        "kinematics.sweep.theta.number: {choices: [2, 3]}",
+    ],
+)
+def test_numbers_of_entries_give_what_studies_with_these_numbers_give(entry: str) -> None:
+    study = press(f"{entry}, stiffness.elastic.rod: {{choices: [bar, tube]}}")
+    name = entry.partition(":")[0]
+    for row in list(mechdesign.optimize(study).tables["designs"]):
+        alone = study_of(PRESS, f"{name}={row[name]:g}", f"stiffness.elastic.rod={row['stiffness.elastic.rod']}")
+        assert row["stiffness.k_min"] == pytest.approx(mechdesign.stiffness(alone).main["k_min"].min(), rel=1e-12)
+
+
 def test_tolerance_classes_are_choices() -> None:
     section = "{sweep: {theta: {from: 30, to: 150, step: 30}}, dimensions: {rod.length: h7}, limits: {B.x: 0.05}}"
     study = press(

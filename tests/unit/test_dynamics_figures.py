@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from helpers.gallery import study_named
 from helpers.pages import faults
+from helpers.pictures import figure_of
 
 import mechdesign
 from mechdesign.questions.dynamics.analysis import DrawnForces
@@ -36,6 +39,13 @@ dynamics:
 """
 
 
+@cache
+def answered(text: str) -> tuple[mechdesign.Study, mechdesign.Answer]:
+    """A study, of the gallery by its name, and its dynamics."""
+    study = mechdesign.load(text=text) if ":" in text else study_named(text)
+    return study, mechdesign.dynamics(study)
+
+
 def drawn(study: mechdesign.Study) -> dict[str, object]:
     """Pictures of a study's dynamics by their names."""
     with style.context():
@@ -49,8 +59,8 @@ def drawn(study: mechdesign.Study) -> dict[str, object]:
 
 @pytest.mark.parametrize("text", [SPRUNG, "flywheel_press", "excavator_lift", "twin_cylinder"])
 def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
-    study = mechdesign.load(text=text) if ":" in text else study_named(text)
-    record = DrawnForces.of(mechdesign.dynamics(study))
+    study, result = answered(text)
+    record = DrawnForces.of(result)
     for index in (0, 7, 19):
         acting = actions(record.motion, record.shown, index)
         links = {action.link for action in acting} - {"ground", ""}
@@ -80,8 +90,8 @@ def test_listed_poses_have_free_bodies_alone() -> None:
 
 
 def test_efforts_mark_the_peak_between_the_rows() -> None:
-    figure = drawn(study_named("flywheel_press"))["efforts"]
-    effort = figure.axes[0]
+    with style.context():
+        effort = figure_of(*answered("flywheel_press"), "efforts").axes[0]
     place, value = np.array(effort.lines[2].get_xydata())[0]
     assert (place, value) == pytest.approx((244.423, 7570.88), rel=1e-5)
     assert "peak 7571" in effort.get_title("left")
@@ -89,8 +99,8 @@ def test_efforts_mark_the_peak_between_the_rows() -> None:
 
 
 def test_bearing_forces_in_the_frame_turn_with_the_link() -> None:
-    study = study_named("twin_cylinder")
-    frame, link = drawn(study)["bearings"].axes[:2]
+    with style.context():
+        frame, link = figure_of(*answered("twin_cylinder"), "bearings").axes[:2]
     # The crank's pin: the force turns with the crank in the frame, and hardly in the crank.
     way, own = (np.array(axes.lines[2].get_xydata()) @ [1, 1j] for axes in (frame, link))
     crank = np.exp(1j * np.radians(np.arange(0, 361, 3)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
@@ -57,12 +58,16 @@ kinematics:
 """
 
 
-def drawn(study, **options):
+def drawn(study, name, look="screen", **options):
+    with style.context(look):
+        figure = figure_of(study, mechdesign.kinematics(study, **options), name)
+        figure.canvas.draw()
+        return figure
+
+
+def names(study):
     with style.context():
-        found = figures(study, mechdesign.kinematics(study, **options))
-        for figure in found.values():
-            figure.canvas.draw()
-        return found
+        return set(figures(study, mechdesign.kinematics(study)))
 
 
 def sweep_of(study):
@@ -75,7 +80,7 @@ def boxes(axes):
 
 @pytest.mark.slow
 def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
-    figure = drawn(study_of(FOUR_BAR))["paths"]
+    figure = drawn(study_of(FOUR_BAR), "paths")
     (axes,) = figure.axes
     window = axes.get_window_extent()
     for line in axes.lines:
@@ -92,7 +97,7 @@ def test_paths_and_their_mechanism_lie_within_the_picture_and_names_apart():
 @pytest.mark.slow
 def test_names_are_nearest_to_their_own_pins_or_have_a_line():
     study = study_of(FOUR_BAR.replace("points: {C: [45, 40]}", "points: {C: [45, 6], E: [45, -6], F: [51, 0]}"))
-    (axes,) = drawn(study)["paths"].axes
+    (axes,) = drawn(study, "paths").axes
     names = [text for text in axes.texts if text.get_text() in "ODABCEF"]
     assert len(names) == 7
     pins = {text.get_text(): axes.transData.transform(text.xy) for text in names}
@@ -104,7 +109,7 @@ def test_names_are_nearest_to_their_own_pins_or_have_a_line():
 
 @pytest.mark.slow
 def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
-    figure = drawn(study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 1e-3}\n  sweep:")))["motion"]
+    figure = drawn(study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 1e-3}\n  sweep:")), "motion")
     for axes in figure.axes:
         name = axes.yaxis.label.get_window_extent()
         assert all(not name.overlaps(tick.get_window_extent()) for tick in axes.get_yticklabels() if tick.get_text())
@@ -114,7 +119,7 @@ def test_numbers_of_ticks_are_clear_of_the_names_of_axes():
 def test_the_coupler_point_tells_most():
     assert ranks(study_of(FOUR_BAR)) == {"A": 0, "B": 0, "C": 2}
     assert ranks(study_of(FOUR_BAR.replace("sweep:", "outputs: [B.x]\n  sweep:")))["B"] == 2
-    figure = drawn(study_of(FOUR_BAR))["paths"]
+    figure = drawn(study_of(FOUR_BAR), "paths")
     study = study_of(FOUR_BAR)
     path = np.asarray(sweep_of(study).places["C"])
     bold = max(
@@ -142,7 +147,7 @@ def test_traces_of_few_poses_are_curves(poses):
 @pytest.mark.slow
 def test_curves_of_what_moves_only():
     study = study_of(FOUR_BAR.replace("sweep:", "rates: {theta: 10}\n  sweep:"))
-    figure = drawn(study)["motion"]
+    figure = drawn(study, "motion")
     names = {text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()}
     assert names == {"C.x", "C.y", "A.x", "A.y", "B.x", "B.y", "rod.angle", "rocker.angle"}
     labels = [axes.get_ylabel() for axes in figure.axes]
@@ -160,7 +165,7 @@ def test_what_stands_still_is_drawn_straight_and_only_where_it_is_asked_for():
         parallelogram.replace("B: [75, 55]", "B: [100, 30]").replace("from: 0, to: 360", "from: 10, to: 170"),
         "kinematics.outputs=[rod.angle]", "kinematics.rates={theta: 10}",
     )  # fmt: skip
-    (axes,) = drawn(study)["motion"].axes
+    (axes,) = drawn(study, "motion").axes
     low, high = axes.get_ylim()
     assert high - low > 0.1
     assert np.ptp(axes.lines[0].get_ydata()) < 1e-6
@@ -217,16 +222,16 @@ def test_a_long_sweep_is_drawn_at_a_bounded_number_of_poses():
 
 @pytest.mark.slow
 def test_listed_poses_are_drawn_one_by_one_and_have_no_curves():
-    found = drawn(study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}"))
-    assert set(found) == {"poses"}
-    titles = [axes.get_title(loc="left") for axes in found["poses"].axes]
+    study = study_of(FOUR_BAR, "kinematics={poses: [{theta: 0}, {theta: 30}]}")
+    assert names(study) == {"poses"}
+    titles = [axes.get_title(loc="left") for axes in drawn(study, "poses").axes]
     assert titles == ["theta = 0 deg", "theta = 30 deg"]
 
 
 @pytest.mark.nightly
 def test_special_poses_say_what_is_special_and_their_arrows_are_to_scale():
     study = study_of(FOUR_BAR, "kinematics.rates={theta: 1 rad/s}", "kinematics.outputs=[A, rocker.angle]")
-    figure = drawn(study)["poses"]
+    figure = drawn(study, "poses")
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert sum(title.endswith("rocker reverses") for title in titles) == 2
     key = {line.get_label(): line for line in figure.artists}
@@ -270,7 +275,7 @@ kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10
     poses = mechdesign.kinematics(study).drawn.special
     singular = [each for each in poses.shown if each.event == "singular: det_J is 0"]
     assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
-    assert drawn(study)["poses"].texts[0].get_text() == "singular poses, poses between"
+    assert drawn(study, "poses").texts[0].get_text() == "singular poses, poses between"
 
 
 def test_special_poses_of_one_configuration_are_shown_once():
@@ -284,7 +289,7 @@ def test_special_poses_of_one_configuration_are_shown_once():
 
 @pytest.mark.nightly
 def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
-    (axes,) = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"))["paths"].axes
+    (axes,) = drawn(study_of(FOUR_BAR, "kinematics.rates={theta: 60 rpm}"), "paths").axes
     (ticks,) = axes.collections
     middles = np.array([path.vertices.mean(axis=0) @ [1, 1j] for path in ticks.get_paths()])
     path = sweep_of(study_of(FOUR_BAR)).places["C"]
@@ -293,13 +298,13 @@ def test_ticks_of_equal_time_are_equal_steps_of_the_drive():
     assert legend == ["four-bar O A B D: crank-rocker", "ticks every 0.0417 s (15 deg of theta); numbers: theta"]
     # Of what speeds up equal steps are not equal times.
     faster = study_of(FOUR_BAR, "kinematics.rates={theta: 6}", "kinematics.accelerations={theta: 1}")
-    (axes,) = drawn(faster)["paths"].axes
+    (axes,) = drawn(faster, "paths").axes
     assert axes.get_legend().get_texts()[-1].get_text() == "ticks every 15 deg of theta; numbers: theta"
 
 
 @pytest.mark.nightly
 def test_crank_angles_stand_beside_their_places_on_the_coupler_curve():
-    (axes,) = drawn(study_of(FOUR_BAR))["paths"].axes
+    (axes,) = drawn(study_of(FOUR_BAR), "paths").axes
     path = sweep_of(study_of(FOUR_BAR)).places["C"]
     numbers = {text.get_text(): text.xy for text in axes.texts if text.get_text().endswith("\N{DEGREE SIGN}")}
     assert len(numbers) > 6
@@ -319,7 +324,7 @@ def test_a_path_passed_at_a_speed_has_the_time_on_its_axis():
 
 @pytest.mark.slow
 def test_plates_lie_below_the_paths_of_points_and_arrows_below_names():
-    (axes,) = drawn(study_of(FOUR_BAR))["paths"].axes
+    (axes,) = drawn(study_of(FOUR_BAR), "paths").axes
     plates = [patch.get_zorder() for patch in axes.patches if isinstance(patch, Polygon)]
     paths = [line.get_zorder() for line in axes.lines if len(line.get_xdata()) == 73]
     assert plates
@@ -403,8 +408,8 @@ def test_a_velocity_polygon_ends_at_the_velocities_of_the_table():
 
 @pytest.mark.nightly
 def test_hodographs_and_polygons_are_drawn_where_they_are_asked_for():
-    assert {"hodographs", "polygons"} <= set(drawn(study_of(FOUR_BAR, *ASKED)))
-    assert not {"hodographs", "polygons"} & set(drawn(study_of(FOUR_BAR, *RATES)))
+    assert {"hodographs", "polygons"} <= names(study_of(FOUR_BAR, *ASKED))
+    assert not {"hodographs", "polygons"} & names(study_of(FOUR_BAR, *RATES))
     with pytest.raises(mechdesign.StudyError, match="hodographs show velocities: give 'rates'"):
         study_of(FOUR_BAR, "kinematics.pictures=[hodographs]")
 
@@ -422,7 +427,7 @@ def test_the_tip_of_a_hodograph_is_the_velocity():
 @pytest.mark.nightly
 def test_transmission_angles_stand_before_their_band_and_the_worst_is_marked():
     study = study_of(FOUR_BAR)
-    (axes,) = drawn(study)["transmission"].axes
+    (axes,) = drawn(study, "transmission").axes
     (band,) = axes.patches
     assert band.get_extents().transformed(axes.transData.inverted()).intervaly == pytest.approx((40, 140))
     curve = next(line for line in axes.lines if len(line.get_xdata()) == 73)
@@ -447,12 +452,12 @@ def test_a_mechanical_advantage_without_bound_has_a_logarithmic_axis_and_its_pla
     marks = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2]
     assert marks == pytest.approx(sorted(result.tables["toggles"]["theta"]))
     assert "rocker.angle_advantage" in result.tables["motion"]
-    assert len(figures(study, result)["motion"].axes) == len(drawn(study_of(FOUR_BAR))["motion"].axes)
+    assert len(drawn(study, "motion").axes) == len(drawn(study_of(FOUR_BAR), "motion").axes)
 
 
 @pytest.mark.slow
 def test_every_assembly_has_a_panel_on_one_scale():
-    figure = drawn(study_of(FOUR_BAR), all_modes=True)["modes"]
+    figure = drawn(study_of(FOUR_BAR), "modes", all_modes=True)
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert len(titles) == 2
     assert [title.endswith("(as drawn)") for title in titles] == [True, False]
@@ -479,15 +484,14 @@ def test_a_rough_sketch_is_shown_beside_the_assembled_one(place, crosses):
 def test_the_path_that_a_point_should_take_is_drawn_beside_its_own():
     wanted = [[10, 60], [30, 80], [50, 70]]
     study = study_of(FOUR_BAR.replace("  drives:", f"  targets: {{C: {wanted}}}\n  drives:"))
-    (axes,) = drawn(study)["paths"].axes
+    (axes,) = drawn(study, "paths").axes
     assert any(np.array_equal(line.get_xydata(), wanted) for line in axes.lines)
 
 
 @pytest.mark.parametrize("look", ["screen", "paper"])
 def test_a_large_effort_has_its_power_of_ten_with_its_unit(look):
     study = study_of(FOUR_BAR, "kinematics.loads=[{link: rocker, moment: 2e7}]")
-    with style.context(look):
-        axes = drawn(study)["motion"].axes[-1]
+    axes = drawn(study, "motion", look).axes[-1]
     assert axes.get_ylabel() == "effort\n[10\N{SUPERSCRIPT SIX} N\N{MIDDLE DOT}mm]"
     assert not axes.yaxis.offsetText.get_visible()
 
@@ -509,7 +513,7 @@ kinematics:
 
 
 def test_every_curve_is_drawn_and_none_is_flattened_by_the_others():
-    figure = drawn(study_of(STROKES))["motion"]
+    figure = drawn(study_of(STROKES), "motion")
     names = [text.get_text() for axes in figure.axes for text in axes.get_legend().get_texts()]
     assert sorted(names) == sorted(["B.x", *(f"{point}.{c}" for point in "PQRS" for c in "xy")])
     for axes in figure.axes:
@@ -520,5 +524,5 @@ def test_every_curve_is_drawn_and_none_is_flattened_by_the_others():
 
 def test_a_curve_of_two_names_is_drawn_once():
     study = study_of(FOUR_BAR.replace("C: [45, 40]", "E: [90, 0]"), "kinematics.outputs=[B, E]")
-    labels = [line.get_label() for axes in drawn(study)["motion"].axes for line in axes.lines]
+    labels = [line.get_label() for axes in drawn(study, "motion").axes for line in axes.lines]
     assert {"B.x, E.x", "B.y, E.y"} <= set(labels)

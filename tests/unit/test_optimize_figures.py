@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
@@ -227,7 +228,7 @@ def optimum(targets: str, poses: str, goal: str):
     result = mechdesign.optimize(study := study_of(text))
     best = study_of(text, f"mechanism.parameters.b={float(result.main['b'][0])}")
     with style.context():
-        return figures(study, result)["optimum"], mechdesign.kinematics(best).tables["motion"]
+        return figure_of(study, result, "optimum"), mechdesign.kinematics(best).tables["motion"]
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
@@ -74,6 +75,16 @@ def drawn(text: str, *overrides: str):
     return found, result
 
 
+def one(name: str, text: str, *overrides: str):
+    """A picture, and the result that it is of."""
+    study = study_of(text, "reliability.sobol=0", *overrides)
+    result = mechdesign.reliability(study)
+    with style.context():
+        figure = figure_of(study, result, name)
+        figure.canvas.draw()
+    return figure, result
+
+
 def legend(figure: Figure) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
@@ -93,9 +104,9 @@ def test_every_method_alone_is_drawn(method: str) -> None:
 
 @pytest.mark.nightly
 def test_a_listed_pose_without_a_value_is_left_empty() -> None:
-    found, _ = drawn(ARM, "reliability.poses=[{q1: 30, q2: 90}, {P.x: 300, P.y: 0}]",
+    figure, _ = one("reliability", ARM, "reliability.poses=[{q1: 30, q2: 90}, {P.x: 300, P.y: 0}]",
                      "reliability.methods=[analytic, monte_carlo]")  # fmt: skip
-    (axes,) = found["reliability"].axes
+    (axes,) = figure.axes
     assert sorted(text.xy[0] for text in axes.texts) == pytest.approx([-0.15, 0.15])
     assert len(axes.get_xticks()) == 2
 
@@ -107,30 +118,30 @@ def test_methods_look_different() -> None:
 
 @pytest.mark.slow
 def test_intervals_are_drawn_where_a_method_claims_one() -> None:
-    found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
-    axes = found["reliability"].axes[0]
+    figure, result = one("reliability", SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
+    axes = figure.axes[0]
     (bars,) = axes.containers
     table = result.tables["reliability"]
     rows = table["method"] == "monte_carlo"
     ends = np.sort(bars.lines[2][0].get_segments()[0][:, 1])
     assert ends == pytest.approx([table["failure_low"][rows][0], table["failure_high"][rows][0]])
-    assert legend(found["reliability"]) == ["first order", "FORM", "Monte Carlo"]
+    assert legend(figure) == ["first order", "FORM", "Monte Carlo"]
 
 
 @pytest.mark.slow
 def test_auto_tells_what_it_used_and_what_it_cost() -> None:
-    found, result = drawn(SLIDER, LISTED, "reliability.methods=[auto]", "reliability.limits.B.x=0.5")
+    figure, result = one("reliability", SLIDER, LISTED, "reliability.methods=[auto]", "reliability.limits.B.x=0.5")
     table = result.tables["reliability"]
     (used,) = set(table["used"].tolist())
     assert used != "auto"
-    assert legend(found["reliability"]) == [f"auto by {look(used).words}, {table['evaluations'].sum():,} solved"]
+    assert legend(figure) == [f"auto by {look(used).words}, {table['evaluations'].sum():,} solved"]
 
 
 @pytest.mark.slow
 def test_no_failure_seen_is_an_arrow_at_the_upper_end() -> None:
-    found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic, monte_carlo]",
-                          "reliability.limits.B.x=1.2")  # fmt: skip
-    axes = found["reliability"].axes[0]
+    figure, result = one("reliability", SLIDER, "reliability.poses=[{crank: 30}]",
+                         "reliability.methods=[analytic, monte_carlo]", "reliability.limits.B.x=1.2")  # fmt: skip
+    axes = figure.axes[0]
     (arrow,) = (line for line in axes.lines if line.get_marker() == "v")
     table = result.tables["reliability"]
     high = float(table["failure_high"][table["method"] == "monte_carlo"][0])
@@ -158,17 +169,17 @@ def test_sweep_has_bands_with_limits_and_the_cycle() -> None:
 
 @pytest.mark.slow
 def test_a_far_limit_does_not_squeeze_the_bands() -> None:
-    found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic]", "reliability.limits.B.x={max: 9}")
-    (axes,) = found["bands"].axes
+    figure, _ = one("bands", SLIDER, SWEPT, "reliability.methods=[analytic]", "reliability.limits.B.x={max: 9}")
+    (axes,) = figure.axes
     assert axes.get_ylim()[1] < 2
     assert axes.get_title(loc="right") == "limit +9 mm, outside"
 
 
 @pytest.mark.nightly
 def test_velocities_have_panels_and_limits_of_their_own() -> None:
-    found, _ = drawn(SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]", "reliability.rates={crank: 60}",
-                     "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
-    axes = found["bands"].axes
+    figure, _ = one("bands", SLIDER, SWEPT, "reliability.methods=[analytic, monte_carlo]",
+                    "reliability.rates={crank: 60}", "reliability.limits={B.x_velocity: {max: 0.3}}")  # fmt: skip
+    axes = figure.axes
     assert [axis.get_title(loc="left") for axis in axes] == ["B.x", "B.x velocity", "B.x acceleration"]
     assert [axis.get_ylabel() for axis in axes] == ["error [mm]", "error [mm/s]", "error [mm/s²]"]
     limits = [[line for line in axis.lines if line.get_color() == style.VERMILION] for axis in axes]
@@ -183,19 +194,19 @@ def steps(axes):
 
 @pytest.mark.slow
 def test_histogram_shows_every_sample_its_failures_and_the_limits() -> None:
-    found, result = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]")
-    for axes in found["histogram"].axes:
+    figure, result = one("histogram", SLIDER, LISTED, "reliability.methods=[monte_carlo]")
+    for axes in figure.axes:
         every, failed = (heights * np.diff(edges) for heights, edges in steps(axes))
         assert every.sum() == pytest.approx(1.0, abs=2e-3)
         failure = result.tables["reliability"]["failure"].max()
         assert failed.sum() == pytest.approx(failure, abs=2e-3)
         limits = [line.get_xdata()[0] for line in axes.lines if line.get_color() == style.VERMILION]
         assert limits == [-0.2, 0.2]
-    upper, lower = found["histogram"].axes
+    upper, lower = figure.axes
     assert (upper.get_yscale(), lower.get_yscale()) == ("linear", "log")
     assert lower.get_xlabel() == "error [mm]"
     assert lower.get_ylabel() == "density [1/mm]"
-    assert "2,000 samples" in texts(found["histogram"])
+    assert "2,000 samples" in texts(figure)
 
 
 @pytest.mark.slow
@@ -228,16 +239,16 @@ def test_a_pose_that_cannot_be_shown(overrides: list[str], message: str) -> None
 
 @pytest.mark.nightly
 def test_a_far_limit_is_told_in_words() -> None:
-    found, _ = drawn(SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
-    axes = found["histogram"].axes[0]
+    figure, _ = one("histogram", SLIDER, LISTED, "reliability.methods=[monte_carlo]", "reliability.limits.B.x=5")
+    axes = figure.axes[0]
     assert [text.get_text() for text in axes.texts] == ["limit -5, +5 mm, outside"]
     assert max(abs(x) for x in axes.get_xlim()) < 2
 
 
 @pytest.mark.nightly
 def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
-    found, _ = drawn(ARM, CORNER, "reliability.methods=[monte_carlo]")
-    axes = found["histogram"].axes
+    figure, _ = one("histogram", ARM, CORNER, "reliability.methods=[monte_carlo]")
+    axes = figure.axes
     assert [axis.get_title(loc="left") for axis in axes[:3]] == ["P: distance from no error", "P.x", "P.y"]
     limits = [[line.get_xdata()[0] for line in axis.lines if line.get_color() == style.VERMILION] for axis in axes[:3]]
     assert limits == [[0.25], [], []]
@@ -249,21 +260,21 @@ def test_a_circle_limits_a_distance_not_the_coordinates() -> None:
 
 @pytest.mark.slow
 def test_estimate_stands_beside_the_other_methods() -> None:
-    found, result = drawn(SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
-    (axes,) = found["estimate"].axes
+    figure, result = one("estimate", SLIDER, LISTED, "reliability.methods=[analytic, form, monte_carlo]")
+    (axes,) = figure.axes
     table = result.tables["reliability"]
     first = {str(m): float(f) for m, f in zip(table["method"][:3], table["failure"][:3], strict=True)}
     level = [
         line.get_ydata()[0] for line in axes.lines if len(line.get_ydata()) == 2 and line.get_linestyle() != "None"
     ]
     assert {first["analytic"], first["form"]} <= set(level)
-    assert f"plain samples: {number(first['monte_carlo'])}" in legend(found["estimate"])
+    assert f"plain samples: {number(first['monte_carlo'])}" in legend(figure)
 
 
 def contours(*overrides: str):
-    found, result = drawn(ARM, CORNER, *overrides)
-    (axes,) = found["density_contours"].axes
-    return axes, found["density_contours"], result
+    figure, result = one("density_contours", ARM, CORNER, *overrides)
+    (axes,) = figure.axes
+    return axes, figure, result
 
 
 def limit_of(axes):
@@ -388,9 +399,9 @@ def test_workspace_has_maps() -> None:
 
 @pytest.mark.slow
 def test_grid_of_drives_has_maps_over_them() -> None:
-    found, _ = drawn(ARM, "reliability.sweep={q1: {from: 0, to: 60, step: 20}, q2: {from: 80, to: 140, step: 15}}",
-                     "reliability.methods=[analytic]")  # fmt: skip
-    axes = found["failure_map"].axes[0]
+    grid = "reliability.sweep={q1: {from: 0, to: 60, step: 20}, q2: {from: 80, to: 140, step: 15}}"
+    figure, _ = one("failure_map", ARM, grid, "reliability.methods=[analytic]")
+    axes = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("q1 [deg]", "q2 [deg]")
     assert axes.get_aspect() == "auto"
 
@@ -426,23 +437,23 @@ def test_outline_of_a_map_is_the_boundary_of_the_workspace() -> None:
 @pytest.mark.slow
 def test_path_in_the_plane_is_drawn_over_its_poses() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [80, 100], [70, 90], [60, 100]]}"
-    found, _ = drawn(ARM, path, "reliability.methods=[analytic]")
-    assert found["reliability"].axes[0].get_xlabel() == "pose along the path"
-    assert found["reliability"].axes[0].lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
+    figure, _ = one("reliability", ARM, path, "reliability.methods=[analytic]")
+    assert figure.axes[0].get_xlabel() == "pose along the path"
+    assert figure.axes[0].lines[0].get_xdata().tolist() == [1, 2, 3, 4, 5]
 
 
 @pytest.mark.slow
 def test_a_sweep_of_a_single_pose_is_drawn_as_one_that_is_listed() -> None:
-    found, _ = drawn(SLIDER, "reliability.sweep={crank: 30}", "reliability.methods=[analytic]")
-    (place,) = found["reliability"].axes[0].get_xticklabels()
+    figure, _ = one("reliability", SLIDER, "reliability.sweep={crank: 30}", "reliability.methods=[analytic]")
+    (place,) = figure.axes[0].get_xticklabels()
     assert place.get_text() == "crank = 30 deg"
 
 
 @pytest.mark.nightly
 def test_poses_out_of_reach_leave_gaps() -> None:
     path = "reliability.path={P: [[60, 100], [70, 110], [300, 100], [70, 90], [60, 100]]}"
-    found, _ = drawn(ARM, path, "reliability.methods=[analytic, monte_carlo]")
-    known = np.isfinite(found["reliability"].axes[0].lines[0].get_ydata())
+    figure, _ = one("reliability", ARM, path, "reliability.methods=[analytic, monte_carlo]")
+    known = np.isfinite(figure.axes[0].lines[0].get_ydata())
     assert known.tolist() == [True, True, False, True, True]
 
 
@@ -468,10 +479,10 @@ def test_contributions_are_one_bar_with_sobol_indices_where_these_differ() -> No
 
 @pytest.mark.slow
 def test_shares_of_correlated_sources_are_explained() -> None:
-    found, result = drawn(SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic]",
+    figure, result = one("contributions", SLIDER, "reliability.poses=[{crank: 30}]", "reliability.methods=[analytic]",
                           "reliability.correlation=[[r, l, -0.9]]")  # fmt: skip
     assert result.tables["contributions"]["share"].min() < 0
-    assert "negative shares" in texts(found["contributions"])
+    assert "negative shares" in texts(figure)
 
 
 def test_allocation_shows_given_beside_allocated_and_how_often_either_fails() -> None:

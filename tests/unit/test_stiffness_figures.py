@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.stiffness import ARM, FIVE_BAR
 from helpers.studies import study_of
 
@@ -91,7 +92,7 @@ def test_ellipse_of_a_point_has_the_axes_of_its_compliance() -> None:
     study = study_of(FIVE_BAR)
     result = mechdesign.stiffness(study)
     with style.context():
-        axes = figures(study, result)["directions"].axes[0]
+        axes = figure_of(study, result, "directions").axes[0]
     assert axes.get_aspect() == 1
     edge, soft, stiff, _ = (np.array(line.get_xydata()) @ [1, 1j] for line in axes.lines[-4:])
     spans = np.abs(edge - edge[:-1].mean())
@@ -106,7 +107,7 @@ def test_each_load_is_drawn_alone_and_legs_stay_on_their_pins() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/planar_2rpr_rp.yaml")
     result = mechdesign.stiffness(study)
     with style.context():
-        panels = figures(study, result)["deflections"].axes
+        panels = figure_of(study, result, "deflections").axes
     assert len(panels) == len(study.stiffness.loads) == 3  # type: ignore[union-attr]
     for axes in panels:
         ends = np.array([end for line in axes.lines if len(line.get_xdata()) > 2 for end in line.get_xydata()[[0, -1]]])
@@ -181,7 +182,7 @@ def test_forces_that_grow_without_bounds_end_at_the_axis() -> None:
                      "stiffness.actuators={s: 1e6}", "stiffness.loads=[[0, -10, 0]]",
                      "stiffness.sweep={s: {from: 61, to: 119.9999, step: 0.9833}}")  # fmt: skip
     with style.context():
-        (forces,) = figures(study, mechdesign.stiffness(study))["joint_forces"].axes
+        (forces,) = figure_of(study, mechdesign.stiffness(study), "joint_forces").axes
     most = max(float(np.nanmax(line.get_ydata())) for line in forces.lines[:2])
     assert forces.get_ylim()[1] < most / 2
     assert "beyond the axis" in forces.get_title(loc="left")
@@ -204,7 +205,7 @@ def test_held_values_have_a_map_each_up_to_their_boundary() -> None:
     study = study_of(HAND)
     result = mechdesign.stiffness(study)
     with style.context():
-        panels = [axes for axes in figures(study, result)["stiffness"].axes if axes.get_xlabel()]
+        panels = [axes for axes in figure_of(study, result, "stiffness").axes if axes.get_xlabel()]
     words = [f"hand.angle = {angle} deg, {name} [N/mm]" for angle in (-90, 0) for name in ("k_min", "k_max")]
     assert [axes.get_title(loc="left") for axes in panels] == words
     over = plane(study, result.drawn.shown.poses)
@@ -223,7 +224,7 @@ def test_deflections_of_all_loads_have_one_magnification() -> None:
     study = mechdesign.load(Path(__file__).parents[2] / "configs/planar_2rpr_rp.yaml")
     result = mechdesign.stiffness(study)
     with style.context():
-        figure = figures(study, result)["deflections"]
+        figure = figure_of(study, result, "deflections")
     (scale,) = re.findall(r"drawn (\S+) times as large", " ".join(text.get_text() for text in figure.texts))
     moves = result.tables["deflections"]
     for k, axes in enumerate(figure.axes):

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.pages import faults, lost_curves
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 
 import mechdesign
@@ -127,7 +128,8 @@ def answered(command: str, text: str) -> tuple[Study, Result]:
     return study, getattr(mechdesign, command)(study)
 
 
-@pytest.mark.parametrize("look", ["screen", "paper"])
+# A page of paper has the least room; the wide one is looked at every night.
+@pytest.mark.parametrize("look", [pytest.param("screen", marks=pytest.mark.nightly), "paper"])
 @pytest.mark.parametrize(
     ("command", "study", "expected"),
     [
@@ -148,7 +150,7 @@ def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expec
         assert set(drawn) == expected
         wrong = {}
         for name, figure in drawn.items():
-            style.encoded(figure)
+            figure.canvas.draw()
             wrong[name] = [*faults(figure)]
             assert figure.get_figheight() <= style.tallest() + 0.05, name
     assert not any(wrong.values()), wrong
@@ -158,8 +160,8 @@ def test_pages_of_stressing_studies_are_laid_out(command: str, study: str, expec
 def test_every_one_of_45_motion_curves_can_be_read() -> None:
     given, result = answered("kinematics", CURVES)
     with style.context():
-        figure = figures(given, result)["motion"]
-        style.encoded(figure)
+        figure = figure_of(given, result, "motion")
+        figure.canvas.draw()
         curves = {line.get_label() for axes in figure.axes for line in axes.get_lines()}
         assert len({f"{tip}.{axis}" for tip in TIPS for axis in "xy"} & curves) == 44
         assert not [*faults(figure), *lost_curves(figure)]
@@ -170,8 +172,8 @@ def test_deflections_under_all_loads_have_one_magnification() -> None:
     given, result = answered("stiffness", LOADS)
     moves = result.tables["deflections"]
     with style.context():
-        figure = figures(given, result)["deflections"]
-        style.encoded(figure)
+        figure = figure_of(given, result, "deflections")
+        figure.canvas.draw()
     ways = [next(line.get_xydata() for line in axes.get_lines() if line.get_linestyle() == ":") for axes in figure.axes]
     drawn = [float(np.hypot(*(way[1] - way[0]))) for way in ways]
     real = np.hypot(moves["dx"], moves["dy"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.pictures import figure_of
 from helpers.studies import study_of
 from matplotlib.collections import LineCollection
 from matplotlib.text import Text
@@ -69,7 +70,7 @@ def test_maps_have_equal_axes_named_levels_and_a_legend_of_what_ends_the_region(
 def test_held_coordinates_are_shown_side_by_side_at_one_scale() -> None:
     study = study_of(ARM)
     with style.context():
-        page = figures(study, mechdesign.workspace(study))["inverse_condition"]
+        page = figure_of(study, mechdesign.workspace(study), "inverse_condition")
     panels = page.axes[:3]
     assert [axes.get_title(loc="left") for axes in panels] == [
         "hand.angle = -90 deg", "hand.angle = 0 deg", "hand.angle = 60 deg"]  # fmt: skip
@@ -105,7 +106,7 @@ def test_an_index_that_grows_without_bound_is_cut_off_and_the_bar_says_so() -> N
     study = study_of(FIVE_BAR)
     result = mechdesign.workspace(study)
     with style.context():
-        page = figures(study, result)["resistivity"]
+        page = figure_of(study, result, "resistivity")
     top = max(page.axes[1].get_yticks())
     assert top < np.nanmax(result.tables["local"]["resistivity"]) / 10
     # An arrow instead of a flat end.
@@ -194,7 +195,7 @@ def test_ellipses_of_a_boom_are_radial_and_tangential() -> None:
     """Along the boom T moves 1 for 1, across it r / 100 for an arc of 100 mm; forces are the inverse."""
     study = study_of(POLAR)
     with style.context():
-        page = figures(study, mechdesign.workspace(study))["ellipses"]
+        page = figure_of(study, mechdesign.workspace(study), "ellipses")
     (axes,) = page.axes
     assert axes.get_aspect() == 1
     lines = [line for drawn in axes.collections if isinstance(drawn, LineCollection) for line in drawn.get_segments()]
@@ -226,6 +227,6 @@ mechanism:
 workspace: {point: T, scan: {about: [100, 50], rays: 31}, indices: inverse_condition}
 """)
     with style.context():
-        page = figures(study, mechdesign.workspace(study))["inverse_condition"]
+        page = figure_of(study, mechdesign.workspace(study), "inverse_condition")
     assert len(page.axes) == 1
     assert "1 everywhere" in " ".join(text.get_text() for text in page.findobj(Text)).replace("\n", " ")

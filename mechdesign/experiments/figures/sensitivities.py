@@ -39,9 +39,7 @@ def sensitivities_figure(view: View) -> Figure:
     panels[-1].set_xlabel("change of the result, in % of its size, for 1 % of the number more", fontsize=_NAME)
     cut = [f"{len(results) - len(shown)} more results"] if len(results) > len(shown) else []
     cut += ["the largest of each"] if any(len(rows) == MOST_BARS for rows in shown) else []
-    words = "sensitivities: what 1 % of each number changes, and the derivatives" + "".join(
-        f"; {remark}" for remark in cut
-    )
+    words = "sensitivities: what 1 % of each number changes, and the derivatives" + "".join(f"; {note}" for note in cut)
     figure.text(0.01, 1 - 0.08 / figure.get_figheight(), style.folded(words, _TITLE, style.width() - 0.2), va="top",
                 fontsize=_TITLE)  # fmt: skip
     return figure

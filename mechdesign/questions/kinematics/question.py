@@ -212,11 +212,9 @@ class MotionQuestion:
         study, drives = self.study, self.study.mechanism.drives
         # One point, then angles; of outputs that are left out the last, as the end of a chain.
         named, others = self.section.outputs or (), default_outputs(study.mechanism)[::-1]
-        candidates = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
-        node = next((c.node for c in candidates.values() if c.kind in ("x", "y")), -1)
-        picked = sorted(candidates, key=lambda name: (candidates[name].node != node, candidates[name].kind != "angle"))[
-            : len(drives)
-        ]
+        parts = {c.name: c for c in expand_outputs(study, (*named, *others)) if c.name not in drives}
+        node = next((c.node for c in parts.values() if c.kind in ("x", "y")), -1)
+        picked = sorted(parts, key=lambda name: (parts[name].node != node, parts[name].kind != "angle"))[: len(drives)]
         points = {name[:-2] for name in picked if name.endswith(".x") and f"{name[:-2]}.y" in picked}
         rows = dict.fromkeys(name[:-2] if name[:-2] in points else name for name in picked)
         listing = f"{counted(len(self.listed), 'output')} ({', '.join(c.name for c in self.listed)})"

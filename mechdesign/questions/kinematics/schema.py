@@ -64,10 +64,8 @@ class KinematicsSection(MotionSection):
         checker.outputs(self.jacobian, ("kinematics", "jacobian"))
         rows = [part for name in self.jacobian or () for part in checker.mechanism.coordinates_of(name)]
         if self.jacobian is not None and len(rows) != (drives := len(checker.mechanism.drives)):
-            counts = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
-            checker.report(
-                ("kinematics", "jacobian"), f"{counts}; a Jacobian has as many outputs as drives", at_key=True
-            )
+            text = f"{counted(len(rows), 'output')} ({', '.join(rows)}) for {counted(drives, 'drive')}"
+            checker.report(("kinematics", "jacobian"), f"{text}; a Jacobian has as many outputs as drives", at_key=True)
         check_loads(checker, self.loads, ("kinematics", "loads"), moving=self.rated, timed=self.motion is not None)
         return super().checked(checker)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from mechdesign.questions.optimize.batch import FAILED, Batch, Evaluated, first_
 from mechdesign.questions.optimize.goals import Goal, shape_of
 from mechdesign.questions.optimize.question import DesignsQuestion, designs_question, regions_of
 from mechdesign.questions.optimize.stacked import grouped
-from mechdesign.questions.optimize.variables import entry_of, shown
+from mechdesign.questions.optimize.variables import entry_of, from_cube, shown, variables_of
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.questions.workspace.answer import answer
 from mechdesign.questions.workspace.contained import fitting_scale
@@ -28,7 +29,9 @@ from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
 from mechdesign.study import Study
 from mechdesign.study.designs import Designs
+from mechdesign.study.forms import form
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.variable import plainly
 from mechdesign.study.variants import with_entries
 from mechdesign.terms import terms_of
 
@@ -45,10 +48,12 @@ class Evaluator:
     how far poses are from assembling.
     """
 
-    def __init__(self, question: DesignsQuestion) -> None:
+    def __init__(self, question: DesignsQuestion, entries: Mapping[str, str] = MappingProxyType({})) -> None:
+        """Evaluate designs by the names of the variables; `entries` are those in whose place parameters stand."""
         self.question, self.study, self.goals, self.layout = question, question.study, question.goals, question.layout
-        # Evaluators of studies of another structure, by the values that decide it.
-        self._others: dict[tuple[float, ...], Evaluator] = {}
+        self._entries = dict(entries)
+        # Evaluators of studies of another structure, by what decides it; None where a number does so, too.
+        self._others: dict[tuple[float | str, ...], Evaluator | None] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy in another process makes evaluators of other studies by itself."""
@@ -56,23 +61,33 @@ class Evaluator:
 
     def __call__(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate a batch of designs, given by the values of the variables in the study's units."""
-        forms = [name for name in designs if self._forms_study(name)]
-        if not forms:
+        designs = {self._entries.get(name, name): values for name, values in designs.items()}
+        names, variables = self.study.parameters.names(), variables_of(self.study)
+        entries = {name: variables[name] for name in designs if name not in names}
+        return self._formed(designs, [name for name, own in entries.items() if own.numeric and not own.integer])
+
+    def _formed(self, designs: Mapping[str, Floats], numbers: Collection[str]) -> Evaluated:
+        """Evaluate designs, those of one structure together; `numbers` are the entries that do not decide it."""
+        forms = [name for name in designs if name not in numbers and self._forms_study(name)]
+        if not forms and not numbers:
             return self._alike(designs)
-        own = {name: values for name, values in designs.items() if name not in forms}
-        kinds, which = np.unique(np.stack([designs[name] for name in forms], axis=1), axis=0, return_inverse=True)
-        table = np.full((len(which), self.layout.width), np.nan)
-        reasons = np.full(len(which), "", dtype=object)
+        count = len(next(iter(designs.values())))
+        deciding = np.reshape([designs[name] for name in forms], (len(forms), count)).T
+        kinds, which = np.unique(deciding, axis=0, return_inverse=True)
+        table = np.full((count, self.layout.width), np.nan)
+        reasons = np.full(count, "", dtype=object)
         for k, kind in enumerate(kinds.tolist()):
             rows = np.flatnonzero(which.ravel() == k)
+            some = {name: values[rows] for name, values in designs.items()}
             try:
-                other = self._of(dict(zip(forms, kind, strict=True)))
+                other = self._of(dict(zip(forms, kind, strict=True)), numbers)
             except MechdesignError as error:
                 reasons[rows] = without_numbers(error)
                 continue
-            found = other({name: values[rows] for name, values in own.items()})
+            own = {name: values for name, values in some.items() if name not in forms}
+            found = self._formed(some, ()) if other is None else other(own)
             # Designs of another structure may have another number of rows behind their goals.
-            width = self.layout.width if other.layout.width == self.layout.width else self.layout.head
+            width = self.layout.width if found.table.shape[1] == self.layout.width else self.layout.head
             table[rows, :width] = found.table[:, :width]
             reasons[rows] = found.reasons if own else found.reasons[0]
         return Evaluated(table, reasons.tolist())
@@ -82,16 +97,31 @@ class Evaluator:
         parameters = self.study.parameters
         return name not in parameters.names() or not parameters.moved([name]).isdisjoint(self.study.fixed)
 
-    def _of(self, values: Mapping[str, float]) -> Evaluator:
-        """The evaluator of the same goals for the study with these values of entries."""
-        key = tuple(values.values())
+    def _of(self, values: Mapping[str, float], numbers: Collection[str]) -> Evaluator | None:
+        """The evaluator of the same goals for the study with these values of entries, kept for the next designs."""
+        key: tuple[float | str, ...] = (*values.values(), *numbers)
         if key not in self._others:
             while len(self._others) >= MAX_OTHERS:
                 self._others.pop(next(iter(self._others)))
-            design = {name: shown(self.study, name, np.array(value)).item() for name, value in values.items()}
-            study = with_entries(self.study, [entry_of(self.study, name, value) for name, value in design.items()])
-            self._others[key] = Evaluator(designs_question(study, self.goals, graded=self.question.graded))
+            self._others[key] = self._other(values, numbers)
         return self._others[key]
+
+    def _other(self, values: Mapping[str, float], numbers: Collection[str]) -> Evaluator | None:
+        """Evaluator of a study with these values, and parameters for the `numbers`; None where one decides its form."""
+        study, graded = self.study, self.question.graded
+        design = {name: shown(study, name, np.array(value)).item() for name, value in values.items()}
+        changes = [entry_of(study, name, value) for name, value in design.items()]
+        if not numbers:
+            return Evaluator(designs_question(with_entries(study, changes), self.goals, graded=graded))
+        lowest = from_cube(study, np.zeros((1, len(variables_of(study))))).designs
+        lifted = form(study, changes, {name: plainly(lowest[name].item()) for name in numbers})
+        if lifted is None:
+            return None
+        section = lifted.study.optimize
+        assert section is not None
+        variables = {lifted.parameters.get(name, name): variable for name, variable in section.variables.items()}
+        named = replace(lifted.study, optimize=section.model_copy(update={"variables": variables}))
+        return Evaluator(designs_question(named, self.goals, graded=graded), lifted.parameters)
 
     def _alike(self, designs: Mapping[str, Floats]) -> Evaluated:
         """Evaluate designs of one study that differ in numbers."""

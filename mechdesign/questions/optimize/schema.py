@@ -410,7 +410,7 @@ def _check_judged(checker: Checker, judged: Judged, path: KeyPath, moved: Collec
 
 def _check_bound(checker: Checker, condition: Condition, path: KeyPath, moved: Collection[str]) -> None:
     """Report a bound that a parameter in `moved` changes."""
-    raw, names = checker.reporter.raw(path), frozenset[str]()
+    raw, names = checker.reporter.document.raw(path), frozenset[str]()
     # A text that is no expression has been reported.
     with suppress(ExpressionError):
         names = Expression.parse(str(raw)).names

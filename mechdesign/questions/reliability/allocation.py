@@ -115,14 +115,12 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
     if section.allocate is None or not task.settings:
         return Result("allocation", {})
     study, aim = task.study, aim_of(section.allocate)
-    originals = tolerances(study, task.sources)
-    free = np.array([k for k, tolerance in enumerate(originals) if tolerance.cost is not None], dtype=np.intp)
+    start = tolerances(study, task.sources)
+    free = np.array([k for k, tolerance in enumerate(start) if tolerance.cost is not None], dtype=np.intp)
     task = replace(task, settings=[replace(setting, scale=None, followed=False) for setting in task.settings])
     if section.precision is None:
         task = replace(task, precision=Precision(relative=_PRECISION))
-    model = ToleranceModel(
-        task, aim, originals, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST)
-    )
+    model = ToleranceModel(task, aim, start, free, np.full(len(free), np.inf if section.allocate.grades else WIDEST))
     rounds = _rounds(model, aim.method(task, section))
     confirmed = [candidate for candidate in rounds if not candidate.missed().any()]
     if not confirmed and rounds[-1].tightest():
@@ -135,7 +133,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
             f"allocate: the {aim.noun} asked, {goal.rpartition(' ')[2]}, is not confirmed at {where}: with tolerances "
             f"for which the analytic model says {by_model}, {last.method} finds {by_simulation}; ask for a little less"
         )
-    before = sum(originals[k].price(originals[k].given) for k in free.tolist())
+    before = sum(start[k].price(start[k].given) for k in free.tolist())
     notes = [Caution(
         "allocated",
         f"allocated: the tolerances cost {last.cost():.6g} in place of {before:.6g}; asked is a {goal}, and at "
@@ -153,7 +151,7 @@ def allocate(task: Task, section: ReliabilitySection) -> Result:
         cheaper = f"allocated: not all choices of grades were compared; a cheaper one costs {last.bound:.6g} at least"
         notes.append(Caution("unconverged", cheaper, "allocation"))
     text, others = rewritten(
-        study, allocated_data(study, originals, last.scales), f"Tolerances of {study.name}, the cheapest for a {goal}"
+        study, allocated_data(study, start, last.scales), f"Tolerances of {study.name}, the cheapest for a {goal}"
     )
     tables = {"allocation": _allocation(last), "confirmation": _confirmation(last)}
     notes += _ends(replace(last, model=rounds[-1].model))

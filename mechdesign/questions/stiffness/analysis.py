@@ -204,9 +204,7 @@ def solve(
     keeper = Keeper(study, poses)
     for solved in all_solved:
         configuration = solved.configuration
-        keeper.keep(solved)
         reason[solved.rows] = configuration.reason
-        first = first or _pose(solved, configuration.valid)
         assembled = np.flatnonzero(np.isin(configuration.reason, (Reason.OK, Reason.LIMIT)))
         chunks = [assembled[k : k + CHUNK] for k in range(0, len(assembled), CHUNK)]
         batches = ((body.at(poses, solved.rows[index]), configuration.take(index)) for index in chunks)
@@ -218,7 +216,9 @@ def solve(
             if all_effects is not None and effect is not None:
                 put(all_effects, rows, effect)
             progress.update(len(index))
+        first = first or _pose(solved, configuration.valid)
         loose = loose or _pose(solved, np.isfinite(held.free[solved.rows, 0]))
+        keeper.keep(solved)
     return Solved(held, reason, Springs.sorted(springs), all_effects, first, loose, keeper.shown)
 
 

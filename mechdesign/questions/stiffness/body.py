@@ -100,8 +100,8 @@ def ask(study: Study) -> Body:
     lone = link is None and len(links) == 1
     standing = build_bodies(mechanism, links[0] if lone else link, point, section)
     carried = build_bodies(mechanism, None, point, section) if lone else standing
-    legs = find_legs(standing, list(mechanism.description.links))
     network = build_network(carried)
+    legs = find_legs(standing, list(mechanism.description.links))
     condensed = section.link is None and (lone or link is not None)
     return Body(section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size or 1.0)
 

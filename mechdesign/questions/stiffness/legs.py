@@ -16,7 +16,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.stiffness.compliance import Held, by_wrenches, poses_by, stiffness_of
 from mechdesign.questions.stiffness.elements import Beam, Element, Hinge, Shift, freedoms, screw_origin
-from mechdesign.questions.stiffness.network import Bodies, NetworkEdge, carrying, is_pin, link_of
+from mechdesign.questions.stiffness.network import Bodies, NetworkEdge, is_pin, link_of
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.stiffness.screws import (
     LegScrews,
@@ -45,7 +45,7 @@ class Leg:
 def find_legs(bodies: Bodies, links: Sequence[str]) -> tuple[Leg, ...] | None:
     """The legs that carry the asked body, in the order of their `links`; None where they are not serial."""
     legs: list[tuple[int, Leg]] = []
-    for piece in _pieces(carrying(bodies), bodies.asked):
+    for piece in _pieces(bodies.carrying, bodies.asked):
         ends = {end for edge in piece for end in (edge.a, edge.b)}
         if not {GROUND, bodies.asked} <= ends:
             continue

@@ -75,6 +75,17 @@ class Bodies:
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
 
+    @cached_property
+    def carrying(self) -> list[NetworkEdge]:
+        """Edges that can carry a load of the asked body: vertices with a single edge are removed, again and again."""
+        edges = list(self.edges)
+        while True:
+            degree = Counter(end for edge in edges for end in (edge.a, edge.b))
+            loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, self.asked)}
+            if not loose:
+                return edges
+            edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
+
 
 def link_of(body: str) -> str:
     """The link to which a body belongs; empty for a massless body."""
@@ -330,23 +341,12 @@ class Network:
 
 def build_network(bodies: Bodies) -> Network:
     """The network of a mechanism; parts that carry no load have no edges and move with the vertex they hang on."""
-    kept = carrying(bodies)
+    carrying = bodies.carrying
     # On a link that carries, an edge to an unloaded place stays: the beams before that place bend and move it.
-    bent = {edge.name for edge in kept if edge.beam}
-    kept = [edge for edge in bodies.edges if edge in kept or (edge.beam and edge.name in bent)]
+    bent = {edge.name for edge in carrying if edge.beam}
+    kept = [edge for edge in bodies.edges if edge in carrying or (edge.beam and edge.name in bent)]
     network = _looped(tuple(_pinned(kept, bodies)), bodies)
     return replace(network, paths=_with_idle(bodies.edges, network.paths))
-
-
-def carrying(bodies: Bodies) -> list[NetworkEdge]:
-    """Edges that can carry a load of the asked body: vertices with a single edge are removed, again and again."""
-    edges = list(bodies.edges)
-    while True:
-        degree = Counter(end for edge in edges for end in (edge.a, edge.b))
-        loose = {vertex for vertex, count in degree.items() if count == 1 and vertex not in (GROUND, bodies.asked)}
-        if not loose:
-            return edges
-        edges = [edge for edge in edges if edge.a not in loose and edge.b not in loose]
 
 
 def _pinned(edges: list[NetworkEdge], bodies: Bodies) -> list[NetworkEdge]:

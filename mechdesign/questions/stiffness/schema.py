@@ -201,9 +201,8 @@ class StiffnessSection(PoseSection):
         right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))
         if right and GROUND in (owners[self.at] if self.bearer is None else [self.bearer]):
             checker.report((*root, "at"), f"point {self.at!r} belongs to the ground and does not move")
-        if self.link is not None and checker.check_name(
-            self.link, checker.mechanism.moving, "moving link", (*root, "link")
-        ):
+        moving = checker.mechanism.moving
+        if self.link is not None and checker.check_name(self.link, moving, "moving link", (*root, "link")):
             points = checker.mechanism.points_of(self.link)
             if right and self.at not in points and self.at != f"{self.link}.{self.point}":
                 message = f"link {self.link!r} has no point {self.at!r}; it has {', '.join(points)}"

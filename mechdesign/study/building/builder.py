@@ -46,9 +46,11 @@ class Builder:
             name: self.units.angle_factor if place.quantity == "angle" else 1.0 for name, place in self.places.items()
         }
         kinds = {name: kind_of(text) for name, text in self.quantities.items()}
+        drawn = [Amount.of(number).expression for point in self.section.sketch.values() for number in point]
         return Parameters(
             dict(self.parameter_values), dict(formulas), dict(self.formulas), factors, frozenset(self.measured),
             {name: kind for name, kind in kinds.items() if kind is not None},
+            frozenset(name for expression in drawn if expression is not None for name in expression.names),
         )  # fmt: skip
 
     def report(self, path: Iterable[str | int], message: str, *, at_key: bool = False) -> None:

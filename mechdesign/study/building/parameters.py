@@ -29,6 +29,8 @@ class Parameters:
     measured: frozenset[str] = frozenset()
     # Parameters that are written with a unit, and the kinds of their quantities.
     kinds: Mapping[str, str] = field(default_factory=dict)
+    # Parameters in the expressions of the sketch's points.
+    sketched: frozenset[str] = frozenset()
 
     def moved(self, names: Collection[str]) -> set[str]:
         """Those of the names that are parameters, and the parameters that follow from them."""

@@ -51,9 +51,7 @@ class Checker:
             if name in self.mechanism.owners:
                 self.report(path, f"{name!r} is a point; its coordinates are {name}.x and {name}.y", at_key=at_key)
             elif name in self.mechanism.moving:
-                drives = [
-                    drive for drive, section in self.mechanism.drives.items() if section and section.angle == name
-                ]
+                drives = [drive for drive, entry in self.mechanism.drives.items() if entry and entry.angle == name]
                 also = f", and its drive is {drives[0]}" if drives else ""
                 self.report(path, f"{name!r} is a link; its coordinate is {name}.angle{also}", at_key=at_key)
             else:
@@ -112,5 +110,5 @@ class Checker:
 
     def needs(self, section: str | None, subject: str, path: KeyPath) -> None:
         """Check that the study has a section that `subject` needs."""
-        if section is not None and self.reporter.raw((section,)) is None:
+        if section is not None and self.reporter.document.raw((section,)) is None:
             self.report(path, f"{subject} needs the {section} section, and the study has none")

@@ -138,7 +138,7 @@ class PoseSection(fields.Model):
 
     def checked(self, checker: Checker) -> Self:
         """The section; names and units of the coordinates that poses give are checked against the mechanism."""
-        if self.at_nodes and checker.reporter.raw(("workspace",)) is None:
+        if self.at_nodes and checker.reporter.document.raw(("workspace",)) is None:
             checker.report((self.command, "poses"), "needs the workspace section, whose nodes are meant")
         for index, pose in enumerate(self.poses or ()):
             checker.coordinates(pose, (self.command, "poses", index))

@@ -21,9 +21,9 @@ from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.study.building.section import MechanismSection, UnitsSection
 from mechdesign.study.text import fields
-from mechdesign.study.text.document import Document, KeyPath, Mark, dotted, has, read
+from mechdesign.study.text.document import LIST_FORM, Document, KeyPath, Mark, dotted, has, read
 from mechdesign.study.text.forms import Generator, name_forms
-from mechdesign.study.text.reporter import LIST_FORM, schema_fields
+from mechdesign.study.text.reporter import schema_fields
 
 _Warning = Annotated[str, fields.choice({**KINDS, ALL: "every kind"}, "kind of warning")]
 

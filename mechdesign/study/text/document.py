@@ -19,6 +19,8 @@ from mechdesign.errors import Problem, StudyError
 
 KeyPath = tuple[str | int, ...]
 
+# A link written as a list has its keys at these places.
+LIST_FORM = {"from": 0, "to": 1, "length": 2}
 MAX_DEPTH = 40
 MAX_NODES = 200_000
 MAX_BYTES = 50_000_000
@@ -84,6 +86,35 @@ class Document:
     def of(cls, data: Any, name: str = "") -> Document:
         """A document of data without a text."""
         return cls(name, data, values={(): Mark(name)})
+
+    def raw(self, path: Sequence[str | int]) -> Any:
+        """The data as written at a path, None if there are none."""
+        return value_at(self.data, self.written(path))
+
+    def written(self, path: Sequence[str | int]) -> KeyPath:
+        """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
+        data: Any = self.data
+        found: list[str | int] = []
+        remaining = list(path)
+        while remaining:
+            segment = remaining.pop(0)
+            if has(data, segment):
+                found.append(segment)
+                data = data[segment]
+            elif data is None or not found:
+                # An empty or missing section has no short forms.
+                return (*found, segment, *remaining)
+            elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
+                found.append(LIST_FORM[str(segment)])
+                data = data[LIST_FORM[str(segment)]]
+            elif isinstance(data, list) and segment in data:
+                found.append(data.index(segment))
+                data = segment
+            elif remaining or not isinstance(data, dict):
+                continue
+            else:
+                found.append(segment)
+        return tuple(found)
 
 
 def dotted(path: Sequence[str | int]) -> str:

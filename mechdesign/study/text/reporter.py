@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, Union, get_args, get_origin
 
 from pydantic import Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -15,8 +15,6 @@ from mechdesign.study.text.document import Document, KeyPath, dotted, has, leave
 from mechdesign.study.text.fields import LOST, MAX_NAMED, Model, shown
 from mechdesign.study.text.units import QuantityError, measure, text_of
 
-# A link written as a list has its keys at these places.
-LIST_FORM = {"from": 0, "to": 1, "length": 2}
 # Expected values by the types of pydantic's errors.
 _EXPECTED = defaultdict(
     lambda: "something else",
@@ -40,20 +38,33 @@ def unknown_key(name: str, names: Iterable[str]) -> str:
     return f"unknown key{suggestion(name, names)}"
 
 
+class Remark(NamedTuple):
+    """A message about a path of the data, which stands at the key there or else at its value."""
+
+    path: tuple[str | int, ...]
+    message: str
+    at_key: bool
+
+
 class Reporter:
-    """Collects problems of one document and raises them together."""
+    """Collects mistakes of one document, finds their places in the text, and raises them together."""
 
     def __init__(self, document: Document) -> None:
         self.document = document
-        # In the order found, each once.
-        self._problems = dict.fromkeys(document.problems)
-        self.warnings: list[Problem] = []
+        self._mistakes: list[Remark] = []
+        self._doubts: list[Remark] = []
         self.kinds: dict[KeyPath, str] = {}
 
     @property
     def problems(self) -> list[Problem]:
-        """Mistakes found so far, each once."""
-        return list(self._problems)
+        """Mistakes so far, in the order in which they were found, each once."""
+        placed = [problem for mistake in self._mistakes for problem in self._placed(mistake)]
+        return list(dict.fromkeys([*self.document.problems, *placed]))
+
+    @property
+    def warnings(self) -> tuple[Problem, ...]:
+        """What is likely a mistake."""
+        return tuple(problem for doubt in self._doubts for problem in self._placed(doubt))
 
     def check_name(
         self, name: str, names: Iterable[str], noun: str, path: Iterable[str | int], *, at_key: bool = False
@@ -70,20 +81,14 @@ class Reporter:
 
     def report(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Report a mistake at a path of the data, which may go through the long form of a short one."""
-        place = self.written(path)
-        above = [place[:length] for length in range(len(place) + 1)]
-        if not self.document.spoiled.isdisjoint(above):
-            return
-        comma = next((self.document.commas[part] for part in above if part in self.document.commas), None)
-        hint = f"; a decimal is written with a point: {comma}" if comma is not None else ""
-        self._problems[self._placed(place, message + hint, at_key)] = None
+        self._mistakes.append(Remark(tuple(path), message, at_key))
 
     def kind(self, path: KeyPath, kind: str) -> None:
         """Report quantities at or below a path of the data whose unit is of another kind."""
         self.kinds[path] = kind
-        for keys, raw in leaves(self.raw(path)):
+        for keys, raw in leaves(self.document.raw(path)):
             # The unit of a parameter is checked with the parameter.
-            parameter = self.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
+            parameter = self.document.raw(("mechanism", "parameters", raw)) if isinstance(raw, str) else None
             if text := text_of(raw) or text_of(parameter):
                 try:
                     measure(text, kind)
@@ -101,16 +106,21 @@ class Reporter:
 
     def doubt(self, path: Sequence[str | int], message: str, *, at_key: bool = False) -> None:
         """Warn of what is likely a mistake at a path of the data."""
-        self.warnings.append(self._placed(self.written(path), message, at_key))
+        self._doubts.append(Remark(tuple(path), message, at_key))
 
-    def _placed(self, path: KeyPath, message: str, at_key: bool) -> Problem:
-        nearest = path
-        while nearest and nearest not in self.document.values:
-            nearest = nearest[:-1]
-        mark = self.document.values[nearest]
-        if (at_key or nearest != path) and nearest in self.document.keys:
-            mark = self.document.keys[nearest]
-        return mark.problem(message, dotted(path))
+    def _placed(self, remark: Remark) -> Iterator[Problem]:
+        """A remark at its place in the text; nothing where it only follows from a mistake of the text itself."""
+        written = self.document.written(remark.path)
+        above = [written[:length] for length in range(len(written) + 1)]
+        if not self.document.spoiled.isdisjoint(above):
+            return
+        comma = next((self.document.commas[part] for part in above if part in self.document.commas), None)
+        hint = f"; a decimal is written with a point: {comma}" if comma is not None else ""
+        there = next(part for part in reversed(above) if part in self.document.values)
+        mark = self.document.values[there]
+        if (remark.at_key or there != written) and there in self.document.keys:
+            mark = self.document.keys[there]
+        yield mark.problem(remark.message + hint, dotted(written))
 
     def done(self) -> None:
         """Raise all problems, in the order of the text.
@@ -120,47 +130,13 @@ class Reporter:
         StudyError
             If there are any.
         """
-        if self.problems:
-            ordered = sorted(self.problems, key=lambda problem: (problem.line == 0, problem.line, problem.column))
+        if problems := self.problems:
+            ordered = sorted(problems, key=lambda problem: (problem.line == 0, problem.line, problem.column))
             raise StudyError(ordered)
 
     def concerns(self, *sections: str) -> bool:
         """Whether a problem lies in one of these top-level sections, or in the text as a whole."""
         return any(problem.key.partition(".")[0] in ("", *sections) for problem in self.problems)
-
-    def raw(self, path: Sequence[str | int]) -> Any:
-        """The data as written at a path, None if there are none."""
-        data = self.document.data
-        for segment in self.written(path):
-            if not has(data, segment):
-                return None
-            data = data[segment]
-        return data
-
-    def written(self, path: Sequence[str | int]) -> KeyPath:
-        """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
-        data: Any = self.document.data
-        keys: list[str | int] = []
-        remaining = list(path)
-        while remaining:
-            segment = remaining.pop(0)
-            if has(data, segment):
-                keys.append(segment)
-                data = data[segment]
-            elif data is None or not keys:
-                # An empty or missing section has no short forms.
-                return (*keys, segment, *remaining)
-            elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
-                keys.append(LIST_FORM[str(segment)])
-                data = data[LIST_FORM[str(segment)]]
-            elif isinstance(data, list) and segment in data:
-                keys.append(data.index(segment))
-                data = segment
-            elif remaining or not isinstance(data, dict):
-                continue
-            else:
-                keys.append(segment)
-        return tuple(keys)
 
     def report_validation(self, error: ValidationError, root: type[Model], prefix: KeyPath) -> None:
         """Note every error of the validation of the part at `prefix`, in words."""
@@ -179,9 +155,9 @@ class Reporter:
                 message = item["msg"] if kind == "study" else f"expected {_EXPECTED[kind]}, not {shown(item['input'])}"
                 if kind in _MAPPINGS and isinstance(item["input"], str) and ":" in item["input"]:
                     message += "; a ':' needs a space after it"
-                *holder, last = self.written(location)
+                *holder, last = self.document.written(location)
                 # For a whole mapping pydantic's path ends with the name of the form.
-                location = location if has(self.raw(holder), last) else tuple(holder)
+                location = location if has(self.document.raw(holder), last) else tuple(holder)
                 self.report(location, message, at_key=at_key)
 
     def mended(self, error: ValidationError, root: type[Model], key: str, raw: Any) -> Any:
@@ -192,7 +168,7 @@ class Reporter:
         part = plain(raw)
         for item in error.errors(include_url=False):
             location = (key, *item["loc"])
-            *inner, last = self.written(location)[1:] or (None,)
+            *inner, last = self.document.written(location)[1:] or (None,)
             holder: Any = part
             for segment in inner:
                 holder = holder[segment] if has(holder, segment) else None

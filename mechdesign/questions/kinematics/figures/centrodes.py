@@ -92,12 +92,10 @@ def centrodes(sweep: Sweep, table: Table) -> list[Centrodes]:
         centre = np.where(np.isfinite(centre), centre, complex(np.nan, np.nan))
         frames = {link: _frame(sweep, link) for link in (moving, fixed)}
         local = {link: (centre - origin) / turn for link, (origin, turn) in frames.items()}
-        finite = np.isfinite(centre) & sweep.configuration.valid
-        if not finite.any() or any(
-            np.abs(z[finite] - z[finite][0]).max() <= _STILL * max(sides) for z in local.values()
-        ):
+        valid = np.isfinite(centre) & sweep.configuration.valid
+        if not valid.any() or any(np.abs(z[valid] - z[valid][0]).max() <= _STILL * max(sides) for z in local.values()):
             continue
-        pose = int(np.where(finite, np.abs(centre - middle), np.inf).argmin())
+        pose = int(np.where(valid, np.abs(centre - middle), np.inf).argmin())
         paths = [frames[link][0][pose] + frames[link][1][pose] * local[link] for link in (fixed, moving)]
         pairs.append(Centrodes(moving, fixed, pose, complex(centre[pose]), *paths))
     return pairs

@@ -240,7 +240,7 @@ def _load(checker: Checker, section: ReliabilitySection, dimensions: dict[str, D
     path: KeyPath = ("reliability", "load")
     report, stiffness = checker.report, checker.parts.get("stiffness")
     random = [name for name in LOADS if name in dimensions]
-    if checker.reporter.raw(("stiffness",)) is None:
+    if checker.reporter.document.raw(("stiffness",)) is None:
         missing = "a load acts at the point of the stiffness section, and the study has none"
         if section.load is not None:
             report(path, missing)
@@ -277,7 +277,7 @@ def _columns_of_dynamics(checker: Checker, section: ReliabilitySection) -> dict[
         message = ""
         if name not in kinds:
             continue
-        if dynamics is None and checker.reporter.raw(("dynamics",)) is None:
+        if dynamics is None and checker.reporter.document.raw(("dynamics",)) is None:
             example = "dynamics: {gravity: [0, -9.81 m/s^2]}"
             message = f"{name!r} is a column of dynamics, and the study has no such section; add one, such as {example}"
         elif name not in still and not pace.rated:

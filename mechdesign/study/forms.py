@@ -1,4 +1,4 @@
-"""Cases that differ only in numbers, as designs of one study that has a parameter in place of each number."""
+"""Studies that differ only in numbers, as designs of one study that has a parameter in place of each number."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def form_of(changes: Changes) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """A study with a parameter in place of each number that cases change; `parameters` are by the names of entries."""
+    """A study with a parameter in place of each number that changes; `parameters` are by the names of entries."""
 
     study: Study
     parameters: Mapping[str, str]
@@ -49,25 +49,25 @@ class Form:
 
 
 def compiled(study: Study, changes: Changes, first: Changes) -> Form | None:
-    """The form of cases that differ from `changes` only in numbers; None where a number decides the structure.
-
-    The form has the study's own numbers, or those of the `first` case where the study has none.
-    """
+    """The form of cases that differ from `changes` only in numbers, kept for the next of them; see `form`."""
     key = hashlib.sha256(json.dumps([study.resolved, form_of(changes), first, study.seed]).encode()).digest()
     if key not in _FORMS:
         while len(_FORMS) >= _MOST_FORMS:
             _FORMS.pop(next(iter(_FORMS)))
-        _FORMS[key] = _compiled(study, changes, dict(first))
+        words = [(name, value) for name, value in changes if not is_number(value)]
+        numbers = {name: value for name, value in changes if is_number(value)}
+        _FORMS[key] = form(study, words, numbers | {name: value for name, value in first if name in numbers})
     return _FORMS[key]
 
 
-def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form | None:
-    names, own, added = set(study.parameters.nominal), dict[str, str](), dict[str, Any]()
-    written: list[tuple[str, Any]] = []
-    for number, (name, value) in enumerate(changes):
-        if not is_number(value):
-            written.append((name, value))
-            continue
+def form(study: Study, changes: Changes, numbers: Mapping[str, Any]) -> Form | None:
+    """The study with changed entries, and a parameter in place of each of these numbers, by the names of their entries.
+
+    A parameter has the study's own number, or that of `numbers` where the study has none. None where there is no such
+    study, or a number decides the structure.
+    """
+    own, added, written = dict[str, str](), dict[str, Any](), [*changes]
+    for name, value in numbers.items():
         try:
             keys = entry(study.resolved, name)
         except StudyError:
@@ -77,19 +77,19 @@ def _compiled(study: Study, changes: Changes, first: Mapping[str, Any]) -> Form 
         if keys[:2] == ("mechanism", "parameters"):
             own[name] = str(keys[2])
             continue
-        parameter = f"entry_{number}"
-        while parameter in names:
+        parameter = f"entry_{len(own)}"
+        while parameter in study.parameters.nominal:
             parameter += "_"
         own[name] = parameter
         raw = value_at(study.resolved, keys)
-        added[parameter] = first[name] if raw is None else raw
+        added[parameter] = value if raw is None else raw
         written.append((name, parameter))
     try:
-        form = Form(with_entries(study, written, added), own)
+        lifted = Form(with_entries(study, written, added), own)
     except MechdesignError:
         return None
-    moved = Designs(form.study, dict.fromkeys(own.values(), np.zeros(1)))
-    return form if own and moved.alike else None
+    moved = Designs(lifted.study, dict.fromkeys(own.values(), np.zeros(1)))
+    return lifted if own and moved.alike else None
 
 
 def is_number(value: Any) -> bool:
