@@ -118,6 +118,7 @@ CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
 RESERVED = FUNCTIONS | CONSTANTS.keys()
 """Names that no parameter can have."""
 
+
 @dataclass(frozen=True)
 class Tabulated:
     """A function of one number by a table: a cubic spline through its rows, periodic if it ends as it begins.
@@ -152,7 +153,7 @@ class Tabulated:
 
 # What an expression calls: a function by its name, or a table.
 Called = str | Tabulated
-_Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated]
+Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated]
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Expression:
     """A parsed expression."""
 
     text: str
-    program: tuple[_Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
+    program: tuple[Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
     angle_unit: float = 1.0  # radians in one of the units that trigonometry takes and gives
 
     @classmethod
@@ -253,7 +254,7 @@ class Expression:
         """The expression with expressions or numbers in place of its variables; it takes the angle unit of these."""
         units = [value.angle_unit for value in values.values() if isinstance(value, Expression)]
 
-        def variable(name: str) -> tuple[_Step, ...]:
+        def variable(name: str) -> tuple[Step, ...]:
             value = values[name]
             return value.program if isinstance(value, Expression) else (("constant", value),)
 
@@ -268,7 +269,7 @@ class Expression:
         """
         arctangents: dict[str, tuple[Expression, float]] = {}
 
-        def call(function: Called, inner: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+        def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
             program = _call_steps(function, inner)
             if function not in _TURNS:
                 return program
@@ -286,11 +287,13 @@ class Expression:
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if kind == "call":
-                    count = 1 if isinstance(item, Tabulated) else arity(str(item))
+                if isinstance(item, Tabulated):
+                    stack[-1:] = [call(item, stack[-1:])]
+                elif kind == "call":
+                    count = arity(str(item))
                     stack[-count:] = [call(item, stack[-count:])]
                 else:
-                    stack.append(constant(item) if kind == "constant" else variable(item))
+                    stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
         return stack[0]
 
     def _variable(self, env: Mapping[str, ArrayLike], name: str) -> Number:
@@ -337,11 +340,11 @@ def _function(called: Called) -> _Function | Tabulated:
     return called if isinstance(called, Tabulated) else _FUNCTIONS[called]
 
 
-def _constant_step(value: float) -> tuple[_Step, ...]:
+def _constant_step(value: float) -> tuple[Step, ...]:
     return (("constant", value),)
 
 
-def _call_steps(function: Called, arguments: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+def _call_steps(function: Called, arguments: list[tuple[Step, ...]]) -> tuple[Step, ...]:
     """The program of a call from those of its arguments."""
     return (*chain.from_iterable(arguments), ("call", function))
 
@@ -368,12 +371,12 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.program: list[_Step] = []
+        self.program: list[Step] = []
         self.depth = 0
         self.tokens = self._tokenize(text)
         self.position = 0
 
-    def parse(self) -> tuple[_Step, ...]:
+    def parse(self) -> tuple[Step, ...]:
         if len(self.tokens) == 1:
             raise ExpressionError("an empty text where a number is expected")
         self._operand_chain(0)

@@ -145,14 +145,15 @@ def compile_structure(
         tuple((index, k) for (kind, index), k in numbers.items() if kind == "slide"),
         tuple((node, k, numbers["y", node]) for (kind, node), k in numbers.items()
               if kind == "x" and ("y", node) in numbers),
-        tuple(spans), {variables[column]: part_of[row] for row, column in enumerate(matched)}, tuple(chains), tuple(functions),
+        tuple(spans), {variables[column]: part_of[row] for row, column in enumerate(matched)}, tuple(chains),
+        tuple(functions),
     )  # fmt: skip
 
 
 def _sets(
     graph: Graph, follower: Coordinate, angles: _Ties, numbers: Mapping[Variable, int], k: int
 ) -> bool:  # fmt: skip
-    """Whether value `k` can set the coordinate that follows: an angle, which it then ties, or a slide, not yet given."""
+    """Whether value `k` can set the coordinate that follows: an angle, which it then ties, or a slide."""
     if follower.kind == "slide":
         return ("slide", follower.slide) not in numbers
     if follower.kind != "angle":

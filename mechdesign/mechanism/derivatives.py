@@ -19,7 +19,7 @@ They are always computed in the Assur groups of the drives, whichever coordinate
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -245,9 +245,7 @@ class Linearization(Loops):
             arms.append((m, m_z, m1, d, d_z))
             here = added(1j * omega * m_z, s1[k] * d_z, 1j * turn_z * added(m1, 1j * omega * m))
             rest.append(self.turned(here, edge.frame))
-        velocity_z = self._solve(
-            none, rest, derived=lambda pose, c, rates: second(pose, c, velocity, position, rates)
-        )
+        velocity_z = self._solve(none, rest, derived=lambda pose, c, rates: second(pose, c, velocity, position, rates))
         s1_z = self._along(velocity_z.slides)
         for k, edge in enumerate(edges):
             m, m_z, m1, d, d_z = arms[k]

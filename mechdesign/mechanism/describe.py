@@ -83,7 +83,9 @@ def describe(mechanism: Mechanism) -> str:
     lines.append(f"branch: {description.branch}")
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
-    lines += [f"coupling: {name} ({coupling.sets} = {coupling.of.text})" for name, coupling in description.couplings.items()]
+    lines += [
+        f"coupling: {name} ({coupling.sets} = {coupling.of.text})" for name, coupling in description.couplings.items()
+    ]
     lines += [f"spring: {name} ({', '.join(spring.between)})" for name, spring in description.springs.items()]
     return "\n".join([*lines, *(f"warning: {doubt}" for doubt in sketch_doubts(mechanism))])
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,12 @@ from mechdesign.mechanism.coordinates import Coordinate
 GRADIENT_STEP = 1e-6
 
 
-Pull = tuple[Literal["node", "slide"], int, Vector] | tuple[Literal["body"], str, Value]
+class Pulls(NamedTuple):
+    """Forces at nodes, moments on bodies and forces along slides, by their indices or names."""
+
+    nodes: dict[int, Vector]
+    bodies: dict[str, Value]
+    slides: dict[int, Value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,26 +68,32 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 
 
 @quiet
-def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Iterator[Pull]:
-    """Forces and moments that do the work ``effort * first(coordinate, rates)`` on any `rates`, the adjoint of `first`.
+def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Pulls:
+    """Forces and moments whose work on any `rates` is ``effort * first(coordinate, rates)``: the adjoint of `first`."""
+    pulls = Pulls({}, {}, {})
+    _pull(pulls, configuration, coordinate, effort)
+    return pulls
 
-    Of each the node, body or slide that it acts on.
-    """
+
+def _pull(pulls: Pulls, configuration: Configuration, coordinate: Coordinate, effort: Value) -> None:
     kind = coordinate.kind
-    if kind in ("x", "y"):
-        yield "node", coordinate.node, effort * (1.0 if kind == "x" else 1j)
-    elif kind == "distance":
-        span = _span(configuration.nodes, coordinate)
-        along = span * (effort / np.sqrt(norm2(span)))
-        yield from (("node", coordinate.other, along), ("node", coordinate.node, -along))
+    if kind in ("x", "y", "distance"):
+        forces: list[tuple[int, Vector]] = [(coordinate.node, effort * (1.0 if kind == "x" else 1j))]
+        if kind == "distance":
+            span = _span(configuration.nodes, coordinate)
+            along = span * (effort / np.sqrt(norm2(span)))
+            forces = [(coordinate.other, along), (coordinate.node, -along)]
+        for node, force in forces:
+            pulls.nodes[node] = pulls.nodes.get(node, 0.0) + force
     elif kind == "slide":
-        yield "slide", coordinate.slide, effort
+        pulls.slides[coordinate.slide] = pulls.slides.get(coordinate.slide, 0.0) + effort
     elif kind == "angle":
-        yield from (("body", coordinate.body, effort), ("body", coordinate.reference, -1.0 * effort))
+        for body, moment in ((coordinate.body, effort), (coordinate.reference, -1.0 * effort)):
+            pulls.bodies[body] = pulls.bodies.get(body, 0.0) + moment
     elif kind == "expression":
-        gradient = _gradient(coordinate, configuration.user_values(coordinate))
-        for slope, part in zip(gradient, coordinate.parts, strict=True):
-            yield from pulled(configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
+        slopes = _gradient(coordinate, configuration.user_values(coordinate))
+        for slope, part in zip(slopes, coordinate.parts, strict=True):
+            _pull(pulls, configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
 
 
 @quiet

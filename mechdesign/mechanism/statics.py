@@ -126,14 +126,14 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
     def pull(coordinate: Coordinate, effort: Value) -> list[Vector]:
         """Add what an effort on a coordinate does to angles and slides; returns its forces at nodes."""
         extra: list[Vector] = [0.0] * len(nodes)
-        for kind, at, force in pulled(linear.configuration, coordinate, effort):
-            if kind == "body":
-                frames[bodies[at][0]] = frames[bodies[at][0]] + force
-            elif kind == "slide":
-                slides[at] = slides[at] + force
-            else:
-                extra[at] = plus(extra[at], 1, force)
-                on_pins[at] = plus(on_pins[at], 1, force)
+        pulls = pulled(linear.configuration, coordinate, effort)
+        for body, moment in pulls.bodies.items():
+            frames[bodies[body][0]] = frames[bodies[body][0]] + moment
+        for slide, force in pulls.slides.items():
+            slides[slide] = slides[slide] + force
+        for node, load in pulls.nodes.items():
+            extra[node] = load
+            on_pins[node] = plus(on_pins[node], 1, load)
         return extra
 
     couplings: dict[int, Value] = {}
@@ -145,7 +145,9 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
             (number,) = group.conditions
             effort = along(number)
             couplings[number] = -1.0 * effort
-            nodes = [plus(node, 1, extra) for node, extra in zip(nodes, pull(structure.values[number], effort), strict=True)]
+            nodes = [
+                plus(node, 1, extra) for node, extra in zip(nodes, pull(structure.values[number], effort), strict=True)
+            ]
         if not group.solved:
             continue
         turning: list[Value] = [0.0] * len(group.angles)
@@ -381,9 +383,8 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
             turn(drive.body, effort)
             turn(drive.reference, -1.0 * effort)
     for coupling, effort in zip(joints.couplings, balance.couplings, strict=True):
-        for kind, at, moment in pulled(linear.configuration, coupling.gap, effort):
-            if kind == "body":
-                turn(at, moment)
+        for body, moment in pulled(linear.configuration, coupling.gap, effort).bodies.items():
+            turn(body, moment)
     for node, body in joints.sole.items():
         if not nothing(force := balance.forces.nodes[node]):
             turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))

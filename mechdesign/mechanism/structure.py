@@ -15,7 +15,8 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import Edge, Graph
 
 Form = Literal[
-    "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides", "newton"
+    "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides",
+    "newton",
 ]  # fmt: skip
 # Of a ``value`` the index in `Structure.values`.
 Variable = tuple[Literal["angle", "slide", "x", "y", "value"], int]

@@ -1,7 +1,8 @@
 """Wheels of couplings: the pitch circles that two gears, two pulleys or a pinion and its rack roll on.
 
-They follow from the ratio of two angles against the link that carries both axes (Willis), or from that of a slide to an
-angle. With the rates w of wheels a and b and of their carrier c, the distance e of their axes, and the rate v of a rack:
+They follow from the ratio of two angles against the link that carries both axes (Willis), or from that of a slide to
+an angle. With the rates w of wheels a and b and of their carrier c, the distance e of the axes, and the rate v of a
+rack:
 
     w_b - w_c = i (w_a - w_c),  r_a = |i| r_b,  r_a + r_b = e for i < 0, |r_a - r_b| = e for i > 0;   v = r w
 """
@@ -117,7 +118,7 @@ def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Co
     for driving in (*others, GROUND):
         for carrier in description.links:
             axes = _axis(graph, follower.body, carrier), _axis(graph, driving, carrier)
-            if carrier in (follower.body, driving) or None in axes or axes[0] == axes[1]:
+            if carrier in (follower.body, driving) or min(axes) < 0 or axes[0] == axes[1]:
                 continue
             ratio = _ratio(rates, driving, carrier)
             # Against the carrier nothing else may turn.
@@ -125,9 +126,7 @@ def _wheels(description: Description, graph: Graph, coupling: Coupled, drawn: Co
             left[driving] = left.get(driving, 0.0) + float(ratio)
             left[carrier] = left.get(carrier, 0.0) + 1.0 - float(ratio)
             if all(abs(rate) < SAME_RATE for body, rate in left.items() if body != GROUND):
-                one, other = axes
-                assert one is not None and other is not None
-                return (follower.body, driving), carrier, (one, other)
+                return (follower.body, driving), carrier, axes
     return None
 
 
@@ -138,27 +137,24 @@ def _rack(description: Description, graph: Graph, coupling: Coupled) -> Axes | N
         return None
     wheel, (guide, *sliders) = angles[0], description.joints[name].links
     axis = _axis(graph, wheel.body, guide)
-    if axis is None or wheel.reference != guide or not sliders:
+    if axis < 0 or wheel.reference != guide or not sliders:
         return None
     edge = next(edge for edge in graph.edges if edge.slide == coupling.follower.slide)
     return (sliders[0], wheel.body), guide, (edge.head, axis)
 
 
-def _axis(graph: Graph, wheel: str, carrier: str) -> int | None:
-    """Node of the pin that two links share."""
-    nodes = [graph.nodes.index(point) for link, point in graph.points if link == wheel and (carrier, point) in graph.points]
-    return nodes[0] if nodes else None
+def _axis(graph: Graph, wheel: str, carrier: str) -> int:
+    """Node of the pin that two links share; -1 of those that share none."""
+    nodes = [
+        graph.nodes.index(point) for link, point in graph.points if link == wheel and (carrier, point) in graph.points
+    ]
+    return nodes[0] if nodes else -1
 
 
 def _rates(gap: Coordinate, configuration: Configuration) -> dict[str, Value]:
     """By link, the derivative of a coupling's gap with respect to the link's angle (radians)."""
-    rates: dict[str, Value] = {}
-    for kind, body, rate in pulled(configuration, gap, 1.0):
-        if kind == "body":
-            rates[body] = rates.get(body, 0.0) + rate
-    return rates
+    return pulled(configuration, gap, 1.0).bodies
 
 
 def _ratio(rates: Mapping[str, Value], driving: str, carrier: str) -> Value:
     return 1.0 + rates.get(carrier, 0.0) if driving == GROUND else -1.0 * rates.get(driving, 0.0)
-

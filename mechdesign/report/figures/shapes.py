@@ -210,7 +210,9 @@ def _belt(wheels: Wheels) -> list[tuple[complex, complex]]:
     (one, other), (first, second) = wheels.axes, wheels.radii
     way = (other - one) / abs(other - one)
     lean = math.acos(max(-1.0, min(1.0, (first - second) / abs(other - one))))
-    return [(one + first * way * turn, other + second * way * turn) for turn in (cmath.rect(1, lean), cmath.rect(1, -lean))]
+    return [
+        (one + first * way * turn, other + second * way * turn) for turn in (cmath.rect(1, lean), cmath.rect(1, -lean))
+    ]
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:

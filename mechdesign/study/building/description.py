@@ -10,7 +10,7 @@ from typing import Literal, NoReturn
 import numpy as np
 
 from mechdesign.errors import MechanismError, StudyError, suggestion
-from mechdesign.expressions import Expression, ExpressionError, Tabulated
+from mechdesign.expressions import Expression, ExpressionError, Step, Tabulated
 from mechdesign.mechanism.coordinates import coupled
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import GROUND, build_graph
@@ -32,13 +32,12 @@ from mechdesign.mechanism.model import (
     Spring,
     Term,
 )
-from mechdesign.study.building import section as models
 from mechdesign.mechanism.sketch import locate
+from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
 from mechdesign.study.schema.paths import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount
-
 
 # Of teeth as ISO 53 has them (radians).
 PRESSURE_ANGLE = np.radians(20.0)
@@ -389,7 +388,7 @@ def _function(
     builder.reporter.kind((*ROOT, *path, "phase"), kind)
     builder.place(ratio, given.ratio, "none", in_coupling=True)
     builder.place(phase, 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
-    steps = (("name", ratio), ("name", of), ("call", "*"), ("name", phase), ("call", "+"))
+    steps: tuple[Step, ...] = (("name", ratio), ("name", of), ("call", "*"), ("name", phase), ("call", "+"))
     return Expression(f"{ratio}*{of} + {phase}", steps, unit)
 
 
@@ -415,7 +414,9 @@ def _table(
 
 def _with_phases(builder: Builder, description: Description) -> Description:
     """A description with the phases of couplings that are left out, as the sketch shows them."""
-    left_out = [name for name, given in builder.section.couplings.items() if given.ratio is not None and given.phase is None]
+    left_out = [
+        name for name, given in builder.section.couplings.items() if given.ratio is not None and given.phase is None
+    ]
     if not left_out or builder.reporter.problems:
         return description
     try:
