@@ -17,9 +17,10 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.optimize.evaluation import Evaluator
 from mechdesign.questions.optimize.question import designs_question
 from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.contained import Shape, fitting_scale
 from mechdesign.questions.workspace.question import questions
+from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
+from mechdesign.region.shapes import Shape
 
 ARM = """
 mechanism:
@@ -60,7 +61,7 @@ def scales(text: str, shape: Shape, *changes: str, places: dict[str, Floats] | N
     """Scales that fit, of the study's own design or of several with other places."""
     (question,) = questions(study_of(text, *changes), wanted=("area",))
     count = len(next(iter(places.values()))) if places else 1
-    return fitting_scale(shape, answer(question, places or {}, count, BATCH).panels)[0]
+    return fitted(shape, answer(question, places or {}, count, BATCH).panels)[0]
 
 
 def ring_of_rectangle(width: float, height: float, inner: float, outer: float) -> float:
@@ -126,8 +127,8 @@ def test_outline_lies_inside_and_a_larger_one_does_not() -> None:
     given = answer(question, places, 3, BATCH)
     theta = np.linspace(0, 2 * np.pi, 721)[:, None]
     for shape in (RECTANGLE, Shape(50, 90, False, 10 + 5j)):
-        scale, centre = fitting_scale(shape, given.panels)
-        outline = scale * shape.radius(theta) * np.exp(1j * theta)
+        scale, placed = fitted(shape, given.panels)
+        centre, outline = placed.centre, scale * shape.radius(theta) * np.exp(1j * theta)
         inside = given.panels.designs.inside(centre + (1 - 1e-6) * outline, np.arange(3))
         assert inside.all()
         assert not given.panels.designs.inside(centre + (1 + 1e-2) * outline, np.arange(3)).all(axis=0).any()

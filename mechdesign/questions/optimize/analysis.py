@@ -37,9 +37,10 @@ from mechdesign.questions.optimize.variables import Design, from_cube, grid, in_
 from mechdesign.questions.poses import Shown, solve_shown
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.contained import Shape, fitting_scale
 from mechdesign.questions.workspace.question import questions, split
+from mechdesign.region.growth import fitted
 from mechdesign.region.rays import SINGLE
+from mechdesign.region.shapes import Shape
 from mechdesign.results import Drawn, Result
 from mechdesign.study import Study
 from mechdesign.study import designs as study_designs
@@ -260,7 +261,7 @@ def _centres(study: Study, shapes: Sequence[Shape]) -> list[complex]:
     if not shapes:
         return []
     panels = answer(questions(study, wanted=("area",))[0], {}, 1, SINGLE).panels
-    return [complex(fitting_scale(shape, panels)[1][0]) for shape in shapes]
+    return [complex(np.asarray(fitted(shape, panels)[1].centre)[0]) for shape in shapes]
 
 
 def _places(designs: Designs, question: DesignsQuestion) -> dict[str, Complexes]:

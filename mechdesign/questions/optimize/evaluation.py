@@ -22,8 +22,8 @@ from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import entry_of, from_cube, shown, variables_of
 from mechdesign.questions.poses import solve_poses, study_poses
 from mechdesign.questions.workspace.answer import answer
-from mechdesign.questions.workspace.contained import fitting_scale
 from mechdesign.questions.workspace.question import Question, split
+from mechdesign.region.growth import fitted
 from mechdesign.region.rays import BATCH
 from mechdesign.results import Result
 from mechdesign.rows import UnknownColumnError
@@ -167,7 +167,7 @@ class Evaluator:
             column, outline = self.layout.column[goal], goal.outline
             shape = None if outline is None else shape_of(outline, numbers.of)
             values = np.stack([
-                region.values[goal.column] if shape is None else fitting_scale(shape, region.panels)[0]
+                region.values[goal.column] if shape is None else fitted(shape, region.panels)[0]
                 for region in given
             ])  # fmt: skip
             # A missing value counts as the worst.

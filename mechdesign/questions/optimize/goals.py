@@ -11,8 +11,8 @@ import numpy as np
 from mechdesign.expressions import Expression
 from mechdesign.numerics.arrays import Flags, Floats
 from mechdesign.questions.optimize.schema import Condition, Containment, OptimizeSection, Outline
-from mechdesign.questions.workspace.contained import Shape
 from mechdesign.questions.workspace.question import COLUMNS, split
+from mechdesign.region.shapes import Shape
 from mechdesign.results import Result
 from mechdesign.rows import Chosen
 from mechdesign.statistics import STATISTICS, Asked, worst

@@ -86,9 +86,7 @@ def reach(question: Question) -> Reached:
     region = Reached(question, evaluation, singular, patches, pieces, everywhere, boundary=boundary)
     if ranged:
         return region
-    counted = [patch for patch in patches if patch.piece == 1 or not field.same_assembly]
-    others = [patch for patch in patches if patch not in counted]
     return replace(
-        region, shapes=inscribed(field, question.scan, counted, others), nodes=nodes_of(field, question.shown, patches),
+        region, shapes=inscribed(given.panels), nodes=nodes_of(field, question.shown, patches),
         loci=loci(field, reasons, patches, singular=singular),
     )  # fmt: skip

@@ -36,13 +36,6 @@ def remarks(study: Study, region: Reached, row: int) -> Iterator[Caution]:
         yield _left_out(study, region)
     if region.beyond > max(region.areas, default=0.0):
         yield _in_other_assembly(study, region)
-    if region.patches and not ranged and not np.isfinite(region.shapes).all():
-        yield Caution(
-            "incomplete",
-            f"the largest circle or rectangle inside the region{there} was not found: where a limit "
-            "jumps (an angle's turn ends there) no slope leads along the boundary",
-            "indices",
-        )
     if region.patches and not ranged:
         yield from _crossed(region, row)
 
