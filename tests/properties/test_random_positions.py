@@ -45,6 +45,13 @@ def gaps(made: Made, configuration: Configuration) -> dict[str, NDArray]:
         if guide.kind == "prismatic":
             kept = slider.turn / guide.along
             found[f"{guide.name} not turned"] = np.abs(turns[slider.name] - kept * along)
+    for name, coupling in layout.couplings.items():
+        value = configuration.value(made.mechanism.coordinate(f"{coupling.coordinate[1]}.{coupling.coordinate[0]}"))
+        for coordinate, (linear, wave) in coupling.terms.items():
+            x = configuration.value(made.mechanism.coordinate(f"{coordinate[1]}.{coordinate[0]}"))
+            value = value - linear * x - wave * np.sin(x)
+        miss = value - coupling.constant
+        found[f"{name} followed"] = wrap(miss) if coupling.coordinate[0] == "angle" else miss
     for clamp in layout.clamps.values():
         kept = layout.bodies[clamp.second].turn / layout.bodies[clamp.first].turn
         found[f"{clamp.name} not turned"] = np.abs(turns[clamp.second] - kept * turns[clamp.first])
