@@ -124,6 +124,8 @@ def compile_structure(
         for row, (kind, index) in enumerate(variables[column] for column in matched)
         if kind == "value" and parts[part_of[row]] != [row_of[index]]
     }
+    # A link that is rigid with the one that follows, or turns against it by a given angle, is not known before it.
+    late |= {k for k in followers if ("value", k) in variables_of(expressions[k], graph, ties, slides)}
     if late:
         return compile_structure(graph, given, couplings, {*implicit, *late})
     groups, chains = [], list[frozenset[int]]()

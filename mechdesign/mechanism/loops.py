@@ -20,7 +20,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, nearest, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
@@ -56,6 +56,8 @@ class Loops:
     slides: list[Any]
     given: list[Value] = field(default_factory=list)
     near: Mapping[str, Value] = field(default_factory=dict)
+    whole: Mapping[str, float] = field(default_factory=dict)
+    drawn: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def start(cls, graph: Graph, structure: Structure, vectors: Vectors, given: Sequence[Value]) -> Self:
@@ -164,9 +166,13 @@ class Loops:
         for angle in angles:
             pair = self.structure.counted(angle, self.graph)
             if pair is not None:
-                offsets = {body: angle_of(np.asarray(turn)) for body, turn in self.vectors.offsets.items()}
+                offsets = {
+                    body: nearest(angle_of(np.asarray(turn)), self.drawn.get(body, 0.0))
+                    for body, turn in self.vectors.offsets.items()
+                }
                 one, other = (tied(tie, self.given, offsets) for tie in pair)
-                counted[angle.name] = one - other + offsets[angle.body] - offsets[angle.reference]
+                turned = one - other + offsets[angle.body] - offsets[angle.reference]
+                counted[angle.name] = turned - self.whole.get(angle.name, 0.0)
         return counted
 
     def put(self, group: Group, unknowns: Unknowns) -> None:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, nearest, picked, quiet
+from mechdesign.mechanism.algebra import TURN, Value, angle_of, nearest, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
@@ -94,6 +94,7 @@ class Plan:
         state = State.start(self.core.graph, self.structure, vectors, given)
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
+        state.whole, state.drawn = self._whole_turns, self._drawn_offsets
         state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
         state.near = {**state.near, **self._given_angles(given), **self._drawn_turns}
         return run(state, self.modes if modes is None else modes, guess)
@@ -224,6 +225,27 @@ class Plan:
 
     def _given_angles(self, given: Sequence[Value]) -> dict[str, Value]:
         return {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_offsets(self) -> dict[str, float]:
+        """Angles of bodies against their classes at the nominal dimensions."""
+        return {body: float(angle_of(np.asarray(turn))) for body, turn in self.core.geometry.nominal.offsets.items()}
+
+    @cached_property
+    def _whole_turns(self) -> dict[str, float]:
+        """Whole turns by which sums of the sketch's drives are away from the angles that the sketch shows."""
+        if not self.structure.functions:
+            return {}
+        drawn = [self.core.sketch.value(c) or 0.0 if c.kind == "angle" else 0.0 for c in self.structure.given]
+        sketch = State.start(self.core.graph, self.structure, self.core.geometry.nominal, drawn)
+        sketch.drawn = self._drawn_offsets
+        angles = angles_of((*self.structure.values, *self.followers)).values()
+        # What follows has the turns that its coupling gives it.
+        return {
+            name: TURN * float(np.round(turned / TURN))
+            for name, turned in sketch.counted(angles).items()
+            if np.isfinite(turned)
+        }
 
     @cached_property
     def _drawn_turns(self) -> dict[str, Value]:

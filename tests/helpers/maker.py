@@ -286,11 +286,7 @@ class Maker:
 
     def couple(self) -> bool:
         """Take one drive away and let a coordinate follow others; False where that is near a singularity."""
-        rng, layout = self.rng, self.layout
-        if len(layout.drives) == 1 and not self.add(DRIVEN["crank"]):
-            return False
-        # A new crank is laid on a layout of its own.
-        layout, before = self.layout, dict(self.layout.drives)
+        rng, layout, before = self.rng, self.layout, dict(self.layout.drives)
         listed = [c for c in layout.drivable() if c[0] != "angle" or c[2] == GROUND]
         for _ in range(TRIALS):
             taken = rng.choice(list(before))

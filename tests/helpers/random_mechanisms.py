@@ -99,7 +99,8 @@ def mechanisms(
         maker.add(DRIVEN["crank"])
     for group in laid:
         event(group)
+    if coupled and len(maker.layout.drives) == 1:
+        maker.add(DRIVEN["crank"])
     maker.finish(anyhow=anyhow)
-    if coupled:
-        assume(maker.couple())
+    assume(not coupled or maker.couple())
     return Made(maker.layout, maker)
