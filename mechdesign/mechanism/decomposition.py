@@ -138,7 +138,9 @@ def compile_structure(
         else:
             group = _group(edges, ties, inner, unknowns, numbers, own)
             single = not inner and not group.bases and group.unknowns == len(own) == 1
-            linear = single and own[0] >= len(given) and couplings[own[0] - len(given)].gap.linear
+            linear = (
+                single and own[0] >= len(given) and _linear(graph, couplings[own[0] - len(given)].gap, ties, slides)
+            )
             groups.append(replace(group, form="linear") if linear else group)
         before = {part_of[other] for row, other in arcs if part_of[row] == k} - {k}
         chains.append(frozenset([k]).union(*(chains[other] for other in before)))
@@ -165,6 +167,17 @@ def _sets(
         return False
     angles.join(frame, reference, Tie(reference, ((1, k),), ((1, follower.reference), (-1, follower.body))))
     return True
+
+
+def _linear(graph: Graph, gap: Coordinate, ties: Sequence[Tie], slides: Mapping[int, int]) -> bool:
+    """Whether a condition is linear in one unknown angle or slide; the turns of two angles would not be known."""
+    turning = [part for part in gap.parts if part.kind == "angle"]
+    unknown = [
+        part
+        for part in turning
+        if any(kind == "angle" for kind, root in variables_of(part, graph, ties, slides) if root)
+    ]
+    return gap.linear and len(unknown) < 2
 
 
 def _equations(

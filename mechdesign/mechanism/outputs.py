@@ -130,8 +130,10 @@ def acceleration_sensitivity(
     Raises
     ------
     MechanismError
-        For a measure given by an expression.
+        For an expression that is not linear in angles and slides.
     """
+    if coordinate.linear:
+        return second(configuration, coordinate, acceleration, position_z, acceleration_z)
     if coordinate.kind == "expression":
         raise MechanismError(
             f"the acceleration error of '{coordinate.name}' is not available analytically: it is an expression; "

@@ -287,6 +287,8 @@ class Maker:
     def couple(self) -> bool:
         """Take one drive away and let a coordinate follow others; False where that is near a singularity."""
         rng, layout, before = self.rng, self.layout, dict(self.layout.drives)
+        if len(before) < 2:
+            return False
         listed = [c for c in layout.drivable() if c[0] != "angle" or c[2] == GROUND]
         for _ in range(TRIALS):
             taken = rng.choice(list(before))
