@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import follow
+from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -98,7 +97,7 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(follow, question)))
+    a_pose = replace(whole, course=Courses(question))
     scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
