@@ -128,7 +128,21 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
-    if chains := ", ".join(sorted(question_of(passage.motion).joints.open)):
-        message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
+    if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
+        message = (
+            f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them; beams "
+            "or bearings with 'moment' in 'stiffness' settle it"
+        )
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
+
+
+def _open_moments(motion: Motion, rows: slice) -> list[str]:
+    """Joints whose moment neither equilibrium nor elasticity determines where their force is known."""
+    question, arrays = question_of(motion), motion.arrays
+    joints = question.joints
+    return sorted({
+        contact.joint for name, contact in zip(question.forces, joints.contacts, strict=True)
+        if contact.joint in joints.open
+        and (np.isnan(arrays[f"{name}.moment"][rows]) & np.isfinite(arrays[f"{name}.fx"][rows])).any()
+    })  # fmt: skip
