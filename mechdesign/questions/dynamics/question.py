@@ -118,7 +118,7 @@ class ForceQuestion:
         energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
         masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
         energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
-        held = balance(linear, forces, self.study.mechanism.meshes)
+        held = balance(linear, forces, mechanism.pressing)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
