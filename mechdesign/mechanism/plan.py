@@ -59,6 +59,10 @@ class Plan:
         self.angles = tuple(left) if self.iterative or not structure.functions else ()
         self.unfollowed = tuple(left) if not self.angles else ()
         self.followers = tuple(coupling.follower for coupling in core.couplings)
+        linear = [k for group in structure.groups if group.form == "linear" for k in group.conditions]
+        solved = angles_of(structure.values[k] for k in linear).values()
+        #: Angles of which linear couplings give the turns.
+        self.solved = tuple(angle.name for angle in solved if structure.counted(angle, core.graph) is None)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -178,7 +182,7 @@ class Plan:
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
-        counted = [angle.name for angle in (*self.angles, *self.followers)]
+        counted = [*(angle.name for angle in (*self.angles, *self.followers)), *self.solved]
         parts = [*parts] if counted else parts
         whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
@@ -214,7 +218,8 @@ class Plan:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
             poses = replace(poses, near={**poses.near, **near})
         if self.followers:
-            poses = replace(poses, near={**poses.near, **state.counted(self.followers)})
+            near = {**state.counted(self.followers), **{name: state.near[name] for name in self.solved}}
+            poses = replace(poses, near={**poses.near, **near})
         if limits:
             self.judge(poses)
         return poses
