@@ -182,7 +182,7 @@ class Plan:
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
-        counted = [*(angle.name for angle in (*self.angles, *self.followers)), *self.solved]
+        counted = sorted({*(angle.name for angle in self.angles), *self.coupled})
         parts = [*parts] if counted else parts
         whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
@@ -264,6 +264,14 @@ class Plan:
     def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """The same, and for other angles the values in the sketch."""
         return self._drawn_angles | self.turns(given, dims)
+
+    @cached_property
+    def coupled(self) -> frozenset[str]:
+        """Angles that couplings count the turns of, from pose to pose the same whatever the way between them."""
+        if not self.structure.functions:
+            return frozenset()
+        known = [c for c in self.followers if self.structure.counted(c, self.core.graph) is not None]
+        return frozenset(angle.name for angle in (*self.angles, *known)).union(self.solved)
 
     @cached_property
     def counted(self) -> frozenset[str]:
