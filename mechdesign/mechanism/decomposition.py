@@ -137,10 +137,8 @@ def compile_structure(
             groups.append(Group("coupled", (), (), (), (), tuple(own)))
         else:
             group = _group(edges, ties, inner, unknowns, numbers, own)
-            single = not inner and not group.bases and group.unknowns == len(own) == 1
-            linear = (
-                single and own[0] >= len(given) and _linear(graph, couplings[own[0] - len(given)].gap, ties, slides)
-            )
+            alone = not inner and not group.bases and group.unknowns == len(own) and own[0] >= len(given)
+            linear = alone and _linear(graph, [couplings[k - len(given)].gap for k in own], ties, slides)
             groups.append(replace(group, form="linear") if linear else group)
         before = {part_of[other] for row, other in arcs if part_of[row] == k} - {k}
         chains.append(frozenset([k]).union(*(chains[other] for other in before)))
@@ -169,15 +167,13 @@ def _sets(
     return True
 
 
-def _linear(graph: Graph, gap: Coordinate, ties: Sequence[Tie], slides: Mapping[int, int]) -> bool:
-    """Whether a condition is linear in one unknown angle or slide; the turns of two angles would not be known."""
-    turning = [part for part in gap.parts if part.kind == "angle"]
-    unknown = [
-        part
-        for part in turning
-        if any(kind == "angle" for kind, root in variables_of(part, graph, ties, slides) if root)
+def _linear(graph: Graph, gaps: Sequence[Coordinate], ties: Sequence[Tie], slides: Mapping[int, int]) -> bool:
+    """Whether conditions are linear in unknown angles and slides, each angle's turns known from one of its bodies."""
+    parts = {part for gap in gaps for part in gap.parts if part.kind == "angle"}
+    roots = [
+        root for part in parts for kind, root in variables_of(part, graph, ties, slides) if kind == "angle" and root
     ]
-    return gap.linear and len(unknown) < 2
+    return all(gap.linear for gap in gaps) and len(roots) == len({*roots})
 
 
 def _equations(

@@ -142,21 +142,6 @@ class Loops:
             if number == k:
                 self.slides[slide] = self.given[k]
 
-    def solve_linear_condition(self, group: Group) -> None:
-        """Solve a group's condition, which is linear in its one unknown."""
-        self.count_turns(group)
-        self.put(group, [0.0])
-        ((slope,),), (gap,) = self.condition_rows(group), self.gaps(group)
-        turned = -gap / slope
-        angles = angles_of(self.structure.values[k] for k in group.conditions)
-        turns = {name: self.pose().value(angle) for name, angle in angles.items() if name not in self.near}
-        for name in turns:
-            own = [self.structure.ties[self.graph.bodies[body][0]].root in group.angles
-                   for body in (angles[name].body, angles[name].reference)]  # fmt: skip
-            turns[name] = turns[name] + turned * (own[0] - own[1])
-        self.near = {**self.near, **turns}
-        self.put(group, [turned])
-
     def gaps(self, group: Group) -> list[Value]:
         """What a group's conditions miss their values by."""
         configuration = self.pose()

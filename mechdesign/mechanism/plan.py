@@ -45,12 +45,16 @@ class Plan:
         self.structure = structure
         self.modes = tuple(modes)
         self.follows = follows and core.description.branch == "follow"
+        linear = [k for group in structure.groups if group.form == "linear" for k in group.conditions]
+        solved = angles_of(structure.values[k] for k in linear).values()
+        #: Angles of which linear couplings give the turns.
+        self.solved = tuple(angle.name for angle in solved if structure.counted(angle, core.graph) is None)
         # Angles in given expressions and in couplings; their turns are counted on the way from the sketch, unless they
         # follow from values.
         inner = angles_of(c for c in structure.values if c.kind == "expression")
         left = [
             angle for name, angle in inner.items()
-            if name not in self.counted and structure.counted(angle, core.graph) is None
+            if name not in self.counted.union(self.solved) and structure.counted(angle, core.graph) is None
         ]  # fmt: skip
         self.iterative = any(group.form == "newton" for group in structure.groups)
         if structure.functions and left and not self.iterative:
@@ -59,10 +63,6 @@ class Plan:
         self.angles = tuple(left) if self.iterative or not structure.functions else ()
         self.unfollowed = tuple(left) if not self.angles else ()
         self.followers = tuple(coupling.follower for coupling in core.couplings)
-        linear = [k for group in structure.groups if group.form == "linear" for k in group.conditions]
-        solved = angles_of(structure.values[k] for k in linear).values()
-        #: Angles of which linear couplings give the turns.
-        self.solved = tuple(angle.name for angle in solved if structure.counted(angle, core.graph) is None)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:

@@ -54,8 +54,8 @@ class Group:
     Their equations are `loops` between nodes that are already placed, and `conditions`: indices of values
     that are equations of this group. The edges of `tree`, each with its sign, then place the group's nodes in order. A
     base is the first node of a part that no loop but only conditions hold. A ``coupled`` group has no equation to be
-    solved: the one condition is the value that follows from others. Of a ``linear`` one the condition is linear in the
-    only unknown.
+    solved: the one condition is the value that follows from others. Of a ``linear`` one the conditions are
+    linear in the unknowns.
     """
 
     form: Form
