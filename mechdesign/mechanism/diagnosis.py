@@ -216,9 +216,10 @@ def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: b
     if not np.isfinite(jacobian).all():
         return ""
     edges, used = doubled(equations, jacobian)
-    names = [coordinate.name for coordinate, says in zip(given, used, strict=True) if says]
+    conditions = [*equations.couplings, *given]
+    names = [coordinate.name for coordinate, says in zip(conditions, used, strict=True) if says]
     links = owners_of(graph, edges)
-    for coordinate, says in zip(given, used, strict=True):
+    for coordinate, says in zip(conditions, used, strict=True):
         if says and coordinate.kind == "angle" and coordinate.body not in links:
             links.append(coordinate.body)
     parts = []

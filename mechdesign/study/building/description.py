@@ -357,6 +357,8 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
             continue
         angle = given.pressure_angle
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
+        if not 0 <= pressure < np.pi / 2:
+            builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
         couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
     return couplings
 
