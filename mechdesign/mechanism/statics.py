@@ -58,11 +58,9 @@ def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) 
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth. Of a belt
-    neither the radii of its pulleys nor its tension is known.
+    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth.
     """
     held = _balance(linear, forces)
-    meshes = [mesh for mesh in meshes if not mesh.belt]
     if not meshes:
         return held
     # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
@@ -74,7 +72,8 @@ def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) 
 def engage(teeth: Forces, mesh: Mesh, effort: Value) -> Vector:
     """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
 
-    Teeth press each other apart by their pressure angle, a wheel inside of a ring towards the ring's axis.
+    Teeth press each other apart by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt only
+    pulls, and its pretension is not known.
     """
     configuration = teeth.configuration
     radius = mesh.radii(configuration)[0]
@@ -86,9 +85,9 @@ def engage(teeth: Forces, mesh: Mesh, effort: Value) -> Vector:
         place, along = mesh.contact(configuration)
         force = along * (effort if mesh.slide >= 0 else effort / radius)
         inside = np.logical_and(mesh.slide < 0, mesh.ratio(configuration) > 1)
-    outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
-    apart = 1j * along * np.where(outwards != inside, 1.0, -1.0)
-    force = force + np.abs(force) * np.tan(mesh.pressure_angle) * apart
+        outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
+        apart = 1j * along * np.where(outwards != inside, 1.0, -1.0)
+        force = force + np.abs(force) * np.tan(mesh.pressure_angle) * apart
     for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
         teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
     return force

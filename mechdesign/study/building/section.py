@@ -287,7 +287,7 @@ class Spring(fields.Model):
 
 _WHEELS = {
     "gears": "wheels with teeth, whose force acts where the pitch circles touch; or a pinion and its rack",
-    "belt": "pulleys with a belt or chain, crossed for a negative ratio: moments alone act on the links",
+    "belt": "pulleys with a belt or chain, or with crossed ones for a negative ratio",
     "none": "a controller or what is not drawn: moments alone act on the links",
 }
 _TABLE_FORM: fields.Form = {"type": ["string", "object", "array"], "title": "table"}
