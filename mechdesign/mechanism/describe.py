@@ -260,6 +260,9 @@ def group_in_words(description: Description, graph: Graph, plan: Plan, index: in
         loops = f"{len(group.loops)} loop{'s' if len(group.loops) != 1 else ''}"
         name = f"group of {loops} without a closed form{f' at {points}' if points else ''}, by Newton's method"
         return f"{name}: {', '.join(unknowns)}"
+    if group.form == "linear":
+        names = [structure.values[k].name for k in group.conditions]
+        return f"coupling{'s' if len(names) > 1 else ''} {', '.join(names)}: {', '.join(unknowns)}"
     chain = chain_of(description, graph, structure, group, placed)
     name = f"{chain.letters} {'dyad' if len(chain.letters) == 3 else 'loop'} {'-'.join(chain.links)}"
     name += f" at {', '.join(chain.pins)}" if chain.pins else ""

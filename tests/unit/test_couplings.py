@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.gallery import study_named
 from helpers.studies import study_of
 from scipy.interpolate import CubicSpline
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.describe import describe
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
@@ -190,7 +192,14 @@ dynamics: {gravity: [0, -9.81 m/s2], sweep: {g1: {from: 10, to: 50, step: 0.25}}
     assert table["g1_power"][inner] / size == pytest.approx(energy[inner] / size, abs=1e-6)
 
 
-def test_check_tells_couplings_and_kinematics_has_what_follows() -> None:
+def test_check_tells_couplings() -> None:
+    told = describe(study_named("planetary").mechanism)
+    assert "1. couplings sun_mesh, ring_mesh: arm.angle, planet.angle" in told
+    assert "coupling: ring_mesh (planet.angle = arm.angle - zr/zp*arm.angle)" in told
+    assert "coupling: mesh (g2.angle = mesh.ratio*g1 + mesh.phase)" in describe(five_bar("{set: g2, of: g1, ratio: 1}"))
+
+
+def test_kinematics_has_what_follows() -> None:
     study = study_of(FIVE_BAR % "{set: g2, of: g1, ratio: -1, phase: 60}" + """
 kinematics: {sweep: {g1: {from: 0, to: 40, step: 10}}, outputs: [g2.angle]}
 """)  # fmt: skip
