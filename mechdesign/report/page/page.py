@@ -191,7 +191,7 @@ def _sketch(study: Study) -> str:
     """The sketch, if no question has drawn the mechanism; empty if it cannot be drawn."""
     try:
         with style.context():
-            return vector.inline(sketch_figure(study), "sketch", "the sketch, assembled")
+            return vector.inline(sketch_figure(study), "sketch", "The sketch, assembled")
     except Exception:
         return ""
 
