@@ -67,6 +67,12 @@ class Wheels:
     along: complex
     strands: tuple[tuple[complex, complex], ...] = ()
 
+    @property
+    def ends(self) -> list[complex]:
+        """The rightmost, uppermost, leftmost and lowest places of the circles."""
+        pairs = zip(self.axes, self.radii, strict=True)
+        return [axis + radius * way for axis, radius in pairs for way in (1, 1j, -1, -1j)]
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -87,8 +93,9 @@ class Scene:
         return link_points(self.description.links[name])
 
     def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
-        """Points, and ends of the guides for a range of each slide (see `Guide.ends`)."""
-        return [*self.points.values(), *(end for guide in self.guides for end in guide.ends(travel, self.span))]
+        """Points, wheels, and ends of the guides for a range of each slide (see `Guide.ends`)."""
+        guides = [end for guide in self.guides for end in guide.ends(travel, self.span)]
+        return [*self.points.values(), *guides, *(end for wheels in self.wheels for end in wheels.ends)]
 
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
@@ -268,8 +275,12 @@ class Sweep(Shown):
     @cached_property
     def travel(self) -> dict[str, tuple[float, float]]:
         """Range of each slide."""
-        some = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
-        return travels([pose(self.mechanism, self.configuration, int(index)) for index in some])
+        return travels([pose(self.mechanism, self.configuration, int(index)) for index in self._some])
+
+    @property
+    def _some(self) -> Ints:
+        """Some of the poses that can be assembled."""
+        return self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
 
     @cached_property
     def extent(self) -> Complexes:
@@ -281,6 +292,9 @@ class Sweep(Shown):
             scene = pose(mechanism, configuration, int(index))
             if scene is not None:
                 reached += [np.array(guide.ends(self.travel, scene.span)) for guide in scene.guides]
+        if mechanism.meshes:
+            scenes = [pose(mechanism, configuration, int(index)) for index in self._some]
+            reached += [np.array(wheels.ends) for scene in scenes if scene is not None for wheels in scene.wheels]
         return np.concatenate(reached)
 
     @property
