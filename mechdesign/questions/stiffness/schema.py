@@ -224,8 +224,8 @@ class StiffnessSection(PoseSection):
         """Also check names, the units of stiffnesses, and loads."""
         root: KeyPath = ("stiffness",)
         if checker.mechanism.couplings:
-            named = ", ".join(checker.mechanism.couplings)
-            message = f"a stiffness of a mechanism with couplings ({named}) is not available; leave out 'stiffness'"
+            couplings = ", ".join(checker.mechanism.couplings)
+            message = f"a stiffness of a mechanism with couplings ({couplings}) is not available; leave out 'stiffness'"
             checker.report(root, message, at_key=True)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))

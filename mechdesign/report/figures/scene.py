@@ -280,7 +280,8 @@ class Sweep(Shown):
     @property
     def _some(self) -> Ints:
         """Some of the poses that can be assembled."""
-        return self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
+        some: Ints = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
+        return some
 
     @cached_property
     def extent(self) -> Complexes:
