@@ -20,6 +20,7 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.assemblies import assemblies
+from mechdesign.mechanism.derivatives import regularity
 from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.plan import Plan
 
@@ -318,7 +319,7 @@ def test_some_couplings_move_as_the_drives_that_give_the_same(made: Made) -> Non
 
 def check_driven(made: Made) -> None:
     """Positions, velocities and accelerations with and without the coupling."""
-    time = np.linspace(-0.2, 0.2, 9)
+    time = np.linspace(-0.1, 0.1, 9)
     coupled, mechanism = made.at(time), made.mechanism
     assume(coupled.valid.all())
     ((name, coupling),) = made.layout.couplings.items()
@@ -342,9 +343,12 @@ def check_driven(made: Made) -> None:
     values = dict(zip(mechanism.drives, made.drives(time), strict=True)) | {name: followed}
     driven = other.forward.solve([values[drive] for drive in other.drives])
     moving = other.linearize(driven)
+    # By hand it might be driven through a pose where it holds nothing, and go on in another assembly.
+    regular = np.broadcast_to(regularity(moving), time.shape)
+    assume(np.nanmin(regular) > 0.3 * regular[4])
+    assert driven.valid.all()
     speeds = moving.velocity([rate if drive == name else made.rates[drive] for drive in other.drives])
     turning = moving.acceleration(speeds, [bend if drive == name else 0.0 for drive in other.drives])
-    assert driven.valid.all()
     for point in mechanism.points:
         node, same_node = mechanism.graph.node(point), other.graph.node(point)
         assert np.abs(driven.point(point) - coupled.point(point)).max() < 1e-9, point
