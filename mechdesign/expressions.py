@@ -118,7 +118,42 @@ CONSTANTS = {"pi": (math.pi, "circumference of a circle over its diameter")}
 RESERVED = FUNCTIONS | CONSTANTS.keys()
 """Names that no parameter can have."""
 
-_Step = tuple[Literal["constant", "name", "call"], float | str]
+
+@dataclass(frozen=True)
+class Tabulated:
+    """A function of one number by a table: a cubic spline through its rows, periodic if it ends as it begins.
+
+    `rows` are the numbers, in rising order, and the function's value at each. Beyond the table it is not a number,
+    unless it has the given `period`.
+    """
+
+    rows: tuple[tuple[float, float], ...]
+    period: float = 0.0
+    angles: Literal[""] = ""
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import CubicSpline
+
+        places, values = np.transpose(self.rows)
+        return CubicSpline(places, values, bc_type="periodic" if self.period else "not-a-knot", extrapolate=False)
+
+    def _at(self, x: Any, order: int) -> Any:
+        first = self.rows[0][0]
+        return self._spline(first + np.mod(np.subtract(x, first), self.period) if self.period else x, order)
+
+    def value(self, x: Any) -> Any:
+        """Value of the spline."""
+        return self._at(x, 0)
+
+    def partials(self, x: Any) -> tuple[Any]:
+        """Its derivative."""
+        return (self._at(x, 1),)
+
+
+# What an expression calls: a function by its name, or a table.
+Called = str | Tabulated
+Step = tuple[Literal["constant", "name", "call"], float | str | Tabulated]
 
 
 @dataclass(frozen=True)
@@ -126,7 +161,7 @@ class Expression:
     """A parsed expression."""
 
     text: str
-    program: tuple[_Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
+    program: tuple[Step, ...]  # postfix: push a constant or a variable's value, or apply a function to the topmost
     angle_unit: float = 1.0  # radians in one of the units that trigonometry takes and gives
 
     @classmethod
@@ -164,10 +199,15 @@ class Expression:
         )
         return {name: np.asarray(value, dtype=float)[()] for name, value in partials.items()}
 
+    @classmethod
+    def of_table(cls, text: str, table: Tabulated, name: str, angle_unit: float) -> Expression:
+        """The value of a table at a variable; `text` is for messages."""
+        return cls(text, (("name", name), ("call", table)), angle_unit)
+
     def is_linear(self) -> bool:
         """Whether the expression is linear in its variables, judged by its form."""
 
-        def degree(function: str, inner: list[int]) -> int:
+        def degree(function: Called, inner: list[int]) -> int:
             if function in ("+", "-", "negate"):
                 return max(inner)
             if function == "*":
@@ -185,9 +225,9 @@ class Expression:
         multiples of an angle may be arcs, and do not count.
         """
 
-        def kind(function: str, inner: list[str]) -> str:
+        def kind(function: Called, inner: list[str]) -> str:
             """``angle``, ``whole`` for a whole number, ``number``, or ``other``, which cannot be added to an angle."""
-            if _FUNCTIONS[function].angles == "gives":
+            if _function(function).angles == "gives":
                 return "angle"
             if "angle" not in inner:
                 return (
@@ -214,7 +254,7 @@ class Expression:
         """The expression with expressions or numbers in place of its variables; it takes the angle unit of these."""
         units = [value.angle_unit for value in values.values() if isinstance(value, Expression)]
 
-        def variable(name: str) -> tuple[_Step, ...]:
+        def variable(name: str) -> tuple[Step, ...]:
             value = values[name]
             return value.program if isinstance(value, Expression) else (("constant", value),)
 
@@ -229,7 +269,7 @@ class Expression:
         """
         arctangents: dict[str, tuple[Expression, float]] = {}
 
-        def call(function: str, inner: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+        def call(function: Called, inner: list[tuple[Step, ...]]) -> tuple[Step, ...]:
             program = _call_steps(function, inner)
             if function not in _TURNS:
                 return program
@@ -241,15 +281,17 @@ class Expression:
         return replace(self, program=program), arctangents
 
     def _run(
-        self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[str, list[Any]], Any]
+        self, constant: Callable[[float], Any], variable: Callable[[str], Any], call: Callable[[Any, list[Any]], Any]
     ) -> Any:
         """Result of the program, with the meanings of constants, variables and calls that are passed."""
         stack: list[Any] = []
         with np.errstate(all="ignore"):
             for kind, item in self.program:
-                if kind == "call":
+                if isinstance(item, Tabulated):
+                    stack[-1:] = [call(item, stack[-1:])]
+                elif kind == "call":
                     count = arity(str(item))
-                    stack[-count:] = [call(str(item), stack[-count:])]
+                    stack[-count:] = [call(item, stack[-count:])]
                 else:
                     stack.append(constant(float(item)) if kind == "constant" else variable(str(item)))
         return stack[0]
@@ -261,8 +303,8 @@ class Expression:
             raise ExpressionError(f"unknown name {name!r}") from None
         return float(value) if type(value) in (float, int) else np.asarray(value, dtype=float)  # type: ignore[arg-type]
 
-    def _apply(self, name: str, arguments: list[Any]) -> Number:
-        function = _FUNCTIONS[name]
+    def _apply(self, name: Called, arguments: list[Any]) -> Number:
+        function = _function(name)
         inner, outer = self._angle_factors(function)
         result: Number = function.value(*(argument * inner for argument in arguments)) * outer
         if not all(type(argument) is float for argument in arguments):
@@ -272,12 +314,14 @@ class Expression:
                 raise ExpressionError(f"division by zero in {self.text!r}")
             if np.isposinf(result):
                 raise ExpressionError(f"{self.text!r} is too large a number; choose a larger unit")
+            if isinstance(name, Tabulated):
+                raise ExpressionError(f"{arguments[0]:g} is not within {self.text}")
             shown = ", ".join(f"{argument:g}" for argument in arguments)
             raise ExpressionError(f"{name}({shown}) in {self.text!r} is not a number")
         return float(result)
 
-    def _differentiate(self, name: str, arguments: list[tuple[Any, dict[str, Any]]]) -> tuple[Any, dict[str, Any]]:
-        function = _FUNCTIONS[name]
+    def _differentiate(self, name: Called, arguments: list[tuple[Any, dict[str, Any]]]) -> tuple[Any, dict[str, Any]]:
+        function = _function(name)
         inner, outer = self._angle_factors(function)
         values = [np.asarray(value) * inner for value, _ in arguments]
         total: dict[str, Any] = {}
@@ -286,17 +330,21 @@ class Expression:
                 total[variable] = total.get(variable, 0.0) + seed * partial * inner * outer
         return function.value(*values) * outer, total
 
-    def _angle_factors(self, function: _Function) -> tuple[float, float]:
+    def _angle_factors(self, function: _Function | Tabulated) -> tuple[float, float]:
         inner = self.angle_unit if function.angles == "takes" else 1.0
         outer = 1.0 / self.angle_unit if function.angles == "gives" else 1.0
         return inner, outer
 
 
-def _constant_step(value: float) -> tuple[_Step, ...]:
+def _function(called: Called) -> _Function | Tabulated:
+    return called if isinstance(called, Tabulated) else _FUNCTIONS[called]
+
+
+def _constant_step(value: float) -> tuple[Step, ...]:
     return (("constant", value),)
 
 
-def _call_steps(function: str, arguments: list[tuple[_Step, ...]]) -> tuple[_Step, ...]:
+def _call_steps(function: Called, arguments: list[tuple[Step, ...]]) -> tuple[Step, ...]:
     """The program of a call from those of its arguments."""
     return (*chain.from_iterable(arguments), ("call", function))
 
@@ -323,12 +371,12 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.program: list[_Step] = []
+        self.program: list[Step] = []
         self.depth = 0
         self.tokens = self._tokenize(text)
         self.position = 0
 
-    def parse(self) -> tuple[_Step, ...]:
+    def parse(self) -> tuple[Step, ...]:
         if len(self.tokens) == 1:
             raise ExpressionError("an empty text where a number is expected")
         self._operand_chain(0)

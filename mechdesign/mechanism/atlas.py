@@ -96,7 +96,7 @@ class Atlas:
             given = [np.array([origin.real]), np.array([origin.imag]), *map(np.asarray, values)]
             first = plan.solve(given, limits=False)
             start = plan.start(first)
-            grown = Atlas(plan, tuple(values), np.array(start.signs).reshape(-1, 1), origin)
+            grown = Atlas(plan, tuple(values), table_of(start.signs, (1,)), origin)
             return grown, table_of(start.unknowns, (1,))[:, np.flatnonzero(first.valid)]
 
         atlas, table = begun(held)

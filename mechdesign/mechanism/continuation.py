@@ -61,7 +61,7 @@ Solver = Callable[[Sequence[Value], Mapping[str, Value], Floats, int, Floats], t
 
 def table_of(unknowns: Sequence[Value], shape: tuple[int, ...]) -> Floats:
     """Unknowns of all groups, one a row."""
-    return np.stack([np.broadcast_to(value, shape) for value in unknowns])
+    return np.array([np.broadcast_to(value, shape) for value in unknowns]).reshape(len(unknowns), *shape)
 
 
 def angle_rows(structure: Structure) -> Flags:
@@ -69,7 +69,7 @@ def angle_rows(structure: Structure) -> Flags:
     flags = [
         np.arange(rows.stop - rows.start) < len(structure.groups[k].angles) for k, rows in structure.unknowns.items()
     ]
-    return np.concatenate(flags)[:, None]
+    return np.concatenate([np.empty(0, dtype=bool), *flags])[:, None]
 
 
 def scale_of(structure: Structure, size: float, table: Floats) -> Floats:
@@ -114,7 +114,7 @@ def follow(
 
     def planned(slope: Floats, table: Floats) -> Floats:
         """Step over which the unknowns change by `PLANNED`."""
-        speed = (np.abs(slope) / scale_of(structure, size, table)).max(axis=0)
+        speed = (np.abs(slope) / scale_of(structure, size, table)).max(axis=0, initial=0.0)
         with np.errstate(divide="ignore"):
             return np.asarray(np.minimum(1.0, PLANNED / speed))
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from mechdesign.errors import MechanismError, suggestion
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import TURN
 from mechdesign.mechanism.graph import GROUND, Graph
-from mechdesign.mechanism.model import MEASURED, Description, Drive, Measure, Quantity
+from mechdesign.mechanism.model import MEASURED, Coupling, Description, Drive, Measure, Quantity
 
 Kind = Literal["x", "y", "angle", "slide", "distance", "expression", "parameter"]
 
@@ -40,10 +40,32 @@ class Coordinate:
     turn: float = 0.0
 
     @property
+    def linear(self) -> bool:
+        """Whether an expression is linear in angles and slides, whatever its parameters."""
+        if self.expression is None or any(part.kind not in ("angle", "slide", "parameter") for part in self.parts):
+            return False
+        unit = self.expression.angle_unit
+        values = {
+            part.name: 1.0 if part.kind == "parameter" else Expression(part.name, (("name", part.name),), unit)
+            for part in self.parts
+        }
+        return self.expression.substituted(values).is_linear()
+
+    @property
     def ends(self) -> tuple[tuple[str, int], ...]:
         """Link and node of each point that the coordinate or a part of it is measured at."""
         nodes = {"x": (self.node,), "y": (self.node,), "distance": (self.node, self.other)}.get(self.kind, ())
         return (*zip(self.links, nodes, strict=False), *(end for part in self.parts for end in part.ends))
+
+
+@dataclass(frozen=True)
+class Coupled:
+    """A coupling: coordinate `follower` has the value of `function`, so that `gap`, their difference, is zero."""
+
+    name: str
+    follower: Coordinate
+    function: Coordinate
+    gap: Coordinate
 
 
 def all_names(description: Description, graph: Graph) -> tuple[str, ...]:
@@ -102,14 +124,36 @@ def _drive(name: str, drive: Drive, graph: Graph) -> Coordinate:
 
 def _measure(name: str, measure: Measure, description: Description, graph: Graph) -> Coordinate:
     if measure.kind == "expression" and measure.expression is not None:
-        parts = tuple(
-            Coordinate(part, "parameter", "none")
-            if MEASURED + part in description.places
-            else resolve(part, description, graph)
-            for part in sorted(measure.expression.names)
-        )
-        return _expression(name, measure.expression, {part.name: part for part in parts})
+        return _expression(name, measure.expression, _parts(measure.expression, description, graph))
     return between(name, measure.kind, measure.items or ("", ""), graph)
+
+
+def coupled(coupling: Coupling, description: Description, graph: Graph) -> Coupled:
+    """Coordinates of a coupling; its function and its gap have the unit of the coordinate that follows."""
+    follower = resolve(coupling.sets, description, graph)
+    parts = _parts(coupling.of, description, graph)
+    gap = Expression(
+        coupling.of.text, (("name", follower.name), *coupling.of.program, ("call", "-")), coupling.of.angle_unit
+    )
+    function, gap_of = (
+        replace(_expression(coupling.name, expression, parts | own), quantity=follower.quantity)
+        for expression, own in ((coupling.of, {}), (gap, {follower.name: follower}))
+    )
+    return Coupled(coupling.name, follower, function, gap_of)
+
+
+def _parts(expression: Expression, description: Description, graph: Graph) -> dict[str, Coordinate]:
+    """Coordinates and parameters of an expression by name."""
+    parts: dict[str, Coordinate] = {}
+    for part in sorted(expression.names):
+        own = description.places.get(part)
+        if MEASURED + part in description.places:
+            parts[part] = Coordinate(part, "parameter", "none")
+        elif own is not None and own.in_coupling:
+            parts[part] = Coordinate(part, "parameter", "angle" if own.quantity == "angle" else "none")
+        else:
+            parts[part] = resolve(part, description, graph)
+    return parts
 
 
 def _angle(name: str, body: str, reference: str = GROUND) -> Coordinate:

@@ -20,6 +20,7 @@ from mechdesign.mechanism.graph import Graph, build_graph
 from mechdesign.mechanism.model import Description, Limit, Term
 from mechdesign.mechanism.rigidity import Equations
 from mechdesign.mechanism.sketch import Sketch, locate
+from mechdesign.mechanism.wheels import Mesh, meshes
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,19 @@ class Core:
         self.graph: Graph = build_graph(description)
         self.geometry = Geometry(self.graph, description.places)
         self.nominal: dict[str, float] = {name: place.nominal for name, place in description.places.items()}
+        self.couplings = tuple(names.coupled(c, description, self.graph) for c in description.couplings.values())
         self.sketch: Sketch = locate(description, self.graph, self.geometry)
         self.bounds = tuple(self._bound(limit, k) for k, limit in enumerate(description.limits))
+
+    @cached_property
+    def meshes(self) -> list[Mesh]:
+        """Wheels that make its couplings."""
+        return meshes(self.description, self.graph, self.couplings, self.sketch_configuration)
+
+    @property
+    def pressing(self) -> list[Mesh]:
+        """Those whose forces are known."""
+        return [mesh for mesh in self.meshes if mesh.presses]
 
     @cached_property
     def size(self) -> float:
@@ -122,7 +134,7 @@ class Core:
     @property
     def equations(self) -> Equations:
         """The equations of all edges, from which diagnosis finds what is wrong with a mechanism."""
-        return Equations(self.graph, self.geometry, self.size or 1.0)
+        return Equations(self.graph, self.geometry, self.size or 1.0, tuple(c.gap for c in self.couplings))
 
     def coordinate(self, name: str) -> Coordinate:
         """Look a coordinate up by name.

@@ -10,12 +10,22 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.coordinates import Coordinate, Coupled
 from mechdesign.mechanism.graph import Edge, Graph
-from mechdesign.mechanism.structure import Form, Group, Loop, Structure, Tie, Variable, variables_of
+from mechdesign.mechanism.structure import (
+    Form,
+    Group,
+    Loop,
+    Structure,
+    Tie,
+    Variable,
+    sliding_by,
+    turning_with,
+    variables_of,
+)
 from mechdesign.numerics.graphs import components, perfect_matching
 
 TWICE_AND_FREE = "the given coordinates fix one part of the mechanism twice and leave another free"
@@ -52,8 +62,13 @@ class _Ties:
         self.parent[a.root] = Tie(b.root, b.given + step.given + back.given, b.offsets + step.offsets + back.offsets)
 
 
-def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
+def compile_structure(
+    graph: Graph, given: Sequence[Coordinate], couplings: Sequence[Coupled] = (), implicit: Collection[int] = ()
+) -> Structure:
     """Decompose a graph for given coordinates.
+
+    A coupling whose coordinates do not follow before the one that it sets is an equation among others; so are those of
+    the values `implicit`.
 
     Raises
     ------
@@ -66,6 +81,7 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
     # Index among the given coordinates of each variable that is given.
     numbers: dict[Variable, int] = {}
     expressions: dict[int, Coordinate] = {}
+    followers = set[int]()
     for k, coordinate in enumerate(given):
         if coordinate.kind == "angle":
             frame, reference = graph.bodies[coordinate.body][0], graph.bodies[coordinate.reference][0]
@@ -83,20 +99,47 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
             edges.append(Edge(coordinate.node, coordinate.other, frame))
         else:
             expressions[k] = coordinate
+    functions: list[Coordinate] = []
+    slides: dict[int, int] = {}
+    for k, coupling in enumerate(couplings, len(given)):
+        follower = coupling.follower
+        sets = k not in implicit and _sets(graph, follower, angles, numbers, k)
+        if sets and follower.kind == "slide":
+            numbers["slide", follower.slide] = slides[follower.slide] = k
+        functions.append(coupling.function if sets else coupling.gap)
+        expressions[k] = functions[-1]
+        if sets:
+            followers.add(k)
     ties = [angles.find(k) for k in range(len(angles.parent))]
-    variables, rows = _equations(graph, edges, ties, numbers, expressions.values())
+    variables, rows = _equations(graph, edges, ties, numbers, expressions, slides, followers)
     matched = perfect_matching(rows, len(variables))
     if matched is None:
         raise Undetermined(TWICE_AND_FREE)
     arcs = _dependence(rows, matched, variables, len(edges))
     parts = components(arcs, len(rows))
     part_of = {row: k for k, members in enumerate(parts) for row in members}
+    row_of = {k: 2 * len(edges) + number for number, k in enumerate(expressions)}
+    late = {
+        index
+        for row, (kind, index) in enumerate(variables[column] for column in matched)
+        if kind == "value" and parts[part_of[row]] != [row_of[index]]
+    }
+    # A link that is rigid with the one that follows, or turns against it by a given angle, is not known before it.
+    late |= {k for k in followers if ("value", k) in variables_of(expressions[k], graph, ties, slides)}
+    if late:
+        return compile_structure(graph, given, couplings, {*implicit, *late})
     groups, chains = [], list[frozenset[int]]()
     for k, members in enumerate(parts):
-        own = [list(expressions)[row - 2 * len(edges)] for row in members if row >= 2 * len(edges)]
+        own = [k for k, row in row_of.items() if row in members]
         inner = sorted({row // 2 for row in members if row < 2 * len(edges)})
         unknowns = [variables[matched[row]] for row in members]
-        groups.append(_group(edges, ties, inner, unknowns, numbers, own))
+        if unknowns == [("value", k) for k in own]:
+            groups.append(Group("coupled", (), (), (), (), tuple(own)))
+        else:
+            group = _group(edges, ties, inner, unknowns, numbers, own)
+            alone = not inner and not group.bases and group.unknowns == len(own) and own[0] >= len(given)
+            linear = alone and _linear(graph, [couplings[k - len(given)].gap for k in own], ties, slides)
+            groups.append(replace(group, form="linear") if linear else group)
         before = {part_of[other] for row, other in arcs if part_of[row] == k} - {k}
         chains.append(frozenset([k]).union(*(chains[other] for other in before)))
     return Structure(
@@ -105,25 +148,61 @@ def compile_structure(graph: Graph, given: Sequence[Coordinate]) -> Structure:
         tuple((node, k, numbers["y", node]) for (kind, node), k in numbers.items()
               if kind == "x" and ("y", node) in numbers),
         tuple(spans), {variables[column]: part_of[row] for row, column in enumerate(matched)}, tuple(chains),
+        tuple(functions),
     )  # fmt: skip
+
+
+def _sets(
+    graph: Graph, follower: Coordinate, angles: _Ties, numbers: Mapping[Variable, int], k: int
+) -> bool:  # fmt: skip
+    """Whether value `k` can set the coordinate that follows: an angle, which it then ties, or a slide."""
+    if follower.kind == "slide":
+        return ("slide", follower.slide) not in numbers
+    if follower.kind != "angle":
+        return False
+    frame, reference = graph.bodies[follower.body][0], graph.bodies[follower.reference][0]
+    if angles.find(frame).root == angles.find(reference).root:
+        return False
+    angles.join(frame, reference, Tie(reference, ((1, k),), ((1, follower.reference), (-1, follower.body))))
+    return True
+
+
+def _linear(graph: Graph, gaps: Sequence[Coordinate], ties: Sequence[Tie], slides: Mapping[int, int]) -> bool:
+    """Whether conditions are linear in unknown angles and slides, each angle's turns known from one of its bodies."""
+    parts = {part for gap in gaps for part in gap.parts if part.kind == "angle"}
+    roots = [
+        root for part in parts for kind, root in variables_of(part, graph, ties, slides) if kind == "angle" and root
+    ]
+    return all(gap.linear for gap in gaps) and len(roots) == len({*roots})
 
 
 def _equations(
     graph: Graph, edges: Sequence[Edge], ties: Sequence[Tie], given: Mapping[Variable, int],
-    expressions: Collection[Coordinate],
+    expressions: Mapping[int, Coordinate], slides: Mapping[int, int], followers: Collection[int],
 ) -> tuple[list[Variable], list[list[int]]]:  # fmt: skip
-    """The unknown variables, and by equation the numbers of those in it: x and y of each edge, then `expressions`."""
+    """The unknown variables, and by equation the numbers of those in it: x and y of each edge, then `expressions`.
+
+    `slides` have the values that they are coupled to; the values of `followers` are unknown.
+    """
     variables: list[Variable] = [("angle", root) for root in sorted({tie.root for tie in ties} - {0})]
     variables += [("slide", slide) for slide in range(len(graph.slides))]
     variables += [(axis, node) for node in range(1, len(graph.nodes)) for axis in ("x", "y")]
     variables = [variable for variable in variables if variable not in given]
+    variables += [("value", k) for k in sorted(followers)]
     number = {variable: k for k, variable in enumerate(variables)}
+
+    def sliding(edge: Edge) -> list[Variable]:
+        return [] if edge.slide is None else [sliding_by(edge.slide, slides)]
+
     equations: list[list[Hashable]] = [
-        [("angle", ties[edge.frame].root), ("slide", edge.slide), (axis, edge.tail), (axis, edge.head)]
+        [*turning_with(ties[edge.frame]), *sliding(edge), (axis, edge.tail), (axis, edge.head)]
         for edge in edges
         for axis in ("x", "y")
     ]
-    equations += [[*variables_of(expression, graph, ties)] for expression in expressions]
+    equations += [
+        [*([("value", k)] if k in followers else []), *variables_of(expression, graph, ties, slides)]
+        for k, expression in expressions.items()
+    ]
     if len(equations) != len(variables):
         lacking = len(variables) - len(equations)
         few = "few" if lacking > 0 else "many"

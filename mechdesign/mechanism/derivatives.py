@@ -11,25 +11,28 @@ a time derivative and x_z a derivative with respect to a dimension:
     e''_z rest = (s'' d_z + 2 i theta'_z s' d + 2 i theta' m'_z - 2 theta' theta'_z m + (i theta'' - theta'^2) m_z
                  + i theta_z (m'' + 2 i theta' m' + (i theta'' - theta'^2) m)) U
 
+A coupling q = f(p) is one equation more: q' = f_p p', and what else its derivatives have is a rest as well.
+
 They are always computed in the Assur groups of the drives, whichever coordinates the configuration was solved from.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from mechdesign.errors import MechanismError
 from mechdesign.mechanism.algebra import Either, Value, Vector, added, cross, norm2, plus, quiet, times, vector
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
-from mechdesign.mechanism.loops import Loops, gap_of, nothing, rows_of, tied, walk
-from mechdesign.mechanism.outputs import Rates, first
+from mechdesign.mechanism.loops import Loops, base_columns, gap_of, nothing, rows_of, tied, walk
+from mechdesign.mechanism.outputs import Rates, acceleration_sensitivity, first, second
 from mechdesign.mechanism.solve import solve_linear
 from mechdesign.mechanism.structure import Group, Structure
 from mechdesign.numerics.arrays import Floats
@@ -39,6 +42,8 @@ from mechdesign.numerics.arrays import Floats
 STALLED = 1e-6
 
 Entries = Sequence[Sequence[Value]]
+# Derivative of a coordinate at configurations, from the derivatives of positions that are solved so far.
+Derived = Callable[[Configuration, Coordinate, Rates], Value]
 
 
 class Linearization(Loops):
@@ -53,6 +58,7 @@ class Linearization(Loops):
         self.geometry = geometry
         self.configuration = configuration
         self._columns: dict[int, list[list[Vector]]] = {}
+        self._conditions: dict[int, list[list[Value]]] = {}
         self._scales: dict[int, Value] = {}
         self._edges: dict[int, Vector] = {}
 
@@ -62,10 +68,22 @@ class Linearization(Loops):
             self._edges[k] = super().edge(k)
         return self._edges[k]
 
+    def pose(self) -> Configuration:
+        """The configuration."""
+        return self.configuration
+
+    def rows(self, index: int, group: Group) -> list[list[Value]]:
+        """Matrix of a group's equations: of its loops, x and y, then of its conditions."""
+        if index not in self._conditions:
+            self._conditions[index] = self.condition_rows(group) if group.conditions else []
+        return rows_of(self.loop_columns(index, group)) + self._conditions[index]
+
     def loop_columns(self, index: int, group: Group) -> list[list[Vector]]:
         """Per loop of a group, the derivatives of its closure with respect to the group's unknowns."""
         if index not in self._columns:
-            self._columns[index] = [self.columns(group, loop.edges)[1] for loop in group.loops]
+            self._columns[index] = [
+                self.columns(group, loop.edges)[1] + base_columns(group, loop) for loop in group.loops
+            ]
         return self._columns[index]
 
     @cached_property
@@ -76,37 +94,38 @@ class Linearization(Loops):
         The determinant of its loop equations over the product of the lengths of its columns; for two links that meet
         it is the sine of the angle between them. It changes its sign where the motion passes a forward singularity.
         """
-        groups = [(k, group) for k, group in enumerate(self.structure.groups) if group.form != "place"]
+        groups = [(k, group) for k, group in enumerate(self.structure.groups) if group.solved]
         signed: dict[int, Value] = {}
         for (index, group), determinant in zip(groups, determinants(self), strict=True):
-            lines = self.loop_columns(index, group)
-            sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(len(lines[0]))]
+            lines, count = self.loop_columns(index, group), group.unknowns
+            sizes = [sum(norm2(np.asarray(line[j])) for line in lines) for j in range(count)]
+            for row in self.rows(index, group)[2 * len(lines) :]:
+                sizes = [size + value * value for size, value in zip(sizes, row, strict=True)]
             signed[index] = determinant / np.sqrt(math.prod(sizes))
         return signed
 
-    def _solve_group(self, index: int, group: Group, right: list[Vector]) -> list[Value]:
-        lines = self.loop_columns(index, group)
-        if len(lines) > 1:
+    def _solve_group(self, index: int, group: Group, right: list[Vector], gaps: list[Value]) -> list[Value]:
+        if not group.dyad:
             sides = [part for value in right for part in (-value.real, -value.imag)]
-            return solve_linear(rows_of(lines), sides)[0]
-        a, b = lines[0]
+            return solve_linear(self.rows(index, group), [*sides, *(-1.0 * gap for gap in gaps)])[0]
+        ((a, b),) = self.loop_columns(index, group)
         scale = self._scale(index, a, b)
         return [cross(right[0], b) * scale, cross(a, right[0]) * scale]
 
-    def hold_group(self, index: int, group: Group, moving: Sequence[Value]) -> list[Vector]:
-        """Forces that hold a group's loops closed against what would move its angles and slides, one a loop.
+    def hold_group(self, index: int, group: Group, moving: Sequence[Value]) -> tuple[list[Vector], list[Value]]:
+        """Forces that hold a group's loops closed against what would move its unknowns, and efforts of its conditions.
 
-        They solve the transposed equations, dot(column, force) = -moving.
+        There is one of each loop, and one of each condition. They solve the transposed equations, matrix^T f = -moving.
         """
-        lines = self.loop_columns(index, group)
-        if len(lines) > 1:
-            sides = [-value for value in moving]
-            parts = solve_linear(list(zip(*rows_of(lines), strict=True)), sides)[0]
-            return [vector(parts[k], parts[k + 1]) for k in range(0, len(parts), 2)]
-        a, b = lines[0]
+        if not group.dyad:
+            sides = [-1.0 * value for value in moving]
+            parts = solve_linear(list(zip(*self.rows(index, group), strict=True)), sides)[0]
+            count = 2 * len(group.loops)
+            return [vector(parts[k], parts[k + 1]) for k in range(0, count, 2)], parts[count:]
+        ((a, b),) = self.loop_columns(index, group)
         p, q = (value * self._scale(index, a, b) for value in moving)
         along = q * a - p * b
-        return [vector(-along.imag, along.real)]
+        return [vector(-along.imag, along.real)], []
 
     def _scale(self, index: int, a: Vector, b: Vector) -> Value:
         if index not in self._scales:
@@ -115,36 +134,59 @@ class Linearization(Loops):
 
     @quiet
     def _solve(
-        self, given: Sequence[Value], rest: Sequence[Vector], offsets: Mapping[str, Value] | None = None
+        self, given: Sequence[Value], rest: Sequence[Vector], rates: Rates | None = None, derived: Derived = first
     ) -> Rates:
-        """Derivatives of all positions from those of drives and body offsets, and the `rest` of each edge."""
-        structure, offsets = self.structure, offsets or {}
-        angles = [tied(tie, given, offsets) for tie in structure.ties]
+        """Derivatives of all positions from those of drives, and the `rest` of each edge.
+
+        Offsets of bodies and parameters have those of `rates`. `derived` gives the derivative of a coordinate from the
+        derivatives of the positions that it follows from.
+        """
+        structure = self.structure
+        offsets, parameters = (rates.offsets, rates.parameters) if rates is not None else ({}, {})
+        values = [*given, *(0.0 for _ in structure.numbers)]
+        angles = [tied(tie, values, offsets) for tie in structure.ties]
         slides: list[Value] = [0.0] * len(self.slides)
         for slide, k in structure.known_slides:
-            slides[slide] = given[k]
+            slides[slide] = values[k]
         nodes: list[Any] = [0.0, *[None] * (len(self.nodes) - 1)]
+        so_far = Rates(nodes, angles, slides, offsets, parameters)
 
         def step(k: int) -> Vector:
             return self.change(k, angles, slides, rest[k])
 
         for index, group in enumerate(structure.groups):
-            if group.form != "place":
+            if group.form == "coupled":
+                (number,) = group.conditions
+                value = derived(self.configuration, structure.values[number], so_far)
+                for frame, tie in enumerate(structure.ties):
+                    for sign, k in tie.given:
+                        angles[frame] = plus(angles[frame], sign, value if k == number else 0.0)
+                for slide, k in structure.known_slides:
+                    slides[slide] = value if k == number else slides[slide]
+            elif group.solved:
                 right = []
                 for loop in group.loops:
                     total = gap_of(loop, nodes)
                     for k, sign in loop.edges:
                         total = plus(total, sign, step(k))
                     right.append(total)
-                unknowns = self._solve_group(index, group, right)
+                if group.conditions:
+                    for base in group.bases:
+                        nodes[base] = 0.0
+                    walk(structure.edges, group.tree, nodes, step)
+                gaps = [derived(self.configuration, structure.values[k], so_far) for k in group.conditions]
+                unknowns = self._solve_group(index, group, right, gaps)
                 for root, unknown in zip(group.angles, unknowns, strict=False):
                     for frame, tie in enumerate(structure.ties):
                         if tie.root == root:
                             angles[frame] = plus(angles[frame], 1, unknown)
-                for slide, unknown in zip(group.slides, unknowns[len(group.angles) :], strict=True):
+                rest_of = iter(unknowns[len(group.angles) :])
+                for slide, unknown in zip(group.slides, rest_of, strict=False):
                     slides[slide] = unknown
+                for base, x, y in zip(group.bases, rest_of, rest_of, strict=False):
+                    nodes[base] = vector(x, y)
             walk(structure.edges, group.tree, nodes, step)
-        return Rates(nodes, angles, slides, offsets)
+        return so_far
 
     def velocity(self, rates: Sequence[Value]) -> Rates:
         """Velocities for given drive rates (radians and lengths per time), or derivatives along any change of them."""
@@ -168,7 +210,9 @@ class Linearization(Loops):
                 if edge.slide is not None:
                     total = total + self.direction(k) * (2j * omega * velocity.slides[edge.slide])
             rest.append(total)
-        return self._solve(accelerations, rest)
+        return self._solve(
+            accelerations, rest, derived=lambda pose, c, rates: second(pose, c, velocity, velocity, rates)
+        )
 
     @quiet
     def sensitivity(self, places: Sequence[str]) -> Rates:
@@ -183,13 +227,26 @@ class Linearization(Loops):
             name: np.array([float(place == own) for place in places]).reshape(-1, *axes)
             for name, own in self.geometry.measured.items()
         }
-        return replace(self._solve(given, rest, offsets), parameters=parameters)
+        return self._solve(given, rest, Rates([], [], [], offsets, parameters))
 
     @quiet
     def rate_sensitivity(
         self, places: Sequence[str], position: Rates, velocity: Rates, acceleration: Rates
     ) -> tuple[Rates, Rates]:
-        """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`."""
+        """Derivatives of velocities and accelerations with respect to dimensions; `position` from `sensitivity`.
+
+        Raises
+        ------
+        MechanismError
+            If a coupling is not linear in angles and slides.
+        """
+        bent = next((function.name for function in self.structure.functions if not function.linear), None)
+        if bent is not None:
+            raise MechanismError(
+                f"the errors of velocities and accelerations are not available analytically with coupling '{bent}', "
+                "which is not linear in angles and slides; use monte_carlo",
+                f"mechanism.couplings.{bent}",
+            )
         _, explicit, _ = self._explicit(places)
         none, edges = [0.0] * len(self.structure.given), self.structure.edges
         s, s1, s2, s_z = map(self._along, (self.slides, velocity.slides, acceleration.slides, position.slides))
@@ -202,7 +259,7 @@ class Linearization(Loops):
             arms.append((m, m_z, m1, d, d_z))
             here = added(1j * omega * m_z, s1[k] * d_z, 1j * turn_z * added(m1, 1j * omega * m))
             rest.append(self.turned(here, edge.frame))
-        velocity_z = self._solve(none, rest)
+        velocity_z = self._solve(none, rest, derived=lambda pose, c, rates: second(pose, c, velocity, position, rates))
         s1_z = self._along(velocity_z.slides)
         for k, edge in enumerate(edges):
             m, m_z, m1, d, d_z = arms[k]
@@ -214,7 +271,12 @@ class Linearization(Loops):
                 1j * turn_z * added(s2[k] * d, 2j * omega * m1, bend * m),
             )  # fmt: skip
             rest[k] = self.turned(here, edge.frame)
-        return velocity_z, self._solve(none, rest)
+        return velocity_z, self._solve(
+            none, rest,
+            derived=lambda pose, c, rates: acceleration_sensitivity(
+                pose, c, velocity, acceleration, position, velocity_z, rates
+            ),
+        )  # fmt: skip
 
     @quiet
     def column_sensitivity(self, group: Group, places: Sequence[str], position: Rates) -> list[list[Vector]]:
@@ -272,10 +334,13 @@ def determinants(linearization: Linearization) -> list[Value]:
     """Per group of the drives' structure, the determinant of its loop equations; zero at a forward singularity."""
     values = []
     for index, group in enumerate(linearization.structure.groups):
-        if group.form == "place":
+        if not group.solved:
             continue
-        lines = linearization.loop_columns(index, group)
-        values.append(cross(*lines[0]) if len(lines) == 1 else solve_linear(rows_of(lines), [0.0] * 2 * len(lines))[1])
+        if group.dyad:
+            values.append(cross(*linearization.loop_columns(index, group)[0]))
+        else:
+            rows = linearization.rows(index, group)
+            values.append(solve_linear(rows, [0.0] * len(rows))[1])
     return values
 
 

@@ -47,7 +47,7 @@ def groups_in_words(mechanism: Mechanism) -> list[str]:
     """The links that the drives place directly, and the groups in the order of their solution."""
     description, graph, plan = mechanism.description, mechanism.graph, mechanism.forward
     placed = placed_before(graph, plan.structure)
-    solved = [k for k, group in enumerate(plan.structure.groups) if group.form != "place"]
+    solved = [k for k, group in enumerate(plan.structure.groups) if group.solved]
     at_once = placed[solved[0]] if solved else placed[-1]
     lines = []
     links = [body for body in graph.bodies if body in at_once and body != GROUND and not body.endswith(":rod")]
@@ -83,6 +83,9 @@ def describe(mechanism: Mechanism) -> str:
     lines.append(f"branch: {description.branch}")
     lines += [f"measure: {_measure(measure)}" for measure in description.measures.values()]
     lines += [f"limit: {_limit(mechanism, limit)}" for limit in description.limits]
+    lines += [
+        f"coupling: {name} ({coupling.sets} = {coupling.of.text})" for name, coupling in description.couplings.items()
+    ]
     lines += [f"spring: {name} ({', '.join(spring.between)})" for name, spring in description.springs.items()]
     return "\n".join([*lines, *(f"warning: {doubt}" for doubt in sketch_doubts(mechanism))])
 
@@ -257,6 +260,9 @@ def group_in_words(description: Description, graph: Graph, plan: Plan, index: in
         loops = f"{len(group.loops)} loop{'s' if len(group.loops) != 1 else ''}"
         name = f"group of {loops} without a closed form{f' at {points}' if points else ''}, by Newton's method"
         return f"{name}: {', '.join(unknowns)}"
+    if group.form == "linear":
+        names = [structure.values[k].name for k in group.conditions]
+        return f"coupling{'s' if len(names) > 1 else ''} {', '.join(names)}: {', '.join(unknowns)}"
     chain = chain_of(description, graph, structure, group, placed)
     name = f"{chain.letters} {'dyad' if len(chain.letters) == 3 else 'loop'} {'-'.join(chain.links)}"
     name += f" at {', '.join(chain.pins)}" if chain.pins else ""

@@ -216,9 +216,10 @@ def _twice_and_free(equations: Equations, given: Sequence[Coordinate], driven: b
     if not np.isfinite(jacobian).all():
         return ""
     edges, used = doubled(equations, jacobian)
-    names = [coordinate.name for coordinate, says in zip(given, used, strict=True) if says]
+    conditions = [*equations.couplings, *given]
+    names = [coordinate.name for coordinate, says in zip(conditions, used, strict=True) if says]
     links = owners_of(graph, edges)
-    for coordinate, says in zip(given, used, strict=True):
+    for coordinate, says in zip(conditions, used, strict=True):
         if says and coordinate.kind == "angle" and coordinate.body not in links:
             links.append(coordinate.body)
     parts = []
@@ -253,7 +254,7 @@ def _rigid(equations: Equations, count: int, drives: int) -> str:
         except Undetermined:
             groups = ()
         for group in groups:
-            if group.form != "place":
+            if group.solved:
                 loop = _parts(graph, [GROUND, *owners_of(graph, group.edges)])
                 return f"A rigid loop: {loop}; leave one of them out, or divide one by a joint"
     edges, _ = doubled(equations, equations.generic())

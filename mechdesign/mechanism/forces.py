@@ -84,6 +84,14 @@ class Forces:
         between: Vector = other - one
         return between
 
+    def plus(self, other: Forces) -> Forces:
+        """The sum of two systems of forces."""
+        both = Forces(self.configuration)
+        both.nodes = [plus(one, 1, more) for one, more in zip(self.nodes, other.nodes, strict=True)]
+        for part in (*self.parts, *other.parts):
+            both.on_body(*part)
+        return both
+
     @property
     def total(self) -> tuple[Vector, Value]:
         """Sum of all forces, and of their moments about the origin."""

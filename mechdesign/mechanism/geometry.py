@@ -110,8 +110,12 @@ class Geometry:
 
     @cached_property
     def measured(self) -> Mapping[str, str]:
-        """Names of the parameters in measures, and the place of each."""
-        return {name.removeprefix(MEASURED): name for name in self.places if name.startswith(MEASURED)}
+        """Names of the parameters in measures and couplings, and the place of each."""
+        return {
+            name.removeprefix(MEASURED): name
+            for name, place in self.places.items()
+            if name.startswith(MEASURED) or place.in_coupling
+        }
 
     @cached_property
     def dependencies(self) -> tuple[frozenset[str], ...]:

@@ -13,15 +13,16 @@ derivatives, rank and sketch all use these equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Self
 
 import numpy as np
 
-from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, plus, rotation, vector
+from mechdesign.mechanism.algebra import Value, Vector, angle_of, dot, nearest, plus, rotation, vector
 from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.geometry import Vectors
 from mechdesign.mechanism.graph import Edge, Graph
 from mechdesign.mechanism.outputs import Rates, first
@@ -40,8 +41,9 @@ ZERO = np.float64(0.0)
 class Loops:
     """The edges of a structure while its groups are solved; positions that are not solved yet are `None`.
 
-    `given` are the values of the given coordinates, `w` the vectors of the edges and of given distances, and `ties` the
-    rotations of classes against their roots. Angles in given expressions lie within half a turn of `near`.
+    `given` are the values of the given coordinates, then those of couplings, `w` the vectors of the edges and of given
+    distances, and `ties` the rotations of classes against their roots. Angles in expressions lie within half a turn of
+    `near`.
     """
 
     graph: Graph
@@ -52,25 +54,25 @@ class Loops:
     rotations: list[Any]
     ties: list[Vector]
     slides: list[Any]
-    given: Sequence[Value] = ()
+    given: list[Value] = field(default_factory=list)
     near: Mapping[str, Value] = field(default_factory=dict)
+    whole: Mapping[str, float] = field(default_factory=dict)
+    drawn: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def start(cls, graph: Graph, structure: Structure, vectors: Vectors, given: Sequence[Value]) -> Self:
         """The positions before the first group is solved: the ground and the given coordinates."""
         nodes: list[Any] = [0.0, *[None] * (len(graph.nodes) - 1)]
         slides: list[Any] = [None] * len(graph.slides)
-        ties: list[Vector] = []
-        for tie in structure.ties:
-            turn: Vector = rotation(tied(tie, given, {})) if tie.given else 1.0
-            for sign, body in tie.offsets:
-                offset = vectors.offsets[body]
-                if not isinstance(offset, float):
-                    turn = np.multiply(turn, offset if sign > 0 else np.conj(offset))
-            ties.append(turn)
-        rotations = [turn if tie.root == 0 else None for tie, turn in zip(structure.ties, ties, strict=True)]
+        # What follows from a coupling is not a number before its group is solved, and the gap of one is zero.
+        values = [*given, *(np.nan if k in structure.coupled else 0.0 for k in structure.numbers)]
+        ties = [tie_rotation(tie, values, vectors) for tie in structure.ties]
+        rotations = [
+            turn if tie.root == 0 and structure.solved_before(tie) else None
+            for tie, turn in zip(structure.ties, ties, strict=True)
+        ]
         for slide, k in structure.known_slides:
-            slides[slide] = given[k]
+            slides[slide] = values[k]
         for k, coordinate in enumerate(structure.given):
             # An expression may contain the given x of a point whose y is still unknown, or the other way round.
             if coordinate.kind in ("x", "y"):
@@ -79,7 +81,7 @@ class Loops:
         for node, x, y in structure.known_nodes:
             nodes[node] = vector(given[x], given[y])
         w = [*vectors.w, *(given[k] for _, k in structure.spans)]
-        return cls(graph, structure, vectors, w, nodes, rotations, ties, slides, given)
+        return cls(graph, structure, vectors, w, nodes, rotations, ties, slides, values)
 
     def arm(self, k: int) -> Vector:
         """Vector w + s d of an edge in the frame of its class."""
@@ -125,6 +127,47 @@ class Loops:
             if tie.root == root:
                 self.rotations[frame] = turn if isinstance(self.ties[frame], float) else turn * self.ties[frame]
 
+    def couple(self, group: Group) -> None:
+        """Set the coordinates that follow by a coupled group's function of positions which are known."""
+        (k,) = group.conditions
+        self.count_turns(group)
+        self.given[k] = self.pose().value(self.structure.values[k])
+        for frame, tie in enumerate(self.structure.ties):
+            if any(k == number for _, number in tie.given):
+                self.ties[frame] = tie_rotation(tie, self.given, self.vectors)
+                root = self.rotations[tie.root]
+                if root is not None:
+                    self.rotations[frame] = self.ties[frame] if tie.root == 0 else root * self.ties[frame]
+        for slide, number in self.structure.known_slides:
+            if number == k:
+                self.slides[slide] = self.given[k]
+
+    def gaps(self, group: Group) -> list[Value]:
+        """What a group's conditions miss their values by."""
+        configuration = self.pose()
+        return [configuration.value(self.structure.values[k]) - self.given[k] for k in group.conditions]
+
+    def count_turns(self, group: Group) -> None:
+        """Count the turns of the angles in a group's conditions that are sums of values."""
+        if group.conditions:
+            angles = angles_of(self.structure.values[k] for k in group.conditions)
+            self.near = {**self.near, **self.counted(angles.values())}
+
+    def counted(self, angles: Iterable[Coordinate]) -> dict[str, Value]:
+        """By name, the angles that are sums of values, whose turns therefore count."""
+        counted: dict[str, Value] = {}
+        for angle in angles:
+            pair = self.structure.counted(angle, self.graph)
+            if pair is not None:
+                offsets = {
+                    body: nearest(angle_of(np.asarray(turn)), self.drawn.get(body, 0.0))
+                    for body, turn in self.vectors.offsets.items()
+                }
+                one, other = (tied(tie, self.given, offsets) for tie in pair)
+                turned = one - other + offsets[angle.body] - offsets[angle.reference]
+                counted[angle.name] = turned - self.whole.get(angle.name, 0.0)
+        return counted
+
     def put(self, group: Group, unknowns: Unknowns) -> None:
         """Set a group's angles, slides and, behind the slides, the x and y of its bases."""
         rest = iter(unknowns)
@@ -167,19 +210,19 @@ class Loops:
         errors: list[Value] = []
         for loop in group.loops:
             total, derivatives = self.columns(group, loop.edges)
-            ends = [float((base == loop.start) - (base == loop.end)) for base in group.bases]
-            rows += rows_of([derivatives + [part for end in ends for part in (end, end * 1j)]])
+            rows += rows_of([derivatives + base_columns(group, loop)])
             gap = plus(gap_of(loop, self.nodes), 1, total)
             errors += [gap.real, gap.imag]
         if group.conditions:
             self.place(group)
-            configuration = self.pose()
-            moves = self._moves(group)
-            for which in group.conditions:
-                coordinate = self.structure.given[which]
-                rows.append([first(configuration, coordinate, move) for move in moves])
-                errors.append(configuration.value(coordinate) - self.given[which])
+            rows += self.condition_rows(group)
+            errors += self.gaps(group)
         return rows, errors
+
+    def condition_rows(self, group: Group) -> list[list[Value]]:
+        """Derivatives of a group's conditions with respect to its unknowns, at positions that are placed."""
+        configuration, moves = self.pose(), self._moves(group)
+        return [[first(configuration, self.structure.values[k], move) for move in moves] for k in group.conditions]
 
     def _moves(self, group: Group) -> list[Rates]:
         """Derivatives of every position with respect to each of a group's unknowns."""
@@ -240,6 +283,22 @@ def tied(tie: Tie, given: Sequence[Value], offsets: Mapping[str, Value]) -> Valu
     for sign, body in tie.offsets:
         total = plus(total, sign, offsets.get(body, 0.0))
     return total
+
+
+def base_columns(group: Group, loop: Loop) -> list[Vector]:
+    """Derivatives of a loop's closure with respect to x and y of a group's bases."""
+    ends = [float((base == loop.start) - (base == loop.end)) for base in group.bases]
+    return [part for end in ends for part in (end, end * 1j)]
+
+
+def tie_rotation(tie: Tie, given: Sequence[Value], vectors: Vectors) -> Vector:
+    """Rotation of a class against its root."""
+    turn: Vector = rotation(tied(tie, given, {})) if tie.given else 1.0
+    for sign, body in tie.offsets:
+        offset = vectors.offsets[body]
+        if not isinstance(offset, float):
+            turn = np.multiply(turn, offset if sign > 0 else np.conj(offset))
+    return turn
 
 
 def gap_of(loop: Loop, nodes: Sequence[Vector]) -> Vector:

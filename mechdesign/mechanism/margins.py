@@ -150,7 +150,7 @@ def closures(linear: Linearization, places: Sequence[str]) -> tuple[Floats, Floa
     shape = linear.configuration.shape
     pairs: list[tuple[Value, Value]] = [(linear.slides[leg], position.slides[leg]) for leg in linear.graph.telescopic]
     for index, group in enumerate(linear.structure.groups):
-        if group.form in ("place", "two slides"):
+        if not group.solved or group.form == "two slides" or group.conditions:
             continue
         lines, changes = linear.loop_columns(index, group), linear.column_sensitivity(group, places, position)
         if group.form == "newton":

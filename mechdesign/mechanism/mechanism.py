@@ -55,12 +55,18 @@ class Mechanism(Core):
         self.drives: tuple[str, ...] = tuple(description.drives)  #: names of what is given, as many as the mobility
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
+        if self.couplings:
+            # What follows from others may be drawn roughly: assembly modes are read from where it really is.
+            drawn = self.sketch_configuration
+            nodes, rotations, slides = [*drawn.nodes], [*drawn.rotations], [*drawn.slides]
+            self.sketch = replace(self.sketch, nodes=nodes, rotations=rotations, slides=slides)
 
     @property
     def mobility(self) -> int:
         """Degrees of freedom by counting, unknowns of the vector loops less their equations."""
         graph = self.graph
-        return (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1) - 2 * len(graph.edges)
+        unknowns = (graph.classes - 1) + len(graph.slides) + 2 * (len(graph.nodes) - 1)
+        return unknowns - 2 * len(graph.edges) - len(self.couplings)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -115,7 +121,7 @@ class Mechanism(Core):
                     "poses",
                 )
             try:
-                structure = compile_structure(self.graph, coordinates)
+                structure = compile_structure(self.graph, coordinates, self.couplings)
                 check_independent(self.equations, structure)
             except Undetermined as error:
                 raise diagnosis.undetermined(
@@ -249,6 +255,7 @@ class Variant(Mechanism):
         self.sketch = original.sketch
         self.drives = original.drives
         self.bounds = original.bounds
+        self.couplings = original.couplings
         self.forward = self.plan(self.drives)
         self.sketch_configuration = self._assemble_sketch()
 

@@ -32,6 +32,7 @@ class Place:
     name: str
     nominal: float
     quantity: Quantity | Physical = "length"
+    in_coupling: bool = False  # whether the function of a coupling names it
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,23 @@ class Measure:
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """A coordinate that follows others: a gear, a rack, a belt, a cam, or electronic gearing.
+
+    `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
+    is a parameter as in a `Measure`, or a place of the coupling's own. Its `wheels` are gears, whose teeth have a
+    `pressure_angle` (radians), or pulleys of a belt with the `radius` of the one that follows.
+    """
+
+    name: str
+    sets: str
+    of: Expression
+    wheels: str = "gears"
+    pressure_angle: float = 0.0
+    radius: float = 0.0
+
+
+@dataclass(frozen=True)
 class Limit:
     """Bounds of a distance of two points, a drive, the angle between two links, or a measure."""
 
@@ -191,3 +209,4 @@ class Description:
     angle_unit: float = 1.0
     masses: Mapping[str, Mass] = field(default_factory=dict)
     springs: Mapping[str, Spring] = field(default_factory=dict)
+    couplings: Mapping[str, Coupling] = field(default_factory=dict)

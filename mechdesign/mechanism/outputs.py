@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,14 @@ from mechdesign.mechanism.coordinates import Coordinate
 
 # Step of the central difference of an expression's exact gradient, relative to its arguments' scale.
 GRADIENT_STEP = 1e-6
+
+
+class Pulls(NamedTuple):
+    """Forces at nodes, moments on bodies and forces along slides, by their indices or names."""
+
+    nodes: dict[int, Vector]
+    bodies: dict[str, Value]
+    slides: dict[int, Value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +68,35 @@ def first(configuration: Configuration, coordinate: Coordinate, rates: Rates) ->
 
 
 @quiet
+def pulled(configuration: Configuration, coordinate: Coordinate, effort: Value) -> Pulls:
+    """Forces and moments whose work on any `rates` is ``effort * first(coordinate, rates)``: the adjoint of `first`."""
+    pulls = Pulls({}, {}, {})
+    _pull(pulls, configuration, coordinate, effort)
+    return pulls
+
+
+def _pull(pulls: Pulls, configuration: Configuration, coordinate: Coordinate, effort: Value) -> None:
+    kind = coordinate.kind
+    if kind in ("x", "y", "distance"):
+        forces: list[tuple[int, Vector]] = [(coordinate.node, effort * (1.0 if kind == "x" else 1j))]
+        if kind == "distance":
+            span = _span(configuration.nodes, coordinate)
+            along = span * (effort / np.sqrt(norm2(span)))
+            forces = [(coordinate.other, along), (coordinate.node, -along)]
+        for node, force in forces:
+            pulls.nodes[node] = pulls.nodes.get(node, 0.0) + force
+    elif kind == "slide":
+        pulls.slides[coordinate.slide] = pulls.slides.get(coordinate.slide, 0.0) + effort
+    elif kind == "angle":
+        for body, moment in ((coordinate.body, effort), (coordinate.reference, -1.0 * effort)):
+            pulls.bodies[body] = pulls.bodies.get(body, 0.0) + moment
+    elif kind == "expression":
+        slopes = _gradient(coordinate, configuration.user_values(coordinate))
+        for slope, part in zip(slopes, coordinate.parts, strict=True):
+            _pull(pulls, configuration, part, effort * _radians(coordinate, _user(part, slope, coordinate)))
+
+
+@quiet
 def second(configuration: Configuration, coordinate: Coordinate, one: Rates, other: Rates, both: Rates) -> Value:
     """Second derivative of a coordinate, along `one` and `other`; `both` has those of positions.
 
@@ -92,8 +130,10 @@ def acceleration_sensitivity(
     Raises
     ------
     MechanismError
-        For a measure given by an expression.
+        For an expression that is not linear in angles and slides.
     """
+    if coordinate.linear:
+        return second(configuration, coordinate, acceleration, position_z, acceleration_z)
     if coordinate.kind == "expression":
         raise MechanismError(
             f"the acceleration error of '{coordinate.name}' is not available analytically: it is an expression; "

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechdesign.mechanism.algebra import Value, nearest, picked, quiet
+from mechdesign.mechanism.algebra import TURN, Value, angle_of, nearest, picked, quiet
 from mechdesign.mechanism.change_points import ChangePoints
 from mechdesign.mechanism.configuration import Configuration, Reason, hide, joined
 from mechdesign.mechanism.continuation import Start, follow
@@ -45,10 +45,24 @@ class Plan:
         self.structure = structure
         self.modes = tuple(modes)
         self.follows = follows and core.description.branch == "follow"
+        linear = [k for group in structure.groups if group.form == "linear" for k in group.conditions]
+        solved = angles_of(structure.values[k] for k in linear).values()
+        #: Angles of which linear couplings give the turns.
+        self.solved = tuple(angle.name for angle in solved if structure.counted(angle, core.graph) is None)
+        # Angles in given expressions and in couplings; their turns are counted on the way from the sketch, unless they
+        # follow from values.
+        inner = angles_of(c for c in structure.values if c.kind == "expression")
+        left = [
+            angle for name, angle in inner.items()
+            if name not in self.counted.union(self.solved) and structure.counted(angle, core.graph) is None
+        ]  # fmt: skip
         self.iterative = any(group.form == "newton" for group in structure.groups)
-        # Angles in given expressions; their turns are counted on the way from the sketch.
-        inner = angles_of(c for c in structure.given if c.kind == "expression")
-        self.angles = tuple(angle for name, angle in inner.items() if name not in self.counted)
+        if structure.functions and left and not self.iterative:
+            # Turns are those of a motion of the drives; in the plane of outputs they would depend on the way.
+            self.iterative = {c.name for c in structure.given} == core.description.drives.keys()
+        self.angles = tuple(left) if self.iterative or not structure.functions else ()
+        self.unfollowed = tuple(left) if not self.angles else ()
+        self.followers = tuple(coupling.follower for coupling in core.couplings)
 
     @cached_property
     def change_points(self) -> ChangePoints | None:
@@ -84,8 +98,9 @@ class Plan:
         state = State.start(self.core.graph, self.structure, vectors, given)
         state.steps, state.enough, state.beyond = steps, enough, beyond
         state.size = self.core.size if self.iterative else 1.0
+        state.whole, state.drawn = self._whole_turns, self._drawn_offsets
         state.near = {angle.name: near for angle, near in zip(self.angles, turns, strict=False)}
-        state.near |= {c.name: v for c, v in zip(self.structure.given, given, strict=True) if c.kind == "angle"}
+        state.near = {**state.near, **self._given_angles(given), **self._drawn_turns}
         return run(state, self.modes if modes is None else modes, guess)
 
     def start(self, at: Configuration | None) -> Start:
@@ -167,13 +182,13 @@ class Plan:
             return self._at_once(drives, dimensions, (min(length, count - begin),), own, begun, limits)
 
         parts: Iterable[Configuration] = map_chunks(part, range(0, count, length), jobs)
-        parts = [*parts] if self.angles else parts
+        counted = sorted({*(angle.name for angle in self.angles), *self.coupled})
+        parts = [*parts] if counted else parts
         whole = joined(parts, shape, vectors or self.core.geometry.vectors(dims), dims)
         near = {
-            angle.name: np.concatenate([np.broadcast_to(some.near[angle.name], some.shape) for some in parts]).reshape(
-                shape
-            )
-            for angle in self.angles
+            name: np.concatenate([np.broadcast_to(some.near[name], some.shape) for some in parts]).reshape(shape)
+            for name in counted
+            if all(name in some.near for some in parts)
         }
         return replace(whole, near={**self.turns(values, dims), **near}, counted=self.counted)
 
@@ -202,14 +217,45 @@ class Plan:
         if self.angles:
             near = dict(zip((angle.name for angle in self.angles), turns, strict=True))
             poses = replace(poses, near={**poses.near, **near})
+        if self.followers:
+            near = {**state.counted(self.followers), **{name: state.near[name] for name in self.solved}}
+            poses = replace(poses, near={**poses.near, **near})
         if limits:
             self.judge(poses)
         return poses
 
     def turns(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """By name, values that angles are reported within half a turn of: given angles, and the limits of drives."""
-        near = self.core.turns(dims)
-        return near | {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+        return self.core.turns(dims) | self._given_angles(given)
+
+    def _given_angles(self, given: Sequence[Value]) -> dict[str, Value]:
+        return {c.name: v for c, v in zip(self.structure.given, given, strict=False) if c.kind == "angle"}
+
+    @cached_property
+    def _drawn_offsets(self) -> dict[str, float]:
+        """Angles of bodies against their classes at the nominal dimensions."""
+        return {body: float(angle_of(np.asarray(turn))) for body, turn in self.core.geometry.nominal.offsets.items()}
+
+    @cached_property
+    def _whole_turns(self) -> dict[str, float]:
+        """Whole turns by which sums of the sketch's drives are away from the angles that the sketch shows."""
+        if not self.structure.functions:
+            return {}
+        drawn = [self.core.sketch.value(c) or 0.0 if c.kind == "angle" else 0.0 for c in self.structure.given]
+        sketch = State.start(self.core.graph, self.structure, self.core.geometry.nominal, drawn)
+        sketch.drawn = self._drawn_offsets
+        angles = angles_of((*self.structure.values, *self.followers)).values()
+        # What follows has the turns that its coupling gives it.
+        return {
+            name: TURN * float(np.round(turned / TURN))
+            for name, turned in sketch.counted(angles).items()
+            if np.isfinite(turned)
+        }
+
+    @cached_property
+    def _drawn_turns(self) -> dict[str, Value]:
+        """Angles in couplings whose turns are not counted, in the sketch."""
+        return {angle.name: self.core.sketch_configuration.value(angle) for angle in self.unfollowed}
 
     @cached_property
     def _drawn_angles(self) -> dict[str, float]:
@@ -218,6 +264,14 @@ class Plan:
     def near_sketch(self, given: Sequence[Value], dims: Mapping[str, Value]) -> dict[str, Value]:
         """The same, and for other angles the values in the sketch."""
         return self._drawn_angles | self.turns(given, dims)
+
+    @cached_property
+    def coupled(self) -> frozenset[str]:
+        """Angles that couplings count the turns of, from pose to pose the same whatever the way between them."""
+        if not self.structure.functions:
+            return frozenset()
+        known = [c for c in self.followers if self.structure.counted(c, self.core.graph) is not None]
+        return frozenset(angle.name for angle in (*self.angles, *known)).union(self.solved)
 
     @cached_property
     def counted(self) -> frozenset[str]:

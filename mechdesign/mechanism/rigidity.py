@@ -41,11 +41,15 @@ DRAWS = 50
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """The equations of all edges; unknowns are angles of classes, slides and nodes, lengths as fractions of `size`."""
+    """The equations of all edges and couplings, whose gaps are zero.
+
+    Unknowns are angles of classes, slides and nodes, lengths as fractions of `size`.
+    """
 
     graph: Graph
     geometry: Geometry
     size: float
+    couplings: tuple[Coordinate, ...] = ()
 
     @property
     def angles(self) -> int:
@@ -70,8 +74,9 @@ class Equations:
 
     def at(self, x: Floats, held: Sequence[Coordinate] = (), values: Sequence[float] = ()) -> Loops:
         """The loops at given unknowns; `values` of the held coordinates (radians or lengths) are zero if left out."""
-        structure = whole(self.graph, held)
-        loops = Loops.start(self.graph, structure, self.geometry.nominal, values or [0.0] * len(held))
+        structure = whole(self.graph, (*self.couplings, *held))
+        zeros = [0.0] * len(self.couplings)
+        loops = Loops.start(self.graph, structure, self.geometry.nominal, [*zeros, *(values or [0.0] * len(held))])
         loops.put(structure.groups[0], x * self._units)
         return loops
 
@@ -92,14 +97,14 @@ class Equations:
 
     def gaps(self, x: Floats) -> Complexes:
         """Vector by which each edge misses its head, in the study's length."""
-        return self._system(self.at(x))[0].view(np.complex128) * self.size
+        return self._system(self.at(x))[0][: 2 * len(self.graph.edges)].view(np.complex128) * self.size
 
     def jacobian(self, x: Floats, held: Sequence[Coordinate] = ()) -> Floats:
-        """Derivatives of the equations (x and y of each edge, then the held coordinates) by the unknowns."""
+        """Derivatives of the equations by the unknowns: x and y of each edge, couplings, then held coordinates."""
         return self._system(self.at(x, held))[1]
 
     def _system(self, loops: Loops) -> tuple[Floats, Floats]:
-        """Residuals of the edges and of the held coordinates, lengths as fractions of `size`, and their Jacobian."""
+        """Residuals of all equations, lengths as fractions of `size`, and their Jacobian."""
         rows, errors = loops.equations(loops.structure.groups[0])
         held = [self.size if c.quantity == "length" else 1.0 for c in loops.structure.given]
         units = np.array([self.size] * 2 * len(self.graph.edges) + held)
@@ -133,7 +138,8 @@ class Equations:
         from scipy.optimize import least_squares
 
         coordinates, values = [coordinate for coordinate, _ in held], [value for _, value in held]
-        turns = np.array([False] * 2 * len(self.graph.edges) + [c.quantity == "angle" for c in coordinates])
+        conditions = [*self.couplings, *coordinates]
+        turns = np.array([False] * 2 * len(self.graph.edges) + [c.quantity == "angle" for c in conditions])
         ahead = np.zeros((0, len(x))) if step is None else step[None] / np.linalg.norm(step)
         start = x if step is None else x + step
 
@@ -202,6 +208,7 @@ class Equations:
         gone |= {self.inner + 2 * (node - 1) + part for node in once - placed - {0} for part in (0, 1)}
         kept = [column for column in range(jacobian.shape[1]) if column not in gone]
         rows = [2 * k + part for k in left for part in (0, 1)]
+        rows += range(2 * len(every), len(jacobian))
         return int(null_space(jacobian[np.ix_(rows, kept)]).shape[1]), len(rows) - len(kept)
 
 

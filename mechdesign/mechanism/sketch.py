@@ -19,7 +19,7 @@ from mechdesign.mechanism.structure import Group, Structure, whole
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
 # Forms of groups without an assembly mode: with a single assembly, or with one that is searched for.
-_WITHOUT_MODE = ("place", "newton", "two slides")
+_WITHOUT_MODE = ("place", "coupled", "linear", "newton", "two slides")
 
 
 @dataclass
@@ -93,6 +93,8 @@ class Sketch(Loops):
         for group in (structure.groups[index] for index in structure.unknowns):
             for root in group.angles:
                 turn = self.rotations[root] if root < self.graph.classes else None
+                if turn is None and not group.loops:
+                    turn = 1.0
                 if turn is None:
                     link = next((body for body, (frame, _) in self.graph.bodies.items() if frame == root), "?")
                     message = f"the points of link '{link}' are needed as a start; add them to the sketch"

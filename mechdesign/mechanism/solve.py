@@ -24,6 +24,7 @@ from itertools import combinations
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, largest, norm2, plus, times, vector
+from mechdesign.mechanism.coordinates import angles_of
 from mechdesign.mechanism.loops import Loops, Unknowns
 from mechdesign.mechanism.structure import Group
 from mechdesign.numerics.arrays import Flags
@@ -78,6 +79,7 @@ def solve_newton(state: State, index: int, guess: Unknowns) -> None:
     A pose that has converged is not changed any more: its result does not depend on its batch.
     """
     group = state.structure.groups[index]
+    state.count_turns(group)
     unknowns: list[Value] = [np.asarray(value, dtype=float) for value in guess]
     count = len(group.angles)
     active: Flags = np.ones((), dtype=bool)
@@ -170,10 +172,31 @@ def run(state: State, modes: Sequence[Value], guess: Unknowns | None = None, beg
         if group.form == "newton":
             assert guess is not None
             solve_newton(state, index, guess[state.structure.unknowns[index]])
+        elif group.form == "coupled":
+            state.couple(group)
+        elif group.form == "linear":
+            _solve_linear_conditions(state, group)
         elif group.form != "place":
             _closed_form(state, group, mode)
         state.place(group)
     return state
+
+
+def _solve_linear_conditions(state: State, group: Group) -> None:
+    """Solve conditions that are linear in a group's unknowns, and count the turns of the angles in them."""
+    state.count_turns(group)
+    state.put(group, [0.0] * group.unknowns)
+    solution, _ = solve_linear(state.condition_rows(group), state.gaps(group))
+    unknowns = [-1.0 * value for value in solution]
+    turned = dict(zip(group.angles, unknowns, strict=False))
+    angles = angles_of(state.structure.values[k] for k in group.conditions)
+    turns = {name: state.pose().value(angle) for name, angle in angles.items() if name not in state.near}
+    for name in turns:
+        for body, sign in ((angles[name].body, 1), (angles[name].reference, -1)):
+            root = state.structure.ties[state.graph.bodies[body][0]].root
+            turns[name] = plus(turns[name], sign, turned.get(root, 0.0))
+    state.near = {**state.near, **turns}
+    state.put(group, unknowns)
 
 
 def _closed_form(state: State, group: Group, mode: Value) -> None:

@@ -15,19 +15,24 @@ closed form. What is left at the given coordinates are the efforts of the drives
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.configuration import Configuration
+from mechdesign.mechanism.coordinates import Coordinate, coupled
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, bases
 from mechdesign.mechanism.graph import GROUND, Graph, origin_of, rod_of
 from mechdesign.mechanism.loops import nothing
 from mechdesign.mechanism.model import Description, Fixed, Prismatic, Slot
+from mechdesign.mechanism.outputs import pulled
+from mechdesign.mechanism.structure import Group
+from mechdesign.mechanism.wheels import Mesh
 
 # Prefix of the pin of several links; its point follows.
 PIN = "pin:"
@@ -35,21 +40,61 @@ PIN = "pin:"
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail."""
+    """A mechanism in equilibrium: `efforts` of the drives, and the force of each edge, from its head to its tail.
+
+    `couplings` are the efforts on the gaps of couplings: what each applies to the coordinate that it sets.
+    """
 
     linear: Linearization
     forces: Forces
     efforts: list[Value]
     edges: list[Vector]
+    couplings: list[Value]
+    teeth: Mapping[str, Vector] = field(default_factory=dict)  # force on the link that follows, by coupling
 
 
 @quiet
-def balance(linear: Linearization, forces: Forces) -> Balance:
+def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) -> Balance:
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite.
+    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth.
     """
+    held = _balance(linear, forces)
+    if not meshes:
+        return held
+    # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
+    teeth = Forces(linear.configuration)
+    pressing = {mesh.coupling: engage(teeth, mesh, held.couplings[mesh.index]) for mesh in meshes}
+    return replace(_balance(linear, forces.plus(teeth)), teeth=pressing)
+
+
+def engage(teeth: Forces, mesh: Mesh, effort: Value) -> Vector:
+    """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
+
+    Teeth press each other apart by their pressure angle, a wheel inside of a ring towards the ring's axis; a belt only
+    pulls, and its pretension is not known.
+    """
+    configuration = teeth.configuration
+    radius = mesh.radii(configuration)[0]
+    if mesh.belt:
+        # Its tight part pulls.
+        place, _, along = mesh.strand(configuration, np.where(effort > 0, -1.0, 1.0))
+        force: Vector = along * np.abs(effort / radius)
+    else:
+        place, along = mesh.contact(configuration)
+        force = along * (effort if mesh.slide >= 0 else effort / radius)
+        inside = np.logical_and(mesh.slide < 0, mesh.ratio(configuration) > 1)
+        outwards = dot(1j * along, place - configuration.nodes[mesh.axes[1]]) > 0
+        apart = 1j * along * np.where(outwards != inside, 1.0, -1.0)
+        force = force + np.abs(force) * np.tan(mesh.pressure_angle) * apart
+    for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
+        teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
+    return force
+
+
+@quiet
+def _balance(linear: Linearization, forces: Forces) -> Balance:
     structure, bodies = linear.structure, linear.graph.bodies
     nodes = list(forces.nodes)
     frames: list[Value] = [0.0] * linear.graph.classes
@@ -69,40 +114,81 @@ def balance(linear: Linearization, forces: Forces) -> Balance:
         if edge.slide is not None:
             slides[edge.slide] = slides[edge.slide] + dot(linear.direction(k), force)
 
-    for index in reversed(range(len(structure.groups))):
-        group = structure.groups[index]
+    def carry(group: Group, forces: list[Vector]) -> None:
+        """Pass forces on a group's nodes on towards the nodes that it starts from."""
         for k, sign in reversed(group.tree):
             edge = structure.edges[k]
             begin, end = (edge.tail, edge.head) if sign > 0 else (edge.head, edge.tail)
-            nodes[begin] = plus(nodes[begin], 1, nodes[end])
-            transmit(k, sign * nodes[end])
-        if group.form == "place":
+            forces[begin] = plus(forces[begin], 1, forces[end])
+            transmit(k, sign * forces[end])
+
+    def along(number: int) -> Value:
+        """What acts along the coordinate of a value."""
+        total: Value = 0.0
+        for frame, tie in enumerate(structure.ties):
+            for sign, k in tie.given:
+                total = plus(total, sign, frames[frame] if k == number else 0.0)
+        for slide, k in structure.known_slides:
+            total = plus(total, 1, slides[slide] if k == number else 0.0)
+        return total
+
+    def pull(coordinate: Coordinate, effort: Value) -> list[Vector]:
+        """Add what an effort on a coordinate does to angles and slides; returns its forces at nodes."""
+        extra: list[Vector] = [0.0] * len(nodes)
+        pulls = pulled(linear.configuration, coordinate, effort)
+        for body, moment in pulls.bodies.items():
+            frames[bodies[body][0]] = frames[bodies[body][0]] + moment
+        for slide, force in pulls.slides.items():
+            slides[slide] = slides[slide] + force
+        for node, load in pulls.nodes.items():
+            extra[node] = load
+            on_pins[node] = plus(on_pins[node], 1, load)
+        return extra
+
+    couplings: dict[int, Value] = {}
+    on_pins = list(forces.nodes)
+    for index in reversed(range(len(structure.groups))):
+        group = structure.groups[index]
+        carry(group, nodes)
+        if group.form == "coupled":
+            (number,) = group.conditions
+            effort = along(number)
+            couplings[number] = -1.0 * effort
+            nodes = [
+                plus(node, 1, extra) for node, extra in zip(nodes, pull(structure.values[number], effort), strict=True)
+            ]
+        if not group.solved:
             continue
         turning: list[Value] = [0.0] * len(group.angles)
         for frame, tie in enumerate(structure.ties):
             if tie.root in group.angles:
                 place = group.angles.index(tie.root)
                 turning[place] = turning[place] + frames[frame]
-        held = linear.hold_group(index, group, [*turning, *(slides[slide] for slide in group.slides)])
+        moving = [*turning, *(slides[slide] for slide in group.slides)]
+        moving += [part for base in group.bases for part in (nodes[base].real, nodes[base].imag)]
+        held, couples = linear.hold_group(index, group, moving)
+        for number, effort in zip(group.conditions, couples, strict=True):
+            couplings[number] = effort
+            extra = pull(structure.values[number], effort)
+            carry(group, extra)
+            nodes = [plus(node, 1, force) for node, force in zip(nodes, extra, strict=True)]
         for loop, force in zip(group.loops, held, strict=True):
             nodes[loop.start] = plus(nodes[loop.start], 1, force)
             nodes[loop.end] = plus(nodes[loop.end], -1, force)
             for k, sign in loop.edges:
                 transmit(k, sign * force)
-    efforts: list[Value] = [0.0] * len(structure.given)
-    for frame, tie in enumerate(structure.ties):
-        for sign, k in tie.given:
-            efforts[k] = plus(efforts[k], -sign, frames[frame])
-    for slide, k in structure.known_slides:
-        efforts[k] = plus(efforts[k], -1, slides[slide])
-    return Balance(linear, forces, efforts, edges)
+    efforts: list[Value] = [plus(0.0, -1, along(k)) for k in range(len(structure.given))]
+    acting = replace(forces)
+    acting.nodes, acting.bodies = on_pins, forces.bodies
+    return Balance(linear, acting, efforts, edges, [couplings[k] for k in structure.numbers])
 
 
 class Contact(NamedTuple):
     """A joint between two bodies, or between a body and a pin that several share.
 
     The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
-    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge.
+    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge. Teeth
+    press each other where the pitch circles of their `mesh` touch.
     """
 
     joint: str
@@ -113,6 +199,12 @@ class Contact(NamedTuple):
     bodies: tuple[str, ...] = ()
     turns: bool = True
     slides: bool = False
+    mesh: Mesh | None = None
+
+    def place(self, configuration: Configuration) -> Vector:
+        """Where it is."""
+        place: Vector = configuration.nodes[self.node]
+        return place if self.mesh is None else self.mesh.contact(configuration)[0]
 
 
 class _Member(NamedTuple):
@@ -130,9 +222,12 @@ class Joints:
     At `loaded` nodes a force acts on the pin itself: what the bodies there bear are no opposite forces.
     """
 
-    def __init__(self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset()) -> None:
+    def __init__(
+        self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(), meshes: Sequence[Mesh] = ()
+    ) -> None:  # fmt: skip
         self.description, self.graph, self.bases = description, graph, bases(graph)
-        self.loaded = loaded
+        self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
+        self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
         #: By node at which one body alone has a point, this body: it bears what acts on the pin.
         self.sole: dict[int, str] = {}
         #: By leg, prismatic or fixed joint, the two bodies that it keeps from turning against each other.
@@ -144,7 +239,8 @@ class Joints:
             if isinstance(joint, Fixed):
                 one, other = joint.links
                 self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
-        self.contacts = tuple(self._slides()) + tuple(self._pins())
+        wheels = [Contact(mesh.coupling, *mesh.links, mesh.axes[0], (), mesh=mesh) for mesh in meshes]
+        self.contacts = (*self._slides(), *self._pins(), *wheels)
         self.order, self.open = self._tie_order()
 
     @cached_property
@@ -305,10 +401,17 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         if drive.kind == "angle":
             turn(drive.body, effort)
             turn(drive.reference, -1.0 * effort)
+    for coupling, effort in zip(joints.couplings, balance.couplings, strict=True):
+        for body, moment in pulled(linear.configuration, coupling.gap, effort).bodies.items():
+            turn(body, moment)
     for node, body in joints.sole.items():
         if not nothing(force := balance.forces.nodes[node]):
             turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))
     for contact in joints.contacts:
+        if contact.mesh is not None:
+            # What teeth do is among the forces on the bodies already.
+            forces.append(balance.teeth[contact.joint])
+            continue
         force = 0.0
         for k, sign in contact.edges:
             force = plus(force, sign, balance.edges[k])

@@ -14,13 +14,20 @@ from typing import Literal
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.graph import Edge, Graph
 
-Form = Literal["place", "two angles", "angle and fixed slide", "angle and turning slide", "two slides", "newton"]
-Variable = tuple[Literal["angle", "slide", "x", "y"], int]
+Form = Literal[
+    "place", "coupled", "linear", "two angles", "angle and fixed slide", "angle and turning slide", "two slides",
+    "newton",
+]  # fmt: skip
+# Of a ``value`` the index in `Structure.values`.
+Variable = tuple[Literal["angle", "slide", "x", "y", "value"], int]
 
 
 @dataclass(frozen=True)
 class Tie:
-    """Class `frame` turns with class `root`: theta = theta_root + sum(sign * given) + sum(sign * body offset)."""
+    """Class `frame` turns with class `root`: theta = theta_root + sum(sign * value) + sum(sign * body offset).
+
+    The values are those of `Structure.values`.
+    """
 
     root: int
     given: tuple[tuple[int, int], ...] = ()
@@ -44,9 +51,11 @@ class Loop:
 class Group:
     """Unknowns that are solved together: angles of classes (roots of ties), slides, and places of `bases`.
 
-    Their equations are `loops` between nodes that are already placed, and `conditions`: indices of given coordinates
+    Their equations are `loops` between nodes that are already placed, and `conditions`: indices of values
     that are equations of this group. The edges of `tree`, each with its sign, then place the group's nodes in order. A
-    base is the first node of a part that no loop but only conditions hold.
+    base is the first node of a part that no loop but only conditions hold. A ``coupled`` group has no equation to be
+    solved: the one condition is the value that follows from others. Of a ``linear`` one the conditions are
+    linear in the unknowns.
     """
 
     form: Form
@@ -58,6 +67,21 @@ class Group:
     bases: tuple[int, ...] = ()
 
     @property
+    def solved(self) -> bool:
+        """Whether it has equations to be solved."""
+        return self.form not in ("place", "coupled")
+
+    @property
+    def unknowns(self) -> int:
+        """Number of its unknowns."""
+        return len(self.angles) + len(self.slides) + 2 * len(self.bases)
+
+    @property
+    def dyad(self) -> bool:
+        """Whether it is one loop with two unknowns."""
+        return len(self.loops) == 1 and not self.conditions
+
+    @property
     def edges(self) -> tuple[int, ...]:
         """Edges around the loops, in order."""
         return tuple(k for loop in self.loops for k, _ in loop.edges)
@@ -65,7 +89,11 @@ class Group:
 
 @dataclass(frozen=True)
 class Structure:
-    """Groups of a graph for given coordinates, in the order in which they are solved."""
+    """Groups of a graph for given coordinates, in the order in which they are solved.
+
+    Its values are the given coordinates and behind them one of each coupling: the function that gives the coordinate
+    which follows, or where that is not known before it is needed the gap between the two, which is zero.
+    """
 
     given: tuple[Coordinate, ...]
     edges: tuple[Edge, ...]  # those of the graph, then the given distances
@@ -77,6 +105,33 @@ class Structure:
     spans: tuple[tuple[int, int], ...] = ()
     owners: Mapping[Variable, int] = field(default_factory=dict)  # group of which each variable is an unknown
     chains: tuple[frozenset[int], ...] = ()  # of each group: itself and all groups whose unknowns its equations contain
+    functions: tuple[Coordinate, ...] = ()  # of the couplings
+
+    @cached_property
+    def values(self) -> tuple[Coordinate, ...]:
+        """Given coordinates, and functions or gaps of couplings."""
+        return (*self.given, *self.functions)
+
+    @cached_property
+    def coupled(self) -> frozenset[int]:
+        """Indices of the values that follow from others in closed form."""
+        return frozenset(k for group in self.groups if group.form == "coupled" for k in group.conditions)
+
+    @property
+    def numbers(self) -> range:
+        """Indices of the couplings' values."""
+        return range(len(self.given), len(self.values))
+
+    def counted(self, angle: Coordinate, graph: Graph) -> tuple[Tie, Tie] | None:
+        """Ties of the two bodies of an angle that is a sum of values and offsets; None of one that is not."""
+        if angle.kind != "angle":
+            return None
+        one, other = (self.ties[graph.bodies[body][0]] for body in (angle.body, angle.reference))
+        return (one, other) if one.root == other.root else None
+
+    def solved_before(self, tie: Tie) -> bool:
+        """Whether a tie has no value that a group solves."""
+        return self.coupled.isdisjoint(k for _, k in tie.given)
 
     @cached_property
     def unknowns(self) -> dict[int, slice]:
@@ -84,27 +139,41 @@ class Structure:
         slices, end = {}, 0
         for index, group in enumerate(self.groups):
             if group.form == "newton":
-                begin, end = end, end + len(group.angles) + len(group.slides) + 2 * len(group.bases)
+                begin, end = end, end + group.unknowns
                 slices[index] = slice(begin, end)
         return slices
 
     def behind(self, coordinate: Coordinate, graph: Graph) -> frozenset[int]:
         """Indices of the groups that a coordinate follows from."""
-        owners = [self.owners.get(variable) for variable in variables_of(coordinate, graph, self.ties)]
+        slides = {slide: k for slide, k in self.known_slides if k >= len(self.given)}
+        owners = [self.owners.get(variable) for variable in variables_of(coordinate, graph, self.ties, slides)]
         return frozenset[int]().union(*(self.chains[index] for index in owners if index is not None))
 
 
-def variables_of(coordinate: Coordinate, graph: Graph, ties: Sequence[Tie]) -> list[Variable]:
-    """Variables that a coordinate depends on, given ones among them."""
+def variables_of(
+    coordinate: Coordinate, graph: Graph, ties: Sequence[Tie], slides: Mapping[int, int]
+) -> list[Variable]:  # fmt: skip
+    """Variables that a coordinate depends on, given ones among them; `slides` have the values of those coupled."""
     if coordinate.kind == "expression":
-        return list(dict.fromkeys(v for part in coordinate.parts for v in variables_of(part, graph, ties)))
+        return list(dict.fromkeys(v for part in coordinate.parts for v in variables_of(part, graph, ties, slides)))
     if coordinate.kind == "angle":
-        return [("angle", ties[graph.bodies[body][0]].root) for body in (coordinate.body, coordinate.reference)]
+        frames = [graph.bodies[body][0] for body in (coordinate.body, coordinate.reference)]
+        return [variable for frame in frames for variable in turning_with(ties[frame])]
     if coordinate.kind == "distance":
         return [(axis, node) for node in (coordinate.node, coordinate.other) for axis in ("x", "y")]
     if coordinate.kind == "slide":
-        return [("slide", coordinate.slide)]
+        return [sliding_by(coordinate.slide, slides)]
     return [] if coordinate.kind == "parameter" else [(coordinate.kind, coordinate.node)]
+
+
+def turning_with(tie: Tie) -> list[Variable]:
+    """Variables that the angle of a class depends on."""
+    return [("angle", tie.root), *(("value", k) for _, k in tie.given)]
+
+
+def sliding_by(slide: int, slides: Mapping[int, int]) -> Variable:
+    """Variable of a slide: itself, or the value that it is coupled to."""
+    return ("value", slides[slide]) if slide in slides else ("slide", slide)
 
 
 def whole(graph: Graph, given: Sequence[Coordinate] = ()) -> Structure:

@@ -159,11 +159,11 @@ def _solve_group(
 
 
 def followed_angles(mechanism: Mechanism, plan: Plan, coordinates: Sequence[Coordinate]) -> list[Coordinate]:
-    """Angles whose turns only the motion gives: not those given, nor drives whose limits leave them one turn."""
+    """Angles whose turns only the motion gives: not those given, coupled, nor drives whose limits leave one turn."""
     settled = {bound.coordinate.name for bound in mechanism.bounds if bound.drive}
     settled -= {coordinate.name for coordinate in mechanism.counting}
     angles = angles_of([*coordinates, *mechanism.counting])
-    return [angle for name, angle in angles.items() if name not in plan.counted | settled]
+    return [angle for name, angle in angles.items() if name not in plan.counted | plan.coupled | settled]
 
 
 class _Turns:

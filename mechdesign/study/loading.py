@@ -335,7 +335,7 @@ def load_document(
     if section is None:
         reporter.done()
     assert section is not None
-    builder = Builder(section, context, reporter)
+    builder = Builder(section, context, reporter, source.folder)
     description = build(builder)
     # Mobility and sketch are checked if the mechanism itself has no mistakes, even if other sections have.
     wrong = reporter.concerns("mechanism", "units")

@@ -67,8 +67,17 @@ class Clamp:
 
 
 @dataclass
+class Follower:
+    """A coupling: a coordinate is ``constant + sum(linear * x + wave * sin(x))`` over others, angles in radians."""
+
+    coordinate: Coordinate
+    terms: dict[Coordinate, tuple[float, float]]
+    constant: float = 0.0
+
+
+@dataclass
 class Layout:
-    """Points in the world, links, joints, drives and measures (by name: the coordinate)."""
+    """Points in the world, links, joints, drives and measures (by name: the coordinate), and couplings."""
 
     places: dict[str, complex] = field(default_factory=dict)
     bodies: dict[str, Body] = field(default_factory=dict)
@@ -76,6 +85,7 @@ class Layout:
     clamps: dict[str, Clamp] = field(default_factory=dict)
     drives: dict[str, Coordinate] = field(default_factory=dict)
     measures: dict[str, Coordinate] = field(default_factory=dict)
+    couplings: dict[str, Follower] = field(default_factory=dict)
     undrawn: set[str] = field(default_factory=set)
     unit: str = "deg"
 
@@ -189,6 +199,11 @@ class Layout:
                 yield self._spin(slider, columns) - self._spin(guide, columns), 0.0
         for clamp in self.clamps.values():
             yield self._spin(clamp.second, columns) - self._spin(clamp.first, columns), 0.0
+        for coupling in self.couplings.values():
+            row = self.rate(coupling.coordinate, columns)
+            for coordinate, (linear, wave) in coupling.terms.items():
+                row = row - (linear + wave * math.cos(self.value(coordinate))) * self.rate(coordinate, columns)
+            yield row, 0.0
 
     def equations(self, columns: list[str]) -> Floats:
         """Constraints, a row each, on the rates of the bodies `columns`; only rows that they take part in."""
@@ -329,10 +344,30 @@ class Layout:
         }
         if joints:
             section["joints"] = order(joints)
+        if self.couplings:
+            section["couplings"] = order({key: self._follower(c, name) for key, c in self.couplings.items()})
         if self.measures:
             section["measures"] = order({key: _measure(c, name) for key, c in self.measures.items()})
         study = {"units": {"angle": self.unit}, "mechanism": section}
         return yaml.dump(study, Dumper=DUMPER, sort_keys=False, default_flow_style=None, width=110)
+
+    def _follower(self, coupling: Follower, name: Renaming) -> dict[str, str]:
+        def written(coordinate: Coordinate) -> str:
+            return f"{name(coordinate[1])}.{coordinate[0]}"
+
+        def unit(coordinate: Coordinate) -> float:
+            return math.degrees(1) if coordinate[0] == "angle" and self.unit == "deg" else 1.0
+
+        own = unit(coupling.coordinate)
+        text = repr(coupling.constant * own)
+        for coordinate, (linear, wave) in coupling.terms.items():
+            text += f" + {linear * own / unit(coordinate)!r}*{written(coordinate)}"
+            if wave:
+                # An angle's sine knows the study's unit; a length is a number of radians.
+                at = written(coordinate)
+                at = at if coordinate[0] == "angle" or self.unit == "rad" else f"{math.degrees(1)!r}*{at}"
+                text += f" + {wave * own!r}*sin({at})"
+        return {"set": written(coupling.coordinate), "to": text, "wheels": "none"}
 
     def _link(self, body: Body, name: Renaming, rough: bool) -> object:
         local = {point: (self.places[point] - body.origin) / body.turn for point in body.points}

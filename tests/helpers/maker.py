@@ -10,7 +10,7 @@ from random import Random
 
 import numpy as np
 
-from helpers.layouts import GROUND, Body, Clamp, Coordinate, Guide, Layout
+from helpers.layouts import GROUND, Body, Clamp, Coordinate, Follower, Guide, Layout
 from mechdesign.numerics.arrays import Floats
 
 # A group: its new links ("link" or telescopic "leg"), its joints (kind, link, link), the base being -1, and its
@@ -283,6 +283,33 @@ class Maker:
                 layout.measures[self.name("m")] = ("distance", one, two)
         layout.measures[self.name("m")] = ("product", rng.choice(points), rng.choice(points))
         return layout
+
+    def couple(self) -> bool:
+        """Take one drive away and let a coordinate follow others; False where that is near a singularity."""
+        rng, layout, before = self.rng, self.layout, dict(self.layout.drives)
+        if len(before) < 2:
+            return False
+        listed = [c for c in layout.drivable() if c[0] != "angle" or c[2] == GROUND]
+        for _ in range(TRIALS):
+            taken = rng.choice(list(before))
+            layout.drives = {name: c for name, c in before.items() if name != taken}
+            follower, *others = rng.sample(listed, min(len(listed), rng.choice([2, 2, 3])))
+            if before[taken] in listed and rng.random() < 0.6:
+                follower = before[taken]
+            terms = {
+                c: (rng.choice([-1, 1]) * rng.uniform(0.3, 2), rng.choice([0.0, 0.0, rng.uniform(-0.3, 0.3)]))
+                for c in others
+                if c != follower
+            }
+            if not terms or follower in layout.drives.values():
+                continue
+            value = sum(a * layout.value(c) + b * math.sin(layout.value(c)) for c, (a, b) in terms.items())
+            layout.couplings = {self.name("c"): Follower(follower, terms, layout.value(follower) - value)}
+            system = layout.system(list(layout.drives.values()))
+            if system.shape[0] == system.shape[1] and weakest(system) > WHOLE:
+                return True
+        layout.drives, layout.couplings = before, {}
+        return False
 
     def regular(self, candidates: Sequence[Coordinate]) -> list[Coordinate] | None:
         """As many coordinates as there are drives, far from a singularity when they are given; None if not found."""

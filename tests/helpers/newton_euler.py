@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from helpers.layouts import GROUND, Coordinate, Layout
+from helpers.layouts import GROUND, Coordinate, Follower, Layout
 from mechdesign.numerics.arrays import Complexes, Floats
 
 # What a constraint belongs to: ("pin", point, link), ("slide" | "tie", joint or leg) or ("drive", name).
@@ -135,6 +135,17 @@ class Bodies:
         way = self.at(slider, self.layout.places[guide.point]) - self.at(body, guide.base)
         return self.vector(body, guide.along / turn), way, body, slider
 
+    def follower(self, coupling: Follower) -> Jet:
+        """How far a coordinate is from where its coupling has it, but for a constant."""
+        jet = self.coordinate(coupling.coordinate)
+        for coordinate, (linear, wave) in coupling.terms.items():
+            x = self.coordinate(coordinate)
+            slope, curve = linear + wave * np.cos(x.value), -wave * np.sin(x.value)
+            bend = slope * x.bend + curve * x.rate**2
+            value = linear * x.value + wave * np.sin(x.value)
+            jet = jet - Jet(value, slope[:, None] * x.row, bend, self.rates)
+        return jet
+
     def line(self, name: str) -> Complexes:
         """Direction of a slide's line, in the world."""
         return self._line(name)[0].value
@@ -159,6 +170,7 @@ class Bodies:
         for clamp in layout.clamps.values():
             second, first = (layout.holder(link, clamp.point) for link in (clamp.second, clamp.first))
             found["tie", clamp.name] = [self.angle(second, first)]
+        found |= {("coupling", name): [self.follower(c)] for name, c in layout.couplings.items()}
         return found | {("drive", name): [self.coordinate(c)] for name, c in layout.drives.items()}
 
     @property

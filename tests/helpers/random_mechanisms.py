@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from random import Random
 
-from hypothesis import event
+from hypothesis import assume, event
 from hypothesis import strategies as st
 
 from helpers.layouts import Coordinate, Layout
@@ -74,11 +74,18 @@ class Made:
 
 
 @st.composite
-def mechanisms(draw: st.DrawFn, *, triads: bool | None = None, anyhow: bool | None = None, most: int = 4) -> Made:
+def mechanisms(
+    draw: st.DrawFn,
+    *,
+    triads: bool | None = None,
+    anyhow: bool | None = None,
+    most: int = 4,
+    coupled: bool = False,
+) -> Made:
     """Random mechanisms: one to three driven links, then dyads; with `triads` also a group that is none.
 
     With `anyhow` the drives are drawn from all angles, absolute and relative, slides and legs, which seldom leaves
-    dyads.
+    dyads. With `coupled` one coordinate follows others.
     """
     triads = draw(st.booleans()) if triads is None else triads
     anyhow = draw(st.booleans()) if anyhow is None else anyhow
@@ -92,4 +99,8 @@ def mechanisms(draw: st.DrawFn, *, triads: bool | None = None, anyhow: bool | No
         maker.add(DRIVEN["crank"])
     for group in laid:
         event(group)
-    return Made(maker.finish(anyhow=anyhow), maker)
+    if coupled and len(maker.layout.drives) == 1:
+        maker.add(DRIVEN["crank"])
+    maker.finish(anyhow=anyhow)
+    assume(not coupled or maker.couple())
+    return Made(maker.layout, maker)

@@ -180,3 +180,25 @@ def test_a_pin_off_its_place_in_one_link_moves_the_others_with_it_and_leaves_gui
                 if end != f"{link}.{point}":
                     found = complex(np.ravel(nodes[mechanism.graph.node(end.partition(".")[2])])[0])
                     assert found == pytest.approx(moved, abs=1e-6 * largest**2), (place, end)
+
+
+@pytest.mark.nightly
+@settings(max_examples=100)
+@given(mechanisms(coupled=True))
+def test_sensitivities_of_coupled_mechanisms_are_derivatives(made: Made) -> None:
+    """Positions of every coordinate by dimensions of links, joints and couplings."""
+    mechanism, h = made.mechanism, 1e-4
+    time = np.array([-0.02, 0.0, 0.03])
+    every = [name for name in mechanism.nominal if not name.startswith("limits")]
+    places = made.rng.sample(every, min(4, len(every)))
+    configuration, linear, *_ = _state(made, time, {})
+    assume(configuration.valid.all())
+    position = linear.sensitivity(places)
+    names = made.rng.sample([n for n in mechanism.coordinates if n not in mechanism.drives], 5)
+    for row, place in enumerate(places):
+        states = [_state(made, time, {place: np.array(mechanism.nominal[place] + k * h)}) for k in STEPS]
+        assume(all(state[0].valid.all() for state in states))
+        for name in names:
+            c = mechanism.coordinate(name)
+            exact = np.broadcast_to(np.asarray(first(configuration, c, position)), (len(places), len(time)))[row]
+            agree(exact, slopes(along([state[0] for state in states], c), h), 1e-7, f"{name} by {place}")

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
-from helpers.layouts import GROUND, Layout
+from helpers.layouts import GROUND, Coordinate, Follower, Layout
 from helpers.random_dynamics import Loaded, loaded
 from hypothesis import given, settings
 
@@ -148,6 +148,11 @@ def judge_equilibrium(case: Loaded) -> None:
         if coordinate[0] == "angle":
             wrenches.turn(coordinate[1], table[f"{name}_effort"])
             wrenches.turn(coordinate[2], -table[f"{name}_effort"])
+    for name, coupling in layout.couplings.items():
+        for coordinate, effort in efforts_of(case, name, coupling):
+            if coordinate[0] == "angle":
+                wrenches.turn(coordinate[1], effort)
+                wrenches.turn(coordinate[2], -effort)
     add_inertia(wrenches, case)
     size = size_of(case)
     for on, (force, moment, parts) in wrenches.sums.items():
@@ -183,12 +188,25 @@ def judge_joints(case: Loaded) -> None:
 
 
 def driven(case: Loaded, slide: str) -> Floats:
-    """The effort of the drive along a slide, a slot or a leg; 0 where it has none."""
+    """The effort of the drive and of couplings along a slide, a slot or a leg; 0 where it has none."""
     drives = case.layout.drives.items()
     efforts = [
         case.bodies.multipliers["drive", k][:, 0] for k, (kind, on, *_) in drives if kind != "angle" and on == slide
     ]
+    for name, coupling in case.layout.couplings.items():
+        pairs = efforts_of(case, name, coupling)
+        efforts += [effort for (kind, on, *_), effort in pairs if kind != "angle" and on == slide]
     return sum(efforts, np.zeros(case.bodies.poses))
+
+
+def efforts_of(case: Loaded, name: str, coupling: Follower) -> list[tuple[Coordinate, Floats]]:
+    """What a coupling applies to each of its coordinates: the work of all on any motion that it allows is zero."""
+    effort = case.bodies.multipliers["coupling", name][:, 0]
+    efforts = [(coupling.coordinate, effort)]
+    for coordinate, (linear, wave) in coupling.terms.items():
+        slope = linear + wave * np.cos(case.bodies.coordinate(coordinate).value)
+        efforts.append((coordinate, -slope * effort))
+    return efforts
 
 
 def at_points(case: Loaded, rows: Sequence[Row]) -> Mapping[tuple[str, str], Complexes]:
@@ -235,5 +253,20 @@ def test_forces_of_some_mechanisms(case: Loaded) -> None:
 @settings(max_examples=200)
 @given(loaded())
 def test_forces_of_two_hundred_mechanisms(case: Loaded) -> None:
+    for judge in CHECKS:
+        judge(case)
+
+
+@settings(max_examples=15)
+@given(loaded(coupled=True))
+def test_forces_of_some_coupled_mechanisms(case: Loaded) -> None:
+    for judge in CHECKS:
+        judge(case)
+
+
+@pytest.mark.nightly
+@settings(max_examples=200)
+@given(loaded(coupled=True))
+def test_forces_of_two_hundred_coupled_mechanisms(case: Loaded) -> None:
     for judge in CHECKS:
         judge(case)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.layouts import GROUND, Coordinate
+from helpers.maker import weakest
 from helpers.random_mechanisms import Made, mechanisms
 from helpers.studies import study_of
 from hypothesis import assume, event, given, settings
@@ -19,7 +20,8 @@ from mechdesign.errors import MechanismError, StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import wrap
 from mechdesign.mechanism.assemblies import assemblies
-from mechdesign.mechanism.derivatives import Jacobian
+from mechdesign.mechanism.derivatives import Jacobian, regularity
+from mechdesign.mechanism.outputs import first, second
 from mechdesign.mechanism.plan import Plan
 
 
@@ -46,6 +48,18 @@ def gaps(made: Made, configuration: Configuration) -> dict[str, NDArray]:
         if guide.kind == "prismatic":
             kept = slider.turn / guide.along
             found[f"{guide.name} not turned"] = np.abs(turns[slider.name] - kept * along)
+    for name, coupling in layout.couplings.items():
+        value = configuration.value(made.mechanism.coordinate(f"{coupling.coordinate[1]}.{coupling.coordinate[0]}"))
+        unseen = np.zeros(1)
+        for coordinate, (linear, wave) in coupling.terms.items():
+            x = configuration.value(made.mechanism.coordinate(f"{coordinate[1]}.{coordinate[0]}"))
+            value = value - linear * x - wave * np.sin(x)
+            # Whole turns of an angle are not seen.
+            whole = np.arange(-3, 4) if coordinate[0] == "angle" else np.zeros(1)
+            unseen = np.add.outer(unseen, linear * 2 * math.pi * whole).ravel()
+        miss = np.subtract.outer(unseen, value - coupling.constant)
+        miss = np.abs(wrap(miss) if coupling.coordinate[0] == "angle" else miss)
+        found[f"{name} followed"] = miss.min(axis=0)
     for clamp in layout.clamps.values():
         kept = layout.bodies[clamp.second].turn / layout.bodies[clamp.first].turn
         found[f"{clamp.name} not turned"] = np.abs(turns[clamp.second] - kept * turns[clamp.first])
@@ -259,3 +273,86 @@ def test_dyads_agree_with_newton(made: Made) -> None:
     assert ok[4]
     for point in made.layout.places:
         assert np.abs(found.point(point) - exact.point(point))[ok].max() < 1e-9
+
+
+@settings(max_examples=15)
+@given(mechanisms(coupled=True))
+def test_some_couplings_hold_along_a_motion(made: Made) -> None:
+    check_couplings(made)
+
+
+@pytest.mark.nightly
+@settings(max_examples=300)
+@given(mechanisms(coupled=True))
+def test_three_hundred_couplings_hold_along_a_motion(made: Made) -> None:
+    check_couplings(made)
+
+
+def check_couplings(made: Made) -> None:
+    """The sketch is assembled as drawn; on the way from there links stay rigid, joints and couplings closed."""
+    for name, coordinate in made.known().items():
+        miss = float(made.mechanism.sketch_configuration.value(made.mechanism.coordinate(name)))
+        miss -= made.layout.value(coordinate)
+        assert (wrap(miss) if coordinate[0] == "angle" else miss) == pytest.approx(0, abs=1e-9), name
+    time = np.linspace(-0.5, 0.5, 21)
+    configuration = made.at(time)
+    assert configuration.valid[10]
+    closed = configuration.take(np.flatnonzero(configuration.valid))
+    far = [np.abs(np.broadcast_to(x, closed.shape)) for x in (*closed.nodes, *closed.slides)]
+    bound = 1e-12 * np.maximum(1.0, np.max(far, axis=0))
+    for what, gap in gaps(made, closed).items():
+        assert np.all(np.abs(gap) < bound), what
+
+
+@pytest.mark.nightly
+@settings(max_examples=1000)
+@given(mechanisms(coupled=True))
+def test_a_thousand_couplings_move_as_the_drives_that_give_the_same(made: Made) -> None:
+    """The same mechanism without its coupling, one of its coordinates driven as the coupling moves it."""
+    check_driven(made)
+
+
+@settings(max_examples=40)
+@given(mechanisms(coupled=True))
+def test_some_couplings_move_as_the_drives_that_give_the_same(made: Made) -> None:
+    check_driven(made)
+
+
+def check_driven(made: Made) -> None:
+    """Positions, velocities and accelerations with and without the coupling."""
+    time = np.linspace(-0.1, 0.1, 9)
+    coupled, mechanism = made.at(time), made.mechanism
+    assume(coupled.valid.all())
+    ((name, coupling),) = made.layout.couplings.items()
+    free, drives = replace(made.layout, couplings={}), [*made.layout.drives.values()]
+    candidates = (coupling.coordinate, *coupling.terms)
+    by_hand = next((c for c in candidates if weakest(free.system([*drives, c])) > 0.02), None)
+    assume(by_hand is not None)
+    free.drives = {**made.layout.drives, name: by_hand}
+    other = study_of(free.text()).mechanism
+    follower = mechanism.coordinate(f"{by_hand[1]}.{by_hand[0]}")
+    linear = mechanism.linearize(coupled)
+    rates = linear.velocity([made.rates[drive] for drive in mechanism.drives])
+    bends = linear.acceleration(rates, [0.0] * len(mechanism.drives))
+    followed, rate, bend = (
+        coupled.value(follower), first(coupled, follower, rates), second(coupled, follower, rates, rates, bends)
+    )  # fmt: skip
+    if follower.quantity == "angle":
+        followed = np.unwrap(np.broadcast_to(followed, time.shape))
+        # From the turn in which it is drawn.
+        followed = followed + made.layout.value(by_hand) - followed[4]
+    values = dict(zip(mechanism.drives, made.drives(time), strict=True)) | {name: followed}
+    driven = other.forward.solve([values[drive] for drive in other.drives])
+    moving = other.linearize(driven)
+    # By hand it might be driven through a pose where it holds nothing, and go on in another assembly.
+    regular = np.broadcast_to(regularity(moving), time.shape)
+    assume(np.nanmin(regular) > 0.3 * regular[4])
+    assert driven.valid.all()
+    speeds = moving.velocity([rate if drive == name else made.rates[drive] for drive in other.drives])
+    turning = moving.acceleration(speeds, [bend if drive == name else 0.0 for drive in other.drives])
+    for point in mechanism.points:
+        node, same_node = mechanism.graph.node(point), other.graph.node(point)
+        assert np.abs(driven.point(point) - coupled.point(point)).max() < 1e-9, point
+        for one, two in ((rates, speeds), (bends, turning)):
+            near, far = (np.broadcast_to(move.nodes[at], time.shape) for move, at in ((one, node), (two, same_node)))
+            assert np.abs(near - far).max() <= 1e-7 * (1 + np.abs(near).max()), point

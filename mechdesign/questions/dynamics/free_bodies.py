@@ -103,7 +103,7 @@ class _Poses:
     def _joints(self) -> Iterator[Acting]:
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
             x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
-            place, sides = self.configuration.nodes[contact.node], _sides(contact)
+            place, sides = contact.place(self.configuration), _sides(contact)
             if sides[0] != sides[1]:
                 for side, sign in zip(sides, (1, -1), strict=True):
                     force = sign * (x + 1j * y)

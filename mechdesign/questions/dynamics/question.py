@@ -121,7 +121,7 @@ class ForceQuestion:
         mechanism = self.study.mechanism
         masses = self.masses(poses, rows, linear.configuration.places)
         forces, energy = self.forces_at(poses, linear.configuration, rows, moving, masses)
-        held = balance(linear, forces)
+        held = balance(linear, forces, mechanism.pressing)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort

@@ -88,7 +88,7 @@ class Along:
         self._groups = []
         if passages and set(question.poses.names) != drives:
             structure = mechanism.forward.structure
-            self._groups = [k for k, group in enumerate(structure.groups) if group.form != "place"]
+            self._groups = [k for k, group in enumerate(structure.groups) if group.solved]
         self._errors = any(name.endswith("_error") for name in columns)
         self._advantages = {
             f"{output}_advantage": (output, input_name)
@@ -152,7 +152,7 @@ class Along:
         mechanism = self.question.study.mechanism
         structure = mechanism.forward.structure
         behind = sorted(structure.behind(mechanism.coordinate(output), mechanism.graph))
-        groups = tuple(k for k in behind if structure.groups[k].form != "place")
+        groups = tuple(k for k in behind if structure.groups[k].solved)
         name = " ".join([FORWARD, *(str(k) for k in groups)])
         self._chains[name] = groups
         return name

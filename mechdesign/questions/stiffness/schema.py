@@ -223,6 +223,10 @@ class StiffnessSection(PoseSection):
     def checked(self, checker: Checker) -> Self:
         """Also check names, the units of stiffnesses, and loads."""
         root: KeyPath = ("stiffness",)
+        if checker.mechanism.couplings:
+            couplings = ", ".join(checker.mechanism.couplings)
+            message = f"a stiffness of a mechanism with couplings ({couplings}) is not available; leave out 'stiffness'"
+            checker.report(root, message, at_key=True)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))
         if right and GROUND in (owners[self.at] if self.bearer is None else [self.bearer]):

@@ -83,7 +83,7 @@ def causes(field: Field) -> list[tuple[str, str]]:
 
 def forward_names(mechanism: Mechanism) -> list[str]:
     """What the links of each group of the drives' structure do where its determinant vanishes."""
-    return [_in_words(mechanism, group) for group in mechanism.forward.structure.groups if group.form != "place"]
+    return [_in_words(mechanism, group) for group in mechanism.forward.structure.groups if group.solved]
 
 
 def _in_words(mechanism: Mechanism, group: Group) -> str:

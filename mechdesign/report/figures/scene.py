@@ -53,6 +53,28 @@ class Guide:
 
 
 @dataclass(frozen=True)
+class Wheels:
+    """Pitch circles of two links, or of a wheel and the line of a rack, where they touch.
+
+    `radii` and `axes` are those of both links; the radius of a rack is 0, and its axis where it slides. A belt has two
+    straight parts, `strands`.
+    """
+
+    links: tuple[str, str]
+    axes: tuple[complex, complex]
+    radii: tuple[float, float]
+    touch: complex
+    along: complex
+    strands: tuple[tuple[complex, complex], ...] = ()
+
+    @property
+    def ends(self) -> list[complex]:
+        """The rightmost, uppermost, leftmost and lowest places of the circles."""
+        pairs = zip(self.axes, self.radii, strict=True)
+        return [axis + radius * way for axis, radius in pairs for way in (1, 1j, -1, -1j)]
+
+
+@dataclass(frozen=True)
 class Scene:
     """One pose of a mechanism: places of the points, unit vectors of the links' x axes, lines of the slides.
 
@@ -64,14 +86,16 @@ class Scene:
     rotations: Mapping[str, complex]
     guides: tuple[Guide, ...]
     span: float
+    wheels: tuple[Wheels, ...] = ()
 
     def link_points(self, name: str) -> tuple[str, ...]:
         """Names of a link's points, its ends first."""
         return link_points(self.description.links[name])
 
     def places(self, travel: Mapping[str, tuple[float, float]]) -> list[complex]:
-        """Points, and ends of the guides for a range of each slide (see `Guide.ends`)."""
-        return [*self.points.values(), *(end for guide in self.guides for end in guide.ends(travel, self.span))]
+        """Points, wheels, and ends of the guides for a range of each slide (see `Guide.ends`)."""
+        guides = [end for guide in self.guides for end in guide.ends(travel, self.span)]
+        return [*self.points.values(), *guides, *(end for wheels in self.wheels for end in wheels.ends)]
 
     def pivot(self, link: str, reference: str) -> str:
         """The point about which a link is turned: the one it shares with its reference, else its first."""
@@ -145,7 +169,15 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         guides.append(Guide(name, joint.line.link, joint.point, origin, along, points[joint.point], slider))
     drawn = np.array([mechanism.sketch_configuration.point(name) for name in points])
     span = max(float(np.ptp(drawn.real)), float(np.ptp(drawn.imag))) or 1.0  # of slides alone one unit of length
-    return Scene(description, points, rotations, tuple(guides), span)
+    wheels = []
+    for mesh in mechanism.meshes:
+        touch, along = (pick(value) for value in mesh.contact(configuration))
+        one, other = (pick(configuration.nodes[node]) for node in mesh.axes)
+        first, second = (float(pick(radius).real) for radius in mesh.radii(configuration))
+        sides = [mesh.strand(configuration, side) for side in (1.0, -1.0) if mesh.belt]
+        strands = [(pick(begin), pick(end)) for begin, end, _ in sides]
+        wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, tuple(strands)))
+    return Scene(description, points, rotations, tuple(guides), span, tuple(wheels))
 
 
 def travels(scenes: Sequence[Scene | None]) -> dict[str, tuple[float, float]]:
@@ -243,8 +275,13 @@ class Sweep(Shown):
     @cached_property
     def travel(self) -> dict[str, tuple[float, float]]:
         """Range of each slide."""
-        some = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
-        return travels([pose(self.mechanism, self.configuration, int(index)) for index in some])
+        return travels([pose(self.mechanism, self.configuration, int(index)) for index in self._some])
+
+    @property
+    def _some(self) -> Ints:
+        """Some of the poses that can be assembled."""
+        some: Ints = self.valid[np.unique(np.linspace(0, len(self.valid) - 1, _TRAVEL_POSES).astype(int))]
+        return some
 
     @cached_property
     def extent(self) -> Complexes:
@@ -256,6 +293,9 @@ class Sweep(Shown):
             scene = pose(mechanism, configuration, int(index))
             if scene is not None:
                 reached += [np.array(guide.ends(self.travel, scene.span)) for guide in scene.guides]
+        if mechanism.meshes:
+            scenes = [pose(mechanism, configuration, int(index)) for index in self._some]
+            reached += [np.array(wheels.ends) for scene in scenes if scene is not None for wheels in scene.wheels]
         return np.concatenate(reached)
 
     @property

@@ -16,7 +16,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Spring
 from mechdesign.report.figures import style
 from mechdesign.report.figures.labels import Label
-from mechdesign.report.figures.scene import Guide, Scene, hull, spring_points
+from mechdesign.report.figures.scene import Guide, Scene, Wheels, hull, spring_points
 
 # Of symbols, in points on paper.
 BAR = 8.0  # width of a link
@@ -31,6 +31,8 @@ _COIL, _WINDINGS = 5.5, 12  # half width of a coil spring or damper, and its tur
 _SPIRAL = 15.0  # radius of a spiral spring
 _CENTER = 4.6  # radius of a centre of mass
 TICK, TICK_SPACING, TICK_ANGLE = 4.95, 5.5, 135.0  # strokes of a hatched rail, and their angle to it (degrees)
+_PITCH: Any = (0, (9, 2, 2, 2))  # dashes of a pitch circle
+_RACK = 0.2  # half of the drawn line of a rack, as a part of the mechanism's size
 _NESTING = 9.0  # between the arrows of drives at one pivot
 _PUSH = 30.0  # length of a straight arrow
 _MIN_SWEEP = 0.2  # radians; a smaller angle gets an arrow of the positive sense instead
@@ -180,9 +182,25 @@ def mechanism_shapes(scene: Scene, colors: Mapping[str, str], travel: Travel) ->
             shapes.append(Symbol(place, 0.5, (_rectangle(PIN, PIN),), fill=style.INK, point=point))
         elif kind == "tracer":
             shapes.append(Symbol(place, 0.5, radius=PIN - 0.8, fill=colors[owners[point]], point=point))
+    for wheels in scene.wheels:
+        shapes += _wheels(wheels, colors, scene.span)
     for spring in scene.description.springs.values():
         shapes += _torsion(scene, spring) if spring.turning else _spring(scene, spring)
     return shapes
+
+
+def _wheels(wheels: Wheels, colors: Mapping[str, str], span: float) -> list[Shape]:
+    """Pitch circles with a mark that turns, the line of a rack, or the two sides of a belt."""
+    shapes: list[Shape] = []
+    circle = np.exp(1j * np.linspace(0, 2 * np.pi, 73))
+    for link, axis, radius in zip(wheels.links, wheels.axes, wheels.radii, strict=True):
+        if radius:
+            rim = (axis + radius * circle).tolist()
+            shapes.append(Line(rim, colors[link], 1.2, 0.05, link, dashes="-" if wheels.strands else _PITCH))
+        else:
+            ends = wheels.touch - _RACK * span * wheels.along, wheels.touch + _RACK * span * wheels.along
+            shapes.append(Line(ends, colors[link], 1.2, 0.05, link, dashes=_PITCH))
+    return shapes + [Line(strand, style.INK, 1.4, 0.06) for strand in wheels.strands]
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:

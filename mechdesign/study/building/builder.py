@@ -14,6 +14,7 @@ from mechdesign.study.building import section as models
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context
+from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.reporter import Reporter
 from mechdesign.study.text.units import Amount, kind_of
 
@@ -24,13 +25,14 @@ class Builder:
     """Builds the parts of a description; mistakes go to the reporter, and wrong parts are left out."""
 
     def __init__(
-        self, section: models.MechanismSection, context: Context, reporter: Reporter
+        self, section: models.MechanismSection, context: Context, reporter: Reporter, folder: Folder
     ) -> None:  # fmt: skip
         self.section = section
         self.parameter_values = context.parameters
         self.quantities = context.quantities
         self.units = context.units
         self.reporter = reporter
+        self.folder = folder
         self.places: dict[str, Place] = {}
         self.formulas: dict[str, Expression] = {}
         self.measured: set[str] = set()
@@ -56,11 +58,12 @@ class Builder:
         self.reporter.report((*ROOT, *path), message, at_key=at_key)
 
     def place(
-        self, name: str, value: float, quantity: Quantity | Physical = "length", *, measured: bool = False
-    ) -> Term:
+        self, name: str, value: float, quantity: Quantity | Physical = "length", *, measured: bool = False,
+        in_coupling: bool = False,
+    ) -> Term:  # fmt: skip
         """Register a number of the geometry, perhaps measured from the sketch, and return its name."""
         factor = self.units.angle_factor if quantity == "angle" else 1.0
-        self.places[name] = Place(name, value * factor, quantity)
+        self.places[name] = Place(name, value * factor, quantity, in_coupling)
         if isinstance(value, Amount) and value.expression is not None:
             self.formulas[name] = value.expression
         if measured:
@@ -100,6 +103,7 @@ class Builder:
             ("joint", "joints", section.joints),
             ("measure", "measures", section.measures),
             ("spring", "springs", section.springs),
+            ("coupling", "couplings", section.couplings),
         ]
         for kind, key, names in groups:
             for name in names:

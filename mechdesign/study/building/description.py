@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal, NoReturn
 
 import numpy as np
 
-from mechdesign.errors import suggestion
-from mechdesign.expressions import Expression, ExpressionError
-from mechdesign.mechanism.graph import GROUND
+from mechdesign.errors import MechanismError, StudyError, suggestion
+from mechdesign.expressions import Expression, ExpressionError, Step, Tabulated
+from mechdesign.mechanism.coordinates import coupled
+from mechdesign.mechanism.geometry import Geometry
+from mechdesign.mechanism.graph import GROUND, build_graph
 from mechdesign.mechanism.model import (
     MEASURED,
+    Coupling,
     Description,
     Drive,
     Fixed,
@@ -28,10 +32,17 @@ from mechdesign.mechanism.model import (
     Spring,
     Term,
 )
+from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
+from mechdesign.study.schema.paths import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount
+
+# Of teeth as ISO 53 has them (radians).
+PRESSURE_ANGLE = np.radians(20.0)
+# Rows from which a cubic spline is told.
+FEWEST_ROWS = 4
 
 
 def build(builder: Builder) -> Description:
@@ -45,10 +56,12 @@ def build(builder: Builder) -> Description:
     drives, measures, limits = _drives(builder), _measures(builder), _limits(builder)
     springs = _springs(builder)
     branch: Literal["side", "follow"] = "follow" if builder.section.branch == "follow" else "side"
-    return Description(
+    couplings = _couplings(builder)
+    description = Description(
         builder.places, builder.links, joints, drives, measures, limits, builder.sketch, branch,
-        builder.units.angle_factor, builder.masses, springs,
+        builder.units.angle_factor, builder.masses, springs, couplings,
     )  # fmt: skip
+    return _with_phases(builder, description)
 
 
 class _WrongJoint(Exception):
@@ -320,6 +333,110 @@ def _springs(builder: Builder) -> dict[str, Spring]:
             terms.get("force", 0.0), terms.get("damping", 0.0),
         )  # fmt: skip
     return springs
+
+
+def _couplings(builder: Builder) -> dict[str, Coupling]:
+    """Couplings without mistakes in their names."""
+    section, couplings = builder.section, dict[str, Coupling]()
+    listed = [*section.coordinates, *section.moving, *section.slides]
+    for name, given in section.couplings.items():
+        path: KeyPath = ("couplings", name)
+        sets = section.coordinate_named(given.set_)
+        if not builder.check_name(given.set_, listed, "coordinate", (*path, "set")):
+            continue
+        kind = section.coordinates.get(sets, "none")
+        if sets in section.measures or sets.endswith((".x", ".y")):
+            message = f"{given.set_!r} cannot follow others: that can an angle of a link, a slide or a length"
+            builder.report((*path, "set"), message)
+            continue
+        function = _function(builder, name, given, path, kind)
+        if function is None:
+            continue
+        if sets in function.names:
+            builder.report(path, f"{given.set_!r} cannot follow itself")
+            continue
+        angle = given.pressure_angle
+        pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
+        if not 0 <= pressure < np.pi / 2:
+            builder.report((*path, "pressure_angle"), "a pressure angle lies between 0 and 90 degrees")
+        couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
+    return couplings
+
+
+def _function(
+    builder: Builder, name: str, given: models.Coupling, path: KeyPath, kind: Quantity
+) -> Expression | None:  # fmt: skip
+    """The function of a coupling; None where it has a mistake, which is reported."""
+    section, unit = builder.section, builder.units.angle_factor
+    if given.to is not None:
+        parameters = builder.parameter_values
+        names = sorted(given.to.names)
+        listed = [*section.coordinates, *parameters]
+        if not all(builder.check_name(item, listed, "coordinate or parameter", (*path, "to")) for item in names):
+            return None
+        for item in given.to.names & parameters.keys():
+            builder.place(MEASURED + item, Amount(parameters[item], "", Expression.parse(item)), "none")
+        return replace(given.to, angle_unit=unit)
+    assert given.of is not None
+    listed = [*section.coordinates, *section.moving, *section.slides]
+    if not builder.check_name(given.of, listed, "coordinate", (*path, "of")):
+        return None
+    of = section.coordinate_named(given.of)
+    if given.table is not None:
+        table = _table(builder, given.table, section.coordinates[of], (*path, "table"))
+        return None if table is None else Expression.of_table(f"the table of {name}", table, of, unit)
+    assert given.ratio is not None
+    ratio, phase = f"{name}.ratio", f"{name}.phase"
+    builder.reporter.kind((*ROOT, *path, "phase"), kind)
+    builder.place(ratio, given.ratio, "none", in_coupling=True)
+    builder.place(phase, 0.0 if given.phase is None else given.phase, kind, in_coupling=True)
+    steps: tuple[Step, ...] = (("name", ratio), ("name", of), ("call", "*"), ("name", phase), ("call", "+"))
+    return Expression(f"{ratio}*{of} + {phase}", steps, unit)
+
+
+def _table(
+    builder: Builder, given: str | tuple[tuple[float, ...], ...], kind: Quantity, path: KeyPath
+) -> Tabulated | None:  # fmt: skip
+    """The spline through a table, which repeats if it spans a turn and ends as it begins."""
+    try:
+        rows = read_table(builder.folder, given) if isinstance(given, str) else np.array(given)
+    except StudyError as error:
+        builder.report(path, str(error))
+        return None
+    if rows.shape[1] != 2 or len(rows) < FEWEST_ROWS or not (np.diff(rows[:, 0]) > 0).all():
+        builder.report(path, f"a table has two columns and at least {FEWEST_ROWS} rows, the first column rising")
+        return None
+    turn, span = 2 * np.pi / builder.units.angle_factor, rows[-1] - rows[0]
+    size = np.ptp(rows[:, 1])
+    repeats = kind == "angle" and abs(span[0] - turn) <= 1e-9 * turn and abs(span[1]) <= 1e-9 * size
+    if repeats:
+        rows[-1, 1] = rows[0, 1]
+    return Tabulated(tuple((float(x), float(y)) for x, y in rows), float(span[0]) if repeats else 0.0)
+
+
+def _with_phases(builder: Builder, description: Description) -> Description:
+    """A description with the phases of couplings that are left out, as the sketch shows them."""
+    left_out = [
+        name for name, given in builder.section.couplings.items() if given.ratio is not None and given.phase is None
+    ]
+    if not left_out or builder.reporter.problems:
+        return description
+    try:
+        graph = build_graph(description)
+        sketch = locate(description, graph, Geometry(graph, description.places))
+    except MechanismError:
+        # It is reported where the mechanism is compiled.
+        return description
+    for name in left_out:
+        pair = coupled(description.couplings[name], description, graph)
+        of = next(part for part in pair.function.parts if part.kind != "parameter")
+        drawn = [sketch.value(c) if c.kind in ("angle", "slide") else None for c in (pair.follower, of)]
+        units = [builder.units.angle_factor if c.quantity == "angle" else 1.0 for c in (pair.follower, of)]
+        follower, followed = (0.0 if value is None else value / unit for value, unit in zip(drawn, units, strict=True))
+        if drawn[0] is not None:
+            phase = follower - description.places[f"{name}.ratio"].nominal * followed
+            builder.place(f"{name}.phase", phase, pair.follower.quantity, measured=True, in_coupling=True)
+    return description
 
 
 def _limits(builder: Builder) -> tuple[Limit, ...]:

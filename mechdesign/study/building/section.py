@@ -285,6 +285,70 @@ class Spring(fields.Model):
         return self
 
 
+_WHEELS = {
+    "gears": "wheels with teeth, whose force acts where the pitch circles touch; or a pinion and its rack",
+    "belt": "pulleys with a belt or chain, or with crossed ones for a negative ratio",
+    "none": "a controller or what is not drawn: moments alone act on the links",
+}
+_TABLE_FORM: fields.Form = {"type": ["string", "object", "array"], "title": "table"}
+
+
+def _table(raw: Any, context: Context) -> str | tuple[tuple[float, ...], ...]:
+    file = file_of(raw)
+    if file is not None:
+        return file
+    if not isinstance(raw, list):
+        raise failure(f"expected a file of two columns, lift.csv, or rows [[0, 0], [30, 2.5], ...], not {shown(raw)}")
+    return read_rows(raw, context, 2, "every row holds two numbers", "an empty table")
+
+
+class Coupling(fields.Model):
+    """A coordinate that follows others, by gears, a rack, a belt, a cam or a controller: ``set`` and one of ``to``,
+    ``ratio`` and ``table``.
+    """
+
+    one_of = (
+        "a coupling gives what it sets by one of to: expression, ratio: number, table: file", "to", "ratio", "table",
+    )  # fmt: skip
+    set_: fields.CoordinateName = Field(alias="set")
+    """Coordinate that follows: an angle of a link, a slide or a length; the name of a link, joint or leg stands for it.
+    Example: planet.angle
+    """
+    to: fields.Bound | None = None
+    """Expression of coordinates and parameters, in the study's units. Example: -2.5*sun.angle + 3.5*arm.angle"""
+    of: fields.CoordinateName | None = None
+    """Coordinate that is followed, of a ``ratio`` or a ``table``. Example: sun.angle"""
+    ratio: fields.AnyPlace | None = None
+    """What the coordinate that follows changes by for each unit of the other, in the study's units. Example: -2.5"""
+    phase: fields.AnyPlace | None = None
+    """Value of the coordinate that follows where the other is 0, with a ``ratio``. Left out: as the sketch shows.
+    Example: 30
+    """
+    table: Annotated[str | tuple[tuple[float, ...], ...], fields.Read(_table, _TABLE_FORM)] | None = None
+    """Rows of the coordinate that is followed and the one that follows, or a file of two such columns; between them a
+    cubic spline. It repeats if it spans a turn and ends as it begins. Example: lift.csv
+    """
+
+    wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
+    """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
+    radius: fields.PositiveLength | None = None
+    """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
+    pressure_angle: fields.Angle | None = None
+    """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Coupling:
+        if self.to is not None and self.of is not None:
+            raise failure("'of' belongs to a 'ratio' or a 'table'; an expression names its coordinates itself")
+        if self.to is None and self.of is None:
+            raise failure("a coupling by 'ratio' or 'table' needs 'of', the coordinate that is followed")
+        if self.radius is not None and self.wheels != "belt":
+            raise failure("the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out")
+        if self.phase is not None and self.ratio is None:
+            raise failure("'phase' belongs to a 'ratio'")
+        return self
+
+
 class Limit(fields.Model):
     """Bounds of a ``distance``, a ``drive``, an ``angle`` or a ``measure``, whose own unit they have."""
 
@@ -382,6 +446,10 @@ class MechanismSection(fields.Model):
     """
     springs: dict[fields.SpringName, Spring] = Field(default_factory=dict)
     """Springs and dampers by name. Example: {return: {between: [S, B], stiffness: 2, free_length: 60}}"""
+    couplings: dict[fields.CouplingName, Coupling] = Field(default_factory=dict)
+    """Coordinates that follow others, by name; each takes one drive's place. Example: {mesh: {set: planet.angle, of:
+    sun.angle, ratio: -2.5}} Example: {cam: {set: follower, to: 12 + 5*(1 - cos(2*crank))}}
+    """
     branch: Annotated[str, fields.choice(_BRANCHES, "branch")] = "side"
     """Which way of assembly a pose has."""
     sketch: dict[fields.PointName, Point] = Field(default_factory=dict)
@@ -451,6 +519,13 @@ class MechanismSection(fields.Model):
         if section is not None:
             return section.kind, getattr(section, section.kind)
         return "slide" if drive in self.slides else "length" if drive in self.legs else "angle", drive
+
+    def coordinate_named(self, name: str) -> str:
+        """The coordinate that the name of a link, leg or slide stands for; any other name as it is."""
+        if name in self.drives:
+            return name
+        ending = "slide" if name in self.slides else "length" if name in self.legs else "angle"
+        return f"{name}.{ending}" if name in (*self.slides, *self.moving) else name
 
     @cached_property
     def driven_kinds(self) -> Mapping[str, Quantity]:

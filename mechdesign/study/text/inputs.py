@@ -77,6 +77,9 @@ def files(data: Mapping[str, Any], commands: Iterable[str]) -> Iterator[tuple[Ke
         for name, raw in ((data.get(section) or {}).get(key) or {}).items():
             if (file := file_of(raw)) is not None:
                 yield (section, key, name, "file") if isinstance(raw, Mapping) else (section, key, name), file
+    for name, raw in ((data.get("mechanism") or {}).get("couplings") or {}).items():
+        if isinstance(raw, Mapping) and (file := file_of(raw.get("table"))) is not None:
+            yield ("mechanism", "couplings", name, "table"), file
     for name, raw in ((data.get("reliability") or {}).get("dimensions") or {}).items():
         if isinstance(raw, Mapping) and isinstance(raw.get("measured"), str):
             yield ("reliability", "dimensions", name, "measured"), raw["measured"]

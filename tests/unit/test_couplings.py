@@ -1,0 +1,206 @@
+"""Couplings: what a study may say of them, what they give, the forces of their wheels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.gallery import study_named
+from helpers.studies import study_of
+from scipy.interpolate import CubicSpline
+
+from mechdesign.errors import StudyError
+from mechdesign.mechanism import Mechanism
+from mechdesign.mechanism.describe import describe
+from mechdesign.mechanism.outputs import first, second
+from mechdesign.questions.dynamics.analysis import dynamics
+from mechdesign.questions.kinematics.analysis import kinematics
+
+FIVE_BAR = """
+mechanism:
+  links: {ground: {O: [0, 0], C: [100, 0]}, g1: [O, A, 30], g2: [C, D, 35], a: [A, B, 80], b: [D, B, 85]}
+  drives: [g1]
+  couplings: {mesh: %s}
+  sketch: {A: [30, 0], D: [117, 30], B: [50, 90]}
+"""
+
+
+def five_bar(coupling: str) -> Mechanism:
+    return study_of(FIVE_BAR % coupling).mechanism
+
+
+@pytest.mark.parametrize(
+    ("coupling", "message"),
+    [
+        ("{set: g2}", "one of to: expression, ratio: number, table: file"),
+        ("{set: g2, to: g1, ratio: 2}", "to and ratio are given"),
+        ("{set: g2, ratio: 2}", "needs 'of'"),
+        ("{set: g2, to: 2*g1, of: g1}", "'of' belongs to a 'ratio' or a 'table'"),
+        ("{set: g2, to: 2*g1, phase: 3}", "'phase' belongs to a 'ratio'"),
+        ("{set: g3, of: g1, ratio: 2}", "there is no coordinate 'g3'"),
+        ("{set: B.x, of: g1, ratio: 2}", "'B.x' cannot follow others"),
+        ("{set: g2, of: g2, ratio: 2}", "'g2' cannot follow itself"),
+        ("{set: g2, to: 2*h1}", "there is no coordinate or parameter 'h1'"),
+        ("{set: g2, of: g1, table: [[0, 1], [0, 2]]}", "at least 4 rows, the first column rising"),
+        ("{set: g2, of: g1, ratio: 2, wheels: chain}", "expected one of gears, belt, none"),
+        ("{set: g2, of: g1, ratio: 2, phase: 20 mm}", "'20 mm' is a length, where an angle is expected"),
+        ("{set: g2, of: g1, ratio: 2, pressure_angle: 95}", "between 0 and 90 degrees"),
+        ("{set: g1, to: '40'}", "'mesh' and 'g1' fix link 'g1' twice over"),
+    ],
+)
+def test_mistakes_are_named(coupling: str, message: str) -> None:
+    with pytest.raises(StudyError) as caught:
+        five_bar(coupling)
+    assert message in str(caught.value)
+
+
+def test_a_stiffness_is_refused() -> None:
+    with pytest.raises(StudyError, match=r"a mechanism with couplings \(mesh\) is not available"):
+        study_of(FIVE_BAR % "{set: g2, of: g1, ratio: 1}" + "stiffness: {at: B, actuators: {g1: 100}}\n")
+
+
+def test_a_phase_that_is_left_out_is_that_of_the_sketch() -> None:
+    mechanism = five_bar("{set: g2, of: g1, ratio: -1.5}")
+    drawn = np.degrees(np.arctan2(30, 17))
+    pose = mechanism.solve({"g1": [-20, 0, 20]})
+    assert pose["g2.angle"] == pytest.approx(drawn + np.array([30, 0, -30]), abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    "coupling",
+    [
+        "{set: g2, of: g1, ratio: -1.37, phase: 20}",
+        '{set: g2, to: "40*sin(g1) + 70 - 0.3*g1"}',
+        '{set: g2, to: "30 + 0.3*B.x - 0.002*B.y**2"}',
+        "{set: g2, of: g1, table: [[-90, 10], [0, 40], [60, 80], [120, 60], [200, 20]]}",
+        '{set: g2, to: "60 + 0.4*b.angle"}',
+    ],
+)
+def test_velocities_and_accelerations_are_differences(coupling: str) -> None:
+    mechanism, at, h = five_bar(coupling), np.array([5.0, 25.0, 50.0]), 1e-2
+    before, here, after = (mechanism.solve({"g1": at + step}) for step in (-h, 0, h))
+    assert here.configuration.valid.all()
+    linear = mechanism.linearize(here.configuration)
+    velocity = linear.velocity([1.0])
+    acceleration = linear.acceleration(velocity, [0.4])
+    turn = np.radians(h)
+    for name in ("B.x", "B.y", "D.x"):
+        coordinate = mechanism.coordinate(name)
+        slope = (after[name] - before[name]) / (2 * turn)
+        bend = (after[name] - 2 * here[name] + before[name]) / turn**2
+        assert first(here.configuration, coordinate, velocity) == pytest.approx(slope, rel=1e-5, abs=1e-4)
+        found = second(here.configuration, coordinate, velocity, velocity, acceleration)
+        assert found == pytest.approx(bend + 0.4 * slope, rel=1e-4, abs=1e-3)
+
+
+def test_turns_count() -> None:
+    """Half as fast as the drive, a wheel is on the other side after a turn of the drive."""
+    mechanism = five_bar("{set: g2, of: g1, ratio: 0.5, phase: 20}")
+    pose = mechanism.solve({"g1": [10.0, 370.0, 730.0]})
+    assert pose["g2.angle"] == pytest.approx([25, 205, 385])
+    assert pose["D.x"][0] == pytest.approx(pose["D.x"][2])
+    assert abs(pose["D.x"][0] - pose["D.x"][1]) > 1
+
+
+def test_what_is_set_may_be_driven() -> None:
+    """The coupling, read backwards, gives the crank, in its turn."""
+    drives = FIVE_BAR.replace("drives: [g1]", "drives: [g2]")
+    mechanism = study_of(drives % "{set: g2, of: g1, ratio: -1.5, phase: 60}").mechanism
+    wanted = np.array([0.0, 30, 80, 170, 355, -300])
+    pose = mechanism.solve({"g2": wanted})
+    assert pose["g1.angle"] == pytest.approx((wanted - 60) / -1.5, abs=1e-9)
+    bent = study_of(drives % '{set: g2, to: "60 - 1.5*g1.angle + 10*sin(g1.angle)"}').mechanism
+    crank = bent.solve({"g2": wanted})["g1.angle"]
+    assert 60 - 1.5 * crank + 10 * np.sin(np.radians(crank)) == pytest.approx(wanted, abs=1e-8)
+
+
+def test_an_inverse_problem_leads_back() -> None:
+    mechanism = five_bar("{set: g2, of: g1, ratio: -1, phase: 60}")
+    pose = mechanism.solve({"g1": [10.0, 20.0, 30.0]})
+    back = mechanism.solve({"B.x": pose["B.x"]})
+    assert back["g1"] == pytest.approx([10, 20, 30], abs=1e-8)
+
+
+def test_a_table_is_a_spline_and_repeats_after_a_turn() -> None:
+    angles = np.arange(0, 361, 30)
+    lifts = 12 + 5 * (1 - np.cos(2 * np.radians(angles))) + np.sin(np.radians(angles))
+    lifts[-1] = lifts[0]
+    rows = [[int(a), float(s)] for a, s in zip(angles, lifts, strict=True)]
+    study = study_of(f"""
+mechanism:
+  links: {{ground: {{O: [0, 0]}}, cam: [O, N, 20], follower: {{F: [0, 0]}}}}
+  joints: {{valve: {{prismatic: [ground, follower], through: O, direction: 90}}}}
+  drives: [cam]
+  couplings: {{lift: {{set: valve, of: cam, table: {rows}}}}}
+  sketch: {{N: [20, 0], F: [0, 12]}}
+""")
+    spline = CubicSpline(np.radians(angles), lifts, bc_type="periodic")
+    at = np.array([0.0, 17, 123, 359, 377, -10])
+    pose = study.mechanism.solve({"cam": at})
+    assert pose["F.y"] == pytest.approx(spline(np.radians(at % 360)), abs=1e-12)
+    linear = study.mechanism.linearize(pose.configuration)
+    velocity = linear.velocity([1.0])
+    bend = second(
+        pose.configuration, study.mechanism.coordinate("F.y"), velocity, velocity, linear.acceleration(velocity, [0.0])
+    )
+    assert bend == pytest.approx(spline(np.radians(at % 360), 2), rel=1e-3, abs=1e-3)
+
+
+def test_two_gears_press_their_bearings_apart() -> None:
+    """A moment M on the second gear: the teeth bear M/r2 along the pitch circles, and that times tan 20 deg apart."""
+    study = study_of("""
+mechanism:
+  links: {ground: {O: [0, 0], C: [90, 0]}, pinion: [O, A, 20], wheel: [C, B, 40]}
+  drives: [pinion]
+  couplings: {mesh: {set: wheel, of: pinion, ratio: -0.5}}
+  sketch: {A: [20, 0], B: [130, 0]}
+dynamics:
+  sweep: {pinion: {from: 0, to: 90, step: 30}}
+  loads: [{link: wheel, moment: 1200}]
+""")
+    result = dynamics(study)
+    assert result.main["pinion_effort"] == pytest.approx(np.full(4, 600))
+    forces = result.tables["joint_forces"]
+    on_wheel = forces["joint"] == "C"
+    sign = np.where(forces["on"][on_wheel] == "wheel", 1.0, -1.0)
+    tooth = 1200 / 60
+    assert np.hypot(forces["fx"], forces["fy"]) == pytest.approx(np.full(len(forces), tooth / np.cos(np.radians(20))))
+    # Pressed away from the pinion, the wheel is held by its bearing towards it.
+    assert sign * forces["fx"][on_wheel] == pytest.approx(np.full(4, -tooth * np.tan(np.radians(20))))
+
+
+@pytest.mark.parametrize(
+    "coupling",
+    ["{set: g2, of: g1, ratio: -1.37}", '{set: g2, to: "40*sin(g1) + 70 - 0.3*g1"}', '{set: g2, to: "60 + 0.4*B.y"}'],
+)
+def test_power_is_the_rate_of_energy(coupling: str) -> None:
+    text = FIVE_BAR % coupling
+    for name, mass in (("g1", 0.5), ("g2", 0.6), ("a", 0.2), ("b", 0.3)):
+        ends = {"g1": "O, to: A, length: 30", "g2": "C, to: D, length: 35", "a": "A, to: B, length: 80",
+                "b": "D, to: B, length: 85"}[name]  # fmt: skip
+        text = text.replace(
+            f"{name}: [{ends.replace(' to: ', ' ').replace(' length: ', ' ')}]",
+            f"{name}: {{from: {ends}, mass: {mass}, inertia: 1e-4}}",
+        )
+    study = study_of(text + """
+dynamics: {gravity: [0, -9.81 m/s2], sweep: {g1: {from: 10, to: 50, step: 0.25}}, rates: {g1: 600}}
+""")  # fmt: skip
+    table = dynamics(study).main
+    assert table["valid"].all()
+    energy = CubicSpline(table["g1"], table["kinetic_energy"] + table["potential_energy"])(table["g1"], 1) * 600
+    inner = slice(8, -8)
+    size = np.abs(table["g1_power"]).max()
+    assert table["g1_power"][inner] / size == pytest.approx(energy[inner] / size, abs=1e-6)
+
+
+def test_check_tells_couplings() -> None:
+    told = describe(study_named("planetary").mechanism)
+    assert "1. couplings sun_mesh, ring_mesh: arm.angle, planet.angle" in told
+    assert "coupling: ring_mesh (planet.angle = arm.angle - zr/zp*arm.angle)" in told
+    assert "coupling: mesh (g2.angle = mesh.ratio*g1 + mesh.phase)" in describe(five_bar("{set: g2, of: g1, ratio: 1}"))
+
+
+def test_kinematics_has_what_follows() -> None:
+    study = study_of(FIVE_BAR % "{set: g2, of: g1, ratio: -1, phase: 60}" + """
+kinematics: {sweep: {g1: {from: 0, to: 40, step: 10}}, outputs: [g2.angle]}
+""")  # fmt: skip
+    assert kinematics(study).main["g2.angle"] == pytest.approx(60 - np.arange(0, 41, 10))
