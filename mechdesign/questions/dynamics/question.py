@@ -12,8 +12,9 @@ import numpy as np
 
 from mechdesign.expressions import Expression
 from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
+from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, springs
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
@@ -106,14 +107,9 @@ class ForceQuestion:
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
     ) -> tuple[dict[str, Value], Balance]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
-        study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
-        forces = Forces(linear.configuration)
-        Loading(study, section.loads, poses, rows).add(forces, moving)
-        description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
-        energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
-        masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
-        energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
-        held = balance(linear, forces, self.study.mechanism.meshes)
+        mechanism = self.study.mechanism
+        forces, energy = self.acting(poses, linear.configuration, rows, moving)
+        held = balance(linear, forces, mechanism.meshes)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
@@ -125,6 +121,19 @@ class ForceQuestion:
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
         return columns, held
+
+    def acting(
+        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving
+    ) -> tuple[Forces, Energy]:
+        """Loads, springs, weights and inertia forces at some rows of poses, and the energies."""
+        study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
+        forces = Forces(configuration)
+        Loading(study, section.loads, poses, rows).add(forces, moving)
+        description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
+        energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
+        masses = {**self._beams(poses, rows, configuration.places), **description.masses}
+        energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
+        return forces, energy
 
     def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""

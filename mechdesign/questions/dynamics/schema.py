@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, ClassVar, Self
 
 from pydantic import Field
 
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints
+from mechdesign.questions.dynamics.forward_schema import ForwardSection
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import MotionSection
@@ -26,12 +28,22 @@ class DynamicsSection(MotionSection):
     """Forces and moments that act on the mechanism beside weights, inertia and springs. Example: [{at: T, force: [0,
     -20]}, {link: rocker, moment: "-0.1*rocker.angle_velocity"}]
     """
+    forward: ForwardSection | None = None
+    """The motion that given efforts of the drives bring about, in place of poses and rates. Example: {duration: 2 s,
+    start: {theta: 0}, efforts: {theta: "5 - 0.1*theta_velocity"}}
+    """
 
     def checked(self, checker: Checker) -> Self:
         """Also check the loads."""
         section = self if self.moves else checker.parts.get("kinematics") or self
-        timed = section.motion is not None
-        check_loads(checker, self.loads, (self.command, "loads"), moving=section.rated, timed=timed)
+        timed, moving = section.motion is not None, section.rated
+        if self.forward is not None:
+            timed = moving = True
+            self.forward.checked(checker, (self.command, "forward"))
+            for key in filter(partial(getattr, self), (*self.sources, "rates", "accelerations", "speed")):
+                message = f"'forward' and {key!r} are both given; what efforts bring about has poses and rates of its own"
+                checker.report((self.command, key), message, at_key=True)
+        check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=timed)
         return super().checked(checker)
 
     def joints(self, mechanism: Mechanism) -> Joints:
