@@ -57,7 +57,7 @@ class Positions:
         self.start = self.of(at)[:, 0]
         followed = angles_of([*coordinates, *self.coordinates, *(c.function for c in mechanism.couplings)]).values()
         self.angles = {angle.name: angle for angle in followed if angle.kind == "angle"}
-        self._turns = {name: float(at.value(angle)) - self._difference(angle, self.start[:, None])[0]
+        self._turns = {name: float(at.value(angle)) - self.difference(angle, self.start[:, None])[0]
                        for name, angle in self.angles.items()}  # fmt: skip
 
     def of(self, configuration: Configuration) -> Floats:
@@ -67,10 +67,10 @@ class Positions:
 
     def near(self, x: Floats) -> dict[str, Value]:
         """Values of the angles, with their turns."""
-        return {name: self._difference(angle, x) + self._turns[name] for name, angle in self.angles.items()}
+        return {name: self.difference(angle, x) + self._turns[name] for name, angle in self.angles.items()}
 
-    def _difference(self, angle: Coordinate, x: Floats) -> Floats:
-        """Angle between the classes of two bodies, up to a constant."""
+    def difference(self, angle: Coordinate, x: Floats) -> Floats:
+        """Angle between the classes of two bodies, up to a constant; of rates of `x` its rate."""
         total = np.zeros(x.shape[1])
         for sign, body in ((1, angle.body), (-1, angle.reference)):
             frame = self.mechanism.graph.bodies[body][0]

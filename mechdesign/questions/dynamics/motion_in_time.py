@@ -66,6 +66,7 @@ class Rates(NamedTuple):
     acceleration: Floats
     power: Floats  # of efforts and loads, less what dampers take
     kinetic: Floats
+    potential: Floats
     efforts: Floats  # of the drives
 
 
@@ -216,7 +217,7 @@ class EquationsOfMotion:
             np.array([np.broadcast_to(first(configuration, c, part), shape) for c in self.positions.coordinates])
             for part in (moves, acceleration)
         ]
-        rates = Rates(*whole, *(np.array(np.broadcast_to(v, shape)) for v in (power, energy.kinetic)), efforts)
+        rates = Rates(*whole, *(np.array(np.broadcast_to(v, shape)) for v in (power, energy.kinetic, energy.potential)), efforts)
         return rates, regularity(linear)
 
     def matrix(self, time: float, x: Floats) -> tuple[Floats, Linearization]:
@@ -297,7 +298,7 @@ class Integration:
             solver = self._solver(0.0, self.begin)
             self._keep(rows[:1], self.begin[:, None])
             rows = rows[1:]
-            failed, steps, bounces = False, 0, 0
+            failed, steps, bounces, watches = False, 0, 0, bool(list(self._watched()))
             while solver.status == "running":
                 begin, steps = solver.t, steps + 1
                 solver.step()
@@ -306,8 +307,11 @@ class Integration:
                     why = f"{MAX_STEPS} steps are not enough" if steps > MAX_STEPS else "the motion cannot go on"
                     self._ended = f"{why} at {begin:.6g}"
                     break
+                if not watches and (not len(rows) or rows[0] > solver.t):
+                    solver = self._switched(solver)
+                    continue
                 dense = solver.dense_output()
-                stop = self._stop(dense, begin, solver.t)
+                stop = self._stop(dense, begin, solver.t) if watches else None
                 until = solver.t if stop is None else stop[1]
                 inside = rows[rows <= until]
                 if len(inside):
@@ -378,13 +382,10 @@ class Integration:
         self, dense: Callable[[Floats], Floats], begin: float, end: float
     ) -> tuple[str, float, Coordinate] | None:
         """The first limit that is reached in a step; crossings up to there are noted."""
-        watched = list(self._watched())
-        if not watched:
-            return None
         times = begin + np.append(0.0, LOOKED_AT) * (end - begin)
         places = self._pose(dense(times))
         found: list[tuple[str, float, Coordinate | None, bool]] = []
-        for name, limit, function in watched:
+        for name, limit, function in self._watched():
             values = np.broadcast_to(function(places), times.shape)
             for k in range(len(times) - 1):
                 one, other = float(values[k]), float(values[k + 1])

@@ -26,6 +26,7 @@ from mechdesign.questions.loads import Loading
 from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.motions import Course
 
 # Parts of what a joint bears, as columns of its own.
 PARTS = ("fx", "fy", "moment", "magnitude", "angle", "normal")
@@ -177,10 +178,13 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     assert section is not None
     pace = section if section.moves else own
     rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
+    if section.forward is not None:
+        # What efforts bring about is a motion over time, whose poses are there already.
+        rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     question = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, pace.rated, question.tempo),
+        borne=ForceQuestion(study, section, motion.rated, question.tempo),
     )  # fmt: skip
