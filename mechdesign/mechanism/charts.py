@@ -9,18 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import qr
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import TURN, Value, angle_of, quiet, rotation
+from mechdesign.mechanism.algebra import TURN, Value, quiet, rotation
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.decomposition import compile_structure
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.loops import Loops
 from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.plan import Plan
@@ -44,7 +42,7 @@ class Positions:
 
     def __init__(self, mechanism: Mechanism, at: Configuration, coordinates: Iterable[Coordinate] = ()) -> None:
         self.mechanism, graph = mechanism, mechanism.graph
-        first = {frame: body for body, (frame, _) in reversed(graph.bodies.items()) if frame}
+        first = {frame: body for body, (frame, _) in reversed([*graph.bodies.items()]) if frame}
         #: By class, its row; the ground has none.
         self.rows = {frame: row for row, frame in enumerate(sorted(first))}
         angles = [Coordinate(f"{first[frame]}.angle", "angle", "angle", body=first[frame], turn=TURN)

@@ -101,7 +101,6 @@ class Forces:
             whole, moment = plus(whole, 1, force), moment + own + cross(nodes[self.bases[body]], force)
         return whole, moment
 
-
     @quiet
     def power(self, velocity: Rates) -> Value:
         """What all forces together do per time."""

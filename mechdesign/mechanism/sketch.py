@@ -172,9 +172,9 @@ def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
 
 
 def side(group: Group, a: Vector, b: Vector) -> tuple[Value, Value]:
-    """On which side of its dividing line a dyad is, by the columns of its loop: an area that is positive in assembly +1.
+    """On which side of its dividing line a dyad is, by the columns of its loop, and what that is compared with.
 
-    Beside it the area with which it is compared.
+    Both are areas; the first is positive in assembly +1.
     """
     if group.form == "two angles":
         return cross(a + b, a), np.abs(a + b) * np.minimum(np.abs(a), np.abs(b))

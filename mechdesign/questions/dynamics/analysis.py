@@ -7,7 +7,7 @@ carry the forces along.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -18,16 +18,17 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.forward import forward
+from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import force_question
-from mechdesign.questions.dynamics.tables import DrawnForces, dynamics_table, extremes_table, joint_table, question_of
+from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import follow
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
-from mechdesign.questions.poses import invalid_in_words, judge_failures, study_poses
+from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
-from mechdesign.results import Result, Scope, Table
+from mechdesign.results import Drawn, Result, Scope, Table
 from mechdesign.statistics import Asked
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -38,11 +39,20 @@ A_ROW_A_POSE = {"dynamics": dynamics_table, "joint_forces": joint_table}
 TABLES = (*A_ROW_A_POSE, "extremes")
 
 
+@dataclass(frozen=True, eq=False)
+class DrawnForces(Drawn):
+    """The solved poses of a motion, and its columns at each pose."""
+
+    shown: Shown
+    motion: Motion
+
+
 @one_thread()
 def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Efforts and forces at every pose of the study's dynamics; see `mechdesign.dynamics`."""
     if study.dynamics is not None and study.dynamics.forward is not None:
-        return forward(study, progress)
+        course, motion, shown = forward(study, progress)
+        return replace(course, drawn=DrawnForces(shown, motion))
     poses = study_poses(study, "dynamics")
     progress.start(poses.count, "poses")
     passage = pass_over(force_question(study, poses), _marks, progress, jobs)
@@ -90,6 +100,7 @@ def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
     answers, along = tables(passage.motion, question, TABLES)
+    answers |= further_tables(passage.motion)
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")

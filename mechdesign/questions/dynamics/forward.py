@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.motion_in_time import Course, EquationsOfMotion, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
-from mechdesign.questions.dynamics.tables import DrawnForces, dynamics_table, extremes_table, joint_table, question_of
+from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.outputs import expand_outputs
 from mechdesign.questions.poses import MAX_SHOWN_POSES, Shown, SolvedPoses, in_study_units
@@ -25,15 +25,8 @@ from mechdesign.study.poses import PoseGroup, Poses
 from mechdesign.study.schema.checker import ORDERS
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnCourse(DrawnForces):
-    """The forces along a motion in time, and what ended it."""
-
-    ended: str = ""
-
-
-def forward(study: Study, progress: Progress) -> Result:
-    """The motion that the efforts of `dynamics.forward` bring about.
+def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
+    """The motion that the efforts of `dynamics.forward` bring about, the forces along it, and what pictures show.
 
     Raises
     ------
@@ -43,7 +36,8 @@ def forward(study: Study, progress: Progress) -> Result:
         If the mechanism has no inertia along a motion.
     """
     section = study.dynamics
-    assert section is not None and section.forward is not None
+    assert section is not None
+    assert section.forward is not None
     outputs = expand_outputs(study, section.outputs or ())
     equations = EquationsOfMotion(ForceQuestion(study, section, moves=True), section.forward, outputs)
     course = Integration(equations).run(progress)
@@ -59,15 +53,18 @@ def forward(study: Study, progress: Progress) -> Result:
     warnings = []
     if course.ended:
         kind, words = ("unconverged", "ended early") if course.failed else ("incomplete", "ended")
-        warnings.append(Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward"))
+        warnings.append(
+            Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward")
+        )
     counts = {"instants": len(course.times), "steps": course.steps}
-    return Result("dynamics", found, warnings, counts, drawn=DrawnCourse(shown, motion, course.ended))
+    return Result("dynamics", found, warnings, counts), motion, shown
 
 
 def _rates(course: Course, drive: Coordinate, values: Floats) -> Floats:
     """Velocity or acceleration of a drive, from those of all positions."""
     if drive.kind == "slide":
-        return values[len(course.positions.rows) + drive.slide]
+        slide: Floats = values[len(course.positions.rows) + drive.slide]
+        return slide
     return course.positions.difference(drive, values)
 
 
@@ -104,10 +101,10 @@ def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) ->
         units = [label(kind) for kind in ORDERS[drive.quantity]]
         columns.append(DRIVE.column(poses.values[drive.name], units[0], drive=drive.name))
         for word, values, unit in (
-            ("velocity", poses.slopes, units[1]), ("acceleration", poses.bends, units[2]),
-            ("effort", {drive.name: course.rates.efforts[k]}, label("moment" if drive.quantity == "angle" else "force")),
+            ("velocity", poses.slopes[drive.name], units[1]), ("acceleration", poses.bends[drive.name], units[2]),
+            ("effort", course.rates.efforts[k], label("moment" if drive.quantity == "angle" else "force")),
         ):  # fmt: skip
-            columns.append(FORWARD[f"<drive>_{word}"].column(values[drive.name], unit, drive=drive.name))
+            columns.append(FORWARD[f"<drive>_{word}"].column(values, unit, drive=drive.name))
     for output in outputs:
         value = np.broadcast_to(in_study_units(study, output, course.configuration.value(output)), course.times.shape)
         columns.append(FORWARD["<output>"].column(value, label(output.quantity), output=output.name))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from mechdesign.expressions import Expression
 from mechdesign.study.schema.checker import ORDERS, Checker
@@ -37,11 +37,13 @@ class ForwardSection(fields.Model):
 
     duration: Time
     """How long the motion lasts, unless a limit of motion ends it. Example: 2 s"""
-    start: dict[fields.CoordinateName, fields.Number] = {}
+    start: dict[fields.CoordinateName, fields.Number] = Field(default_factory=dict)
     """Values of the drives at the start, and their velocities (``theta_velocity``). Left out: as drawn, at rest.
     Example: {theta: 30, theta_velocity: 10 rad/s}
     """
-    efforts: dict[fields.DriveName, Annotated[Quantity, fields.Read(read_quantity, fields.NUMBER_FORM)]] = {}
+    efforts: dict[fields.DriveName, Annotated[Quantity, fields.Read(read_quantity, fields.NUMBER_FORM)]] = Field(
+        default_factory=dict
+    )
     """Torques or forces of the drives, as numbers or as expressions of coordinates, their velocities and ``time``, in
     the study's units. Left out: 0, the drive runs free. Example: {theta: "5 - 0.1*theta_velocity"}
     """
@@ -49,7 +51,7 @@ class ForwardSection(fields.Model):
     """Velocity with which limits of motion are left over that with which they are reached, from 0 to 1. Left out: the
     motion ends at a limit. Example: 0.5
     """
-    events: dict[fields.CoordinateName, Crossing] = {}
+    events: dict[fields.CoordinateName, Crossing] = Field(default_factory=dict)
     """Crossings whose times are asked, by a name of yours. Example: {passes: {of: C.x, value: 30}}"""
     rows: Annotated[int, fields.whole(2, MAX_ROWS)] = ROWS
     """Number of instants in the tables, evenly spread over the duration. Left out: |ROWS|. Example: 1001"""
@@ -80,6 +82,6 @@ class ForwardSection(fields.Model):
                 check_name(checker, used, place, moving=True, timed=True)
         for name, crossing in self.events.items():
             checker.coordinate(crossing.of, (*path, "events", name, "of"))
-            quantity = checker.mechanism.coordinates.get(crossing.of)
-            if quantity in ORDERS:
-                checker.kind((*path, "events", name, "value"), ORDERS[quantity][0])
+            kind = checker.mechanism.coordinates.get(crossing.of)
+            if kind in ORDERS:
+                checker.kind((*path, "events", name, "value"), ORDERS[kind][0])

@@ -1,20 +1,21 @@
 """The motion that given efforts bring about: equations of motion of any mobility, integrated in time.
 
 Inverse dynamics is affine in the accelerations: with q the coordinates of a chart, efforts Q = M(q) q'' + c(q, q', t).
-One call with no acceleration and with each unit acceleration gives c and the columns of M, and M q'' = Q - c the motion.
+One call without acceleration and with each unit acceleration gives c and the columns of M; M q'' = Q - c is the motion.
 
-The state holds all positions x of the mechanism and their velocities, of which a chart's are independent. The others are
-solved from these in every pose, from the assembly that the state shows: so loops close to rounding, and the motion goes
-on through poses at which two assemblies meet. There the equations lose rank while the motion itself is smooth: its rates
-are those of poses before and behind, interpolated. Where a chart's coordinates come near to a dead centre, others take
-over.
+The state holds all positions x of the mechanism and their velocities, of which a chart's are independent. The others
+are solved from these in every pose, in the assembly that the state shows: so loops close to rounding, and the motion
+goes on through poses at which two assemblies meet. There the equations lose rank while the motion itself is smooth: its
+rates are those of poses before and behind, interpolated. Where a chart's coordinates come near to a dead centre, others
+take over.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import DOP853
@@ -23,9 +24,10 @@ from scipy.optimize import brentq
 from mechdesign.errors import AssemblyError, MechanismError
 from mechdesign.mechanism import Configuration, Mechanism, Reason
 from mechdesign.mechanism.algebra import Value, quiet
-from mechdesign.mechanism.charts import Atlas, Chart, Positions, regularity
+from mechdesign.mechanism.charts import Atlas, Positions, regularity
 from mechdesign.mechanism.configuration import joined
 from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
 from mechdesign.mechanism.forces import Forces, Moving
@@ -118,9 +120,7 @@ class EquationsOfMotion:
         If the drives do not determine the start, or the mechanism has no inertia along a motion.
     """
 
-    def __init__(
-        self, question: ForceQuestion, section: ForwardSection, outputs: Sequence[Coordinate] = ()
-    ) -> None:
+    def __init__(self, question: ForceQuestion, section: ForwardSection, outputs: Sequence[Coordinate] = ()) -> None:
         self.question, self.section, self.study = question, section, question.study
         mechanism = self.study.mechanism
         at, linear, speeds = self._start(mechanism)
@@ -150,7 +150,7 @@ class EquationsOfMotion:
         linear = mechanism.linearize(pose)
         if regularity_of_drives(linear) < STALLED:
             raise AssemblyError(
-                "the start of dynamics.forward is a singular pose, at which velocities of the drives do not say how the "
+                "the start of dynamics.forward is a singular pose: there velocities of the drives do not say how the "
                 "mechanism moves; start beside it"
             )
         return pose, linear, np.array(speeds)
@@ -175,7 +175,9 @@ class EquationsOfMotion:
         speed = np.max(np.abs(velocity) / self.positions.scales)
         steps = AROUND / speed if speed > 0 else np.full(len(AROUND), np.nan)
         around = x[:, None] + velocity[:, None] * steps
-        rates, regular = self._rates(np.full(len(steps), time), around, np.repeat(velocity[:, None], len(steps), axis=1))
+        rates, regular = self._rates(
+            np.full(len(steps), time), around, np.repeat(velocity[:, None], len(steps), axis=1)
+        )
         good = np.flatnonzero(regular >= MEETING / 2)
         good = good[np.argsort(np.abs(AROUND[good]), kind="stable")[:NEAREST]]
         if len(good) < NEAREST:
@@ -213,11 +215,13 @@ class EquationsOfMotion:
         power = loads.power(moves) - energy.lost
         for effort, drive in zip(efforts, self.drives, strict=True):
             power = power + effort * first(configuration, drive, moves)
-        whole = [
+        velocities, accelerated = (
             np.array([np.broadcast_to(first(configuration, c, part), shape) for c in self.positions.coordinates])
             for part in (moves, acceleration)
-        ]
-        rates = Rates(*whole, *(np.array(np.broadcast_to(v, shape)) for v in (power, energy.kinetic, energy.potential)), efforts)
+        )
+        rates = Rates(
+            *whole, *(np.array(np.broadcast_to(v, shape)) for v in (power, energy.kinetic, energy.potential)), efforts
+        )
         return rates, regularity(linear)
 
     def matrix(self, time: float, x: Floats) -> tuple[Floats, Linearization]:
@@ -234,11 +238,21 @@ class EquationsOfMotion:
 def _solve(matrix: Floats, right: Floats) -> Floats:
     """Accelerations of poses, shape (n, poses), from mass matrices of shape (n, n, poses); nan where there are none."""
     full = np.moveaxis(matrix, -1, 0)
-    good = np.isfinite(full).all(axis=(1, 2)) & np.isfinite(right).all(axis=0)
+    good = np.array(np.isfinite(full).all(axis=(1, 2)) & np.isfinite(right).all(axis=0))
     good[good] = np.linalg.det(full[good]) != 0
     solution = np.full(right.shape, np.nan)
     solution[:, good] = np.linalg.solve(full[good], right.T[good][..., None])[..., 0].T
     return solution
+
+
+def _beyond(coordinate: Coordinate, value: Value, pose: Configuration) -> Value:
+    """By how much a coordinate is beyond a value."""
+    return pose.value(coordinate) - value
+
+
+def _margin(bound: Bound, places: Mapping[str, Value], k: int, pose: Configuration) -> Value:
+    """Margin of a limit by its number."""
+    return bound.margins(pose, places)[k][1]
 
 
 class Integration:
@@ -281,14 +295,15 @@ class Integration:
         energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
         return np.concatenate([self.positions.scales, self.positions.scales * pace, [energy]])
 
-    def _function(self, time: float, state: Floats) -> Floats:
+    def _function(self, time: float, state: Any) -> Any:
         """Derivative of the state: positions, velocities, work."""
         x, velocity = state[: self.count, None], state[self.count : -1, None]
         rates = self.equations.rates(np.array([time]), x, velocity)
         return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power])
 
     def _solver(self, time: float, state: Floats) -> DOP853:
-        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=ABSOLUTE * self.scales)
+        tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
+        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance)
 
     def run(self, progress: Progress = NULL) -> Course:
         """Integrate; rows are evenly spread over the duration, and one more where the motion ends before."""
@@ -301,8 +316,7 @@ class Integration:
             failed, steps, bounces, watches = False, 0, 0, bool(list(self._watched()))
             while solver.status == "running":
                 begin, steps = solver.t, steps + 1
-                solver.step()
-                if solver.status == "failed" or steps > MAX_STEPS:
+                if solver.step() is not None or steps > MAX_STEPS:
                     failed = True
                     why = f"{MAX_STEPS} steps are not enough" if steps > MAX_STEPS else "the motion cannot go on"
                     self._ended = f"{why} at {begin:.6g}"
@@ -340,7 +354,9 @@ class Integration:
 
     def _course(self, failed: bool, steps: int) -> Course:
         times, x, work = (np.concatenate([part[k] for part in self._parts], axis=-1) for k in (0, 1, 3))
-        rates = Rates(*(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in self._parts), strict=True)))
+        rates = Rates(
+            *(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in self._parts), strict=True))
+        )
         vectors = self.mechanism.geometry.nominal
         whole = joined([part[4] for part in self._parts], times.shape, vectors, {})
         near = self.positions.near(x)
@@ -371,12 +387,11 @@ class Integration:
         """Crossings and limits: name, of a limit its coordinate, and what changes its sign."""
         for name, coordinate in self.equations.crossings:
             value = radians(self.equations.study, coordinate, float(self.section.events[name].value))
-            yield name, None, lambda pose, c=coordinate, v=value: pose.value(c) - v
+            yield name, None, partial(_beyond, coordinate, value)
+        places = self.mechanism.nominal
         for bound in self.mechanism.bounds:
-            for k, (label, _) in enumerate(bound.margins(self.equations.last, self.mechanism.nominal)):
-                yield label, bound.coordinate, (
-                    lambda pose, b=bound, k=k: b.margins(pose, self.mechanism.nominal)[k][1]
-                )  # fmt: skip
+            for k, (label, _) in enumerate(bound.margins(self.equations.last, places)):
+                yield label, bound.coordinate, partial(_margin, bound, places, k)
 
     def _stop(
         self, dense: Callable[[Floats], Floats], begin: float, end: float

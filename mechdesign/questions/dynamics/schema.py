@@ -18,6 +18,13 @@ from mechdesign.study.text import fields
 HELP_PAGE = "theory/dynamics"
 
 
+class Flywheel(fields.Model):
+    """A flywheel on the one drive, an angle that turns at a constant speed through a cycle."""
+
+    fluctuation: fields.Positive
+    """Coefficient of fluctuation that is asked: largest less smallest speed, over the mean. Example: 0.05"""
+
+
 class DynamicsSection(MotionSection):
     """The motion whose drive efforts and joint forces are asked, and what acts on the mechanism."""
 
@@ -32,16 +39,33 @@ class DynamicsSection(MotionSection):
     """The motion that given efforts of the drives bring about, in place of poses and rates. Example: {duration: 2 s,
     start: {theta: 0}, efforts: {theta: "5 - 0.1*theta_velocity"}}
     """
+    flywheel: Flywheel | None = None
+    """The flywheel that evens out the speed of the drive over the poses, a cycle at constant speed. Example:
+    {fluctuation: 0.05}
+    """
+    modes: bool = False
+    """Whether natural frequencies of small motion about each pose are asked, of springs and gravity. Example: true"""
 
     def checked(self, checker: Checker) -> Self:
         """Also check the loads."""
+        if self.flywheel is not None and [*checker.mechanism.driven_kinds.values()] != ["angle"]:
+            message = "a flywheel sits on the one drive of a mechanism, an angle; this one has others"
+            checker.report((self.command, "flywheel"), message, at_key=True)
+        for key in ("flywheel", "modes") if self.forward is not None else ():
+            if getattr(self, key):
+                message = (
+                    f"'forward' and {key!r} are both given; {key} are those of poses: ask for them in another study"
+                )
+                checker.report((self.command, key), message, at_key=True)
         section = self if self.moves else checker.parts.get("kinematics") or self
         timed, moving = section.motion is not None, section.rated
         if self.forward is not None:
             timed = moving = True
             self.forward.checked(checker, (self.command, "forward"))
             for key in filter(partial(getattr, self), (*self.sources, "rates", "accelerations", "speed")):
-                message = f"'forward' and {key!r} are both given; what efforts bring about has poses and rates of its own"
+                message = (
+                    f"'forward' and {key!r} are both given; what efforts bring about has poses and rates of its own"
+                )
                 checker.report((self.command, key), message, at_key=True)
         check_loads(checker, self.loads, (self.command, "loads"), moving=moving, timed=timed)
         return super().checked(checker)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,16 +16,7 @@ from mechdesign.questions.dynamics.columns import DYNAMICS, EXTREMES, JOINT_FORC
 from mechdesign.questions.dynamics.question import PARTS, ForceQuestion
 from mechdesign.questions.kinematics.along import Along, of_swept, over
 from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.poses import Shown
-from mechdesign.results import Drawn, Table
-
-@dataclass(frozen=True, eq=False)
-class DrawnForces(Drawn):
-    """The solved poses of a motion, and its columns at each pose."""
-
-    shown: Shown
-    motion: Motion
-
+from mechdesign.results import Table
 
 # A range below this part of a function's size is rounding.
 STILL = 1e-12

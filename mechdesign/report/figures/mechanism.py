@@ -12,7 +12,7 @@ from mechdesign.errors import MechdesignError
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
-from mechdesign.questions.dynamics.tables import DrawnForces
+from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import mass_centers
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from mechdesign.numerics.arrays import Complexes, Floats
-from mechdesign.questions.dynamics.tables import DrawnForces
+from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.question import ForceQuestion
 from mechdesign.questions.dynamics.tables import STILL, question_of
 from mechdesign.report.figures.joints import NOTHING, Joint, loaded, peak
