@@ -24,9 +24,7 @@ from mechdesign.study.poses import Poses
 # is about 1e-12 of the stiffness.
 STEP = 1e-3
 STENCIL = {-2: 1 / 12, -1: -8 / 12, 1: 8 / 12, 2: -1 / 12}
-# Places a pose at which the energy of a cycle is looked at.
-FINE = 50
-# An eigenvalue below this part of the largest, or of what one radian of time makes of it, is rounding.
+# An eigenvalue below this part of the stiffness over the mass is rounding.
 ROUNDING = 1e-11
 
 
@@ -60,20 +58,17 @@ def _flywheel_table(motion: Motion, wheel: Flywheel) -> Table:
             sign = 1.0 if angle[-1] > angle[0] else -1.0
             whole = np.isclose((forwards[-1] - forwards[0]) / TURN, np.round((forwards[-1] - forwards[0]) / TURN))
 
-            def integral(values: Floats) -> PPoly:
+            def curve(values: Floats) -> PPoly:
                 if whole:
-                    closed = np.append(values[:-1], values[0])
-                    spline = CubicSpline(forwards, closed, bc_type="periodic")
-                else:
-                    spline = CubicSpline(forwards, values)
-                antiderivative: PPoly = spline.antiderivative()
-                return antiderivative
+                    return CubicSpline(forwards, np.append(values[:-1], values[0]), bc_type="periodic")
+                return CubicSpline(forwards, values)
 
-            work = integral(sign * effort)
-            places = np.linspace(forwards[0], forwards[-1], FINE * len(forwards))
-            mean = float(work(forwards[-1])) / (forwards[-1] - forwards[0])
-            surplus = float(np.ptp(work(places) - mean * (places - forwards[0])))
-            energy = float(integral(motion.arrays["kinetic_energy"])(forwards[-1])) / (forwards[-1] - forwards[0])
+            way, torque = forwards[-1] - forwards[0], curve(sign * effort)
+            mean = float(torque.integrate(forwards[0], forwards[-1])) / way
+            # Energy is largest and smallest where the torque passes its mean.
+            places = np.append(forwards[[0, -1]], torque.solve(mean, extrapolate=False))
+            surplus = float(np.ptp(torque.antiderivative()(places) - mean * (places - forwards[0])))
+            energy = float(curve(motion.arrays["kinetic_energy"]).integrate(forwards[0], forwards[-1])) / way
             mass = study.units.inertia_factor * speed**2
             own = 2 * energy / mass
             added = max(surplus / (wheel.fluctuation * mass) - own, 0.0)

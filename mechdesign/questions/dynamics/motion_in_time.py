@@ -219,10 +219,10 @@ class EquationsOfMotion:
             np.array([np.broadcast_to(first(configuration, c, part), shape) for c in self.positions.coordinates])
             for part in (moves, acceleration)
         )
-        rates = Rates(
-            *whole, *(np.array(np.broadcast_to(v, shape)) for v in (power, energy.kinetic, energy.potential)), efforts
+        power, kinetic, potential = (
+            np.array(np.broadcast_to(value, shape)) for value in (power, energy.kinetic, energy.potential)
         )
-        return rates, regularity(linear)
+        return Rates(velocities, accelerated, power, kinetic, potential, efforts), regularity(linear)
 
     def matrix(self, time: float, x: Floats) -> tuple[Floats, Linearization]:
         """Mass matrix of the chart's coordinates at a pose, shape (mobility, mobility), and the pose."""

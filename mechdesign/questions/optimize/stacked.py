@@ -72,7 +72,7 @@ def in_time(study: Study, command: str) -> bool:
 
 
 def complete(study: Study, command: str) -> bool:
-    """Whether `TABLES` has all costly tables of a command's answer: not of methods that sample, nor of motions in time."""
+    """Whether `TABLES` has all costly tables of a command's answer: not of what samples, nor of motions in time."""
     if in_time(study, command):
         return False
     return command != "reliability" or (
