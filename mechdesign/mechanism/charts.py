@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import TURN, Value, quiet, rotation
+from mechdesign.mechanism.algebra import TURN, Value, cross, quiet, rotation
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, angles_of
 from mechdesign.mechanism.decomposition import compile_structure
@@ -67,9 +67,16 @@ class Positions:
         """Values of the angles, with their turns."""
         return {name: self.difference(angle, x) + self._turns[name] for name, angle in self.angles.items()}
 
+    def rate(self, coordinate: Coordinate, rates: Floats) -> Floats:
+        """Derivative of an angle between bodies or of a slide from those of all positions, of shape (m, ...)."""
+        if coordinate.kind == "slide":
+            slide: Floats = rates[len(self.rows) + coordinate.slide]
+            return slide
+        return self.difference(coordinate, rates)
+
     def difference(self, angle: Coordinate, x: Floats) -> Floats:
         """Angle between the classes of two bodies, up to a constant; of rates of `x` its rate."""
-        total = np.zeros(x.shape[1])
+        total = np.zeros(x.shape[1:])
         for sign, body in ((1, angle.body), (-1, angle.reference)):
             frame = self.mechanism.graph.bodies[body][0]
             total = total + sign * x[self.rows[frame]] if frame else total
@@ -137,18 +144,21 @@ class Chart:
 
 @quiet
 def regularity(linear: Linearization) -> Floats:
-    """Smallest singular value of a group's equations whose columns have the length 1; 0 where they have no solution.
+    """How far a chart is from a pose where two assemblies meet, shape of the batch; 0 where it has no solution.
 
-    Shape of the batch; 1 where no group has equations.
+    Of two links that meet the sine of the angle between them, of a group without a closed form the smallest singular
+    value of its equations, whose columns have the length 1; the least of all groups.
     """
     least = np.ones(linear.configuration.shape)
     for index, group in enumerate(linear.structure.groups):
         if not group.solved:
             continue
-        matrix = np.stack(
-            [np.stack([np.broadcast_to(e, least.shape) for e in row], axis=-1) for row in linear.rows(index, group)],
-            axis=-2,
-        )
+        if group.dyad:
+            ((a, b),) = linear.loop_columns(index, group)
+            least = np.minimum(least, np.nan_to_num(np.abs(cross(a, b)) / (np.abs(a) * np.abs(b))))
+            continue
+        rows = [[np.broadcast_to(e, least.shape) for e in row] for row in linear.rows(index, group)]
+        matrix = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
         matrix = matrix / np.linalg.norm(matrix, axis=-2, keepdims=True)
         finite = np.isfinite(matrix).all(axis=(-1, -2))
         values = np.linalg.svd(np.where(finite[..., None, None], matrix, 0.0), compute_uv=False)[..., -1]

@@ -60,14 +60,6 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     return Result("dynamics", found, warnings, counts), motion, shown
 
 
-def _rates(course: Course, drive: Coordinate, values: Floats) -> Floats:
-    """Velocity or acceleration of a drive, from those of all positions."""
-    if drive.kind == "slide":
-        slide: Floats = values[len(course.positions.rows) + drive.slide]
-        return slide
-    return course.positions.difference(drive, values)
-
-
 def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
     """Forces along the motion: those of any motion over time, at the poses that were integrated."""
     mechanism, count = study.mechanism, len(course.times)
@@ -79,7 +71,7 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
     rows = np.arange(count)
     values = {drive.name: of(drive, course.configuration.value(drive)) for drive in drives}
     slopes, bends = (
-        {drive.name: of(drive, _rates(course, drive, part)) for drive in drives}
+        {drive.name: of(drive, course.positions.rate(drive, part)) for drive in drives}
         for part in (course.rates.velocity, course.rates.acceleration)
     )
     poses = Poses(

@@ -31,6 +31,7 @@ from mechdesign.mechanism.core import Bound
 from mechdesign.mechanism.derivatives import STALLED, Linearization
 from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
 from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.outputs import Rates as Directions
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats
@@ -189,40 +190,43 @@ class EquationsOfMotion:
     @quiet
     def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[Rates, Floats]:
         """Rates where the equations have full rank, and how regular they are."""
-        linear, count = self.chart.solve(x, self.last), len(self.chart.rows)
-        configuration, shape = linear.configuration, times.shape
+        linear, count, shape = self.chart.solve(x, self.last), len(self.chart.rows), times.shape
+        configuration, section, rows = linear.configuration, self.question.section, slice(None)
         moves = linear.velocity([*velocity[self.chart.rows]])
         units = np.eye(count + 1)[1:, :, None]
         moving = Moving(moves, linear.acceleration(moves, [*units]))
         poses = Poses((), len(times), True, shape, times=times)
-        rows = slice(None)
         forces, energy = self.question.acting(poses, configuration, rows, moving)
         held = balance(linear, forces).efforts
         table = np.array([np.broadcast_to(effort, (count + 1, *shape)) for effort in held])
         rest, matrix = table[:, 0], table[:, 1:] - table[:, :1]
-        loading = Loading(self.study, self.question.section.loads, poses, rows)
-        drives = [loading.value(self.section.efforts.get(d.name, NOTHING), forces, moving) for d in self.drives]
-        efforts = np.array([np.broadcast_to(effort, shape) for effort in drives], dtype=float)
-        by = linear.by_drives
-        pushed = np.array([
-            sum(e * first(configuration, d, part) for e, d in zip(efforts, self.drives, strict=True)) for part in by
-        ])  # fmt: skip
-        pushed = np.array([np.broadcast_to(part, shape) for part in pushed])
-        accelerations = _solve(matrix, pushed - rest)
-        acceleration = linear.acceleration(moves, [*accelerations])
-        loads = Forces(configuration)
-        loading.add(loads, moving)
-        power = loads.power(moves) - energy.lost
-        for effort, drive in zip(efforts, self.drives, strict=True):
-            power = power + effort * first(configuration, drive, moves)
-        velocities, accelerated = (
-            np.array([np.broadcast_to(first(configuration, c, part), shape) for c in self.positions.coordinates])
-            for part in (moves, acceleration)
+        loading = Loading(self.study, section.loads, poses, rows)
+        given = [loading.value(self.section.efforts.get(d.name, NOTHING), forces, moving) for d in self.drives]
+        efforts = np.array([np.broadcast_to(effort, shape) for effort in given], dtype=float)
+        velocities, columns = self._of_all(moves, shape), self._of_all(moving.acceleration, (count + 1, *shape))
+        # What the unit accelerations add are derivatives of the positions by the chart's coordinates.
+        slopes = columns[:, 1:] - columns[:, :1]
+        by = np.array([self.positions.rate(d, slopes) for d in self.drives])
+        accelerations = _solve(matrix, np.einsum("dp,dkp->kp", efforts, by) - rest)
+        accelerated = columns[:, 0] + np.einsum("mkp,kp->mp", slopes, accelerations)
+        power = np.sum(
+            [e * self.positions.rate(d, velocities) for e, d in zip(efforts, self.drives, strict=True)], axis=0
         )
+        power = power - energy.lost
+        if section.loads:
+            loads = Forces(configuration)
+            loading.add(loads, moving)
+            power = power + loads.power(moves)
         power, kinetic, potential = (
             np.array(np.broadcast_to(value, shape)) for value in (power, energy.kinetic, energy.potential)
         )
         return Rates(velocities, accelerated, power, kinetic, potential, efforts), regularity(linear)
+
+    def _of_all(self, rates: Directions | None, shape: tuple[int, ...]) -> Floats:
+        """Derivatives of all positions, shape (m, ...)."""
+        assert rates is not None
+        angles = [rates.angles[frame] for frame in self.positions.rows]
+        return np.array([np.broadcast_to(value, shape) for value in (*angles, *rates.slides)])
 
     def matrix(self, time: float, x: Floats) -> tuple[Floats, Linearization]:
         """Mass matrix of the chart's coordinates at a pose, shape (mobility, mobility), and the pose."""
