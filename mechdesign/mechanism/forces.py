@@ -39,11 +39,14 @@ class Forces:
         Force on the pin at each node.
     bodies : dict
         By body, the force on it at its base, and the moment about that.
+    acting : list
+        All of these that act on bodies one by one: the body, the arm from its base, the force and the moment.
     """
 
     configuration: Configuration
     nodes: list[Vector] = field(default_factory=list)
     bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
+    acting: list[tuple[str, Vector, Vector, Value]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.nodes = [0.0] * len(self.configuration.nodes)
@@ -55,6 +58,7 @@ class Forces:
 
     def on_body(self, body: str, force: Vector, moment: Value = 0.0, arm: Vector = 0.0) -> None:
         """Add a force on a body at an arm from its base, and a moment."""
+        self.acting.append((body, arm, force, moment))
         before = self.bodies.get(body, (0.0, 0.0))
         self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
 

@@ -162,7 +162,7 @@ class Coupling:
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
     is a parameter as in a `Measure`, or a place of the coupling's own. Its `wheels` are gears, whose teeth have a
-    `pressure_angle` (radians), or pulleys of a belt.
+    `pressure_angle` (radians), or pulleys of a belt with the `radius` of the one that follows.
     """
 
     name: str
@@ -170,6 +170,7 @@ class Coupling:
     of: Expression
     wheels: str = "gears"
     pressure_angle: float = 0.0
+    radius: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -107,3 +107,16 @@ def test_bearing_forces_in_the_frame_turn_with_the_link() -> None:
     assert own == pytest.approx(way / crank, abs=1e-9 * np.abs(way).max())
     assert np.ptp(np.unwrap(np.angle(way))) > 6
     assert np.ptp(np.angle(own)) < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "links"), [("excavator_lift", 8), ("flywheel_press", 3)])
+def test_free_bodies_on_paper_are_those_that_a_page_holds(name: str, links: int) -> None:
+    study = study_named(name)
+    result = mechdesign.dynamics(study)
+    with style.context("paper"):
+        figure = figures(study, result)["free_bodies"]
+        style.encoded(figure)
+        assert not list(faults(figure))
+    words = " ".join(text.get_text().replace("\n", " ") for text in figure.texts)
+    assert (f"of {links} links those 3 with the largest forces" in words) == (links > 3)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import follow
+from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
@@ -104,7 +103,7 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(follow, question)))
+    a_pose = replace(whole, course=Courses(question))
     scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
@@ -135,7 +134,21 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
-    if chains := ", ".join(sorted(question_of(passage.motion).joints.open)):
-        message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
+    if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
+        message = (
+            f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them; beams "
+            "or bearings with 'moment' in 'stiffness' settle it"
+        )
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
+
+
+def _open_moments(motion: Motion, rows: slice) -> list[str]:
+    """Joints whose moment neither equilibrium nor elasticity determines where their force is known."""
+    question, arrays = question_of(motion), motion.arrays
+    joints = question.joints
+    return sorted({
+        contact.joint for name, contact in zip(question.forces, joints.contacts, strict=True)
+        if contact.joint in joints.open
+        and (np.isnan(arrays[f"{name}.moment"][rows]) & np.isfinite(arrays[f"{name}.fx"][rows])).any()
+    })  # fmt: skip

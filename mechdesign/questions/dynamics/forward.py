@@ -15,6 +15,7 @@ from mechdesign.questions.columns import DRIVE, TIMED, VALID
 from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
 from mechdesign.questions.dynamics.motion_in_time import Course, EquationsOfMotion, Integration
 from mechdesign.questions.dynamics.question import ForceQuestion, force_question
+from mechdesign.questions.dynamics.schema import DynamicsSection
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.outputs import expand_outputs
@@ -35,8 +36,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     MechanismError
         If the mechanism has no inertia along a motion.
     """
-    section = study.dynamics
-    assert section is not None
+    section = DynamicsSection.of(study)
     assert section.forward is not None
     outputs = expand_outputs(study, section.outputs or ())
     equations = EquationsOfMotion(ForceQuestion(study, section, moves=True), section.forward, outputs)

@@ -19,6 +19,7 @@ from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.dynamics.open_moments import with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
@@ -89,7 +90,11 @@ class ForceQuestion:
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
         """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
         columns, held = self._held(poses, linear, rows, moving)
-        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
+        borne, stiffness = reactions(self.joints, held), self.study.stiffness
+        if self.joints.open and stiffness is not None:
+            section = poses.section(stiffness, rows)
+            borne = with_open_moments(borne, self.joints, held.forces, self.study.mechanism, section)
+        for name, reaction in zip(self.forces, borne, strict=True):
             columns |= self._parts(name, reaction)
         return columns
 
@@ -110,7 +115,7 @@ class ForceQuestion:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         mechanism = self.study.mechanism
         forces, energy = self.acting(poses, linear.configuration, rows, moving)
-        held = balance(linear, forces, mechanism.meshes)
+        held = balance(linear, forces, mechanism.pressing)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
@@ -174,8 +179,7 @@ def weighed_beams(study: Study) -> list[str]:
 
 def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
-    section, own = study.dynamics, study.kinematics or KinematicsSection()
-    assert section is not None
+    section, own = DynamicsSection.of(study), study.kinematics or KinematicsSection()
     pace = section if section.moves else own
     rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
     if section.forward is not None:

@@ -78,7 +78,7 @@ class DynamicsSection(MotionSection):
         points += [point for spring in springs for point in spring.between]
         graph = mechanism.graph
         loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
-        return Joints(mechanism.description, graph, loaded)
+        return Joints(mechanism.description, graph, loaded, mechanism.pressing)
 
     @property
     def moves(self) -> bool:

@@ -20,7 +20,7 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel, CoordinateChannel
-from mechdesign.questions.reliability.schema.section import links_meant
+from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
 from mechdesign.questions.stiffness.elements import corners_of
@@ -151,10 +151,9 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
     stiffness, poses = study.stiffness, Poses.single({}) if poses is None else poses
-    assert study.reliability is not None
     if stiffness is None:
         return None, []
-    section = poses.section(study.reliability)
+    section = poses.section(ReliabilitySection.of(study))
     loads = poses.section(stiffness).loads if section.load is None else (section.load,)
     notes = []
     if len(loads) > 1:

@@ -25,7 +25,7 @@ from mechdesign.questions.dynamics.schema import column_kinds
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.loads import coordinates_in
 from mechdesign.questions.reliability.laws import at_rows
-from mechdesign.questions.reliability.schema.section import pace_of
+from mechdesign.questions.reliability.schema.section import ReliabilitySection, pace_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import MotionSection
@@ -51,10 +51,8 @@ def kinds_of_forces(study: Study) -> dict[str, str]:
 
 def pace(study: Study) -> MotionSection:
     """The section whose rates the mechanism has."""
-    assert study.reliability is not None
-    if not kinds_of_forces(study):
-        return study.reliability
-    return pace_of(study.reliability, study.dynamics, study.kinematics)
+    section = ReliabilitySection.of(study)
+    return pace_of(section, study.dynamics, study.kinematics) if kinds_of_forces(study) else section
 
 
 def followed(study: Study) -> set[str]:

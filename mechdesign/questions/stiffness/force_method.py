@@ -13,8 +13,8 @@ Davies, Circuit actions attributable to active couplings, 1995]
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -122,14 +122,23 @@ class Loaded:
 
 def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: Value) -> Twists:
     """Freedoms of all edges; a radian counts as `length`, one for all poses or each."""
-    at, n = configuration.point(section.at), configuration.shape[0]
+    at = configuration.point(section.at)
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
+    return twists_about(origin, at - origin, network, section, configuration, length)
+
+
+def twists_about(
+    origin: Complexes, arm: Complexes, network: Network, section: StiffnessSection, configuration: Configuration,
+    length: Value, seats: Mapping[str, Complexes] | None = None,
+) -> Twists:  # fmt: skip
+    """Freedoms of all edges about an origin; `seats` are places on beams that are no points of the mechanism."""
+    n = configuration.shape[0]
     # A row for each freedom: the edges that have it (1 or 0), the twist and the compliance.
     rows = [(np.eye(len(network.edges))[k][:, None], *freedom) for k, edge in enumerate(network.edges) if not edge.beam
             for freedom in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
     for edges in network.edges_along_beams:
-        rows += _beam_freedoms(network, edges, section, configuration, origin)
+        rows += _beam_freedoms(network, edges, section, configuration, origin, seats or {})
     twist = np.zeros((n, 3, len(rows)))
     compliance = np.zeros((n, len(rows)))
     within = np.zeros((max((over.shape[1] for over, *_ in rows), default=1), len(network.edges), len(rows)))
@@ -140,12 +149,12 @@ def twists_of(network: Network, section: StiffnessSection, configuration: Config
             compliance[:, j] = soft
     twist[:, 2] *= np.reshape(length, (-1, 1))
     free = np.array([soft is None for *_, soft in rows], dtype=bool)
-    return Twists(network, twist, compliance, free, within, at - origin, length)
+    return Twists(network, twist, compliance, free, within, arm, length)
 
 
 def _beam_freedoms(
     network: Network, edges: Sequence[int], section: StiffnessSection, configuration: Configuration,
-    origin: Complexes,
+    origin: Complexes, seats: Mapping[str, Complexes],
 ) -> Iterator[tuple[Floats, Floats, Value]]:  # fmt: skip
     """Freedoms of the beams of one link, cut wherever something is attached.
 
@@ -154,7 +163,8 @@ def _beam_freedoms(
     """
     beams = [beam for k in edges if (beam := network.edges[k].beam)]
     line = beam_line(beams[0].link, configuration)
-    feet = np.array([line.foot(beam.head, configuration.point(beam.head)) for beam in beams])
+    heads = [seats[beam.head] if beam.head in seats else configuration.point(beam.head) for beam in beams]
+    feet = np.array([line.foot(beam.head, head) for beam, head in zip(beams, heads, strict=True)])
     cuts = np.sort(np.concatenate([np.zeros((1, feet.shape[1])), feet]), axis=0)
     for low, high in pairwise(cuts):
         over = np.zeros((len(network.edges), feet.shape[1]))
@@ -167,25 +177,76 @@ def _beam_freedoms(
 
 def load(twists: Twists, size: int) -> Loaded:
     """Stiffness and compliance of a body or (`size` 2) a pin, with wrenches and displacements under unit loads."""
-    n, (around, onward) = len(twists.twist), _ways(twists.network)
-
-    def matrices(chosen: Flags) -> tuple[Floats, Floats]:
-        within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
-        loops = (around @ within)[:, :, None] * twist[:, None]
-        return loops.reshape(n, 3 * len(around), twist.shape[2]), (onward @ within)[:, None] * twist[:, :size]
-
-    compliance = twists.compliance[:, ~twists.free]
-    statics = _Statics.of(*matrices(twists.free))
-    loops, path = matrices(~twists.free)
-    bears, stress = _least_energy(statics, loops, path, compliance)
+    n, (_, onward) = len(twists.twist), _ways(twists.network)
+    through = np.broadcast_to(onward[:, None, None] * np.eye(3)[:size], (n, len(onward), size, 3))
+    statics, loops, compliance = _equilibrium(twists, through)
+    bears, stress, _ = _least_energy(statics, *loops, compliance)
     strain = compliance[:, :, None] * bears
     total = bears.swapaxes(1, 2) @ strain
     shift = np.zeros((n, len(twists.free), size))
     shift[:, ~twists.free] = strain
-    shift[:, twists.free] = -statics.inverse @ (loops @ strain)
+    shift[:, twists.free] = -statics.inverse @ (loops[0] @ strain)
     held = _held((total + total.swapaxes(1, 2)) / 2, statics, twists.length, size)
     stress[held.rank < size], shift[held.rank < size] = np.nan, np.nan
     return Loaded(held.seen_from(twists.arm), twists, stress, shift)
+
+
+def bear(twists: Twists, through: Floats) -> tuple[Floats, Floats]:
+    """Wrenches that all edges bear under the loads of each pose, and what rigid loops may bear besides.
+
+    Parameters
+    ----------
+    through : ndarray, shape (n, edges, 3)
+        Wrench about the origin of the twists that each edge would bear if the loops were cut.
+
+    Returns
+    -------
+    wrenches : ndarray, shape (n, edges, 3)
+        nan where free joints give way, and in poses that are not known.
+    open_wrenches : ndarray, shape (n, edges, 3, 3 loops)
+        States of self-stress that store no energy.
+    """
+    scale = twists.scale[:, None]
+    unknown = ~np.isfinite(twists.twist).all(axis=(1, 2)) | ~np.isfinite(through).all(axis=(1, 2))
+    kept = np.where(unknown, 0.0, 1.0)[:, None, None]
+    twist, compliance = np.nan_to_num(twists.twist) * kept, np.nan_to_num(twists.compliance) * kept[:, 0]
+    twists = replace(twists, twist=twist, compliance=compliance)
+    scaled = np.nan_to_num(through) * kept * scale
+    size = np.abs(scaled).max(axis=(1, 2), keepdims=True, initial=0.0)
+    size[size == 0] = 1.0
+    unit = scaled / size
+    statics, loops, compliance = _equilibrium(twists, unit[:, :, None])
+    _, stress, rigid = _least_energy(statics, *loops, compliance)
+    around, _ = _ways(twists.network)
+
+    def of_edges(wrenches: Floats) -> Floats:
+        around_loops = wrenches.reshape(len(unit), len(around), 3, wrenches.shape[2])
+        return np.asarray(np.einsum("le,nlik->neik", around, around_loops))
+
+    wrenches = unit - of_edges(stress)[..., 0]
+    if statics.lost is not None:
+        unknown = unknown | (np.trace(statics.lost, axis1=1, axis2=2) > 0.5)
+    wrenches[unknown] = np.nan
+    return wrenches * size / scale, of_edges(rigid) / scale[..., None]
+
+
+def _equilibrium(twists: Twists, through: Floats) -> tuple[_Statics, tuple[Floats, Floats], Floats]:
+    """Equilibrium of the free joints, and loops, paths and compliances of the elastic ones.
+
+    `through` are the scaled wrenches that each edge would bear under each load if the loops were cut, of shape
+    (n, edges, loads, 3).
+    """
+    n, (around, _) = len(twists.twist), _ways(twists.network)
+    carried = through.transpose(0, 2, 3, 1).reshape(n, -1, through.shape[1])
+
+    def matrices(chosen: Flags) -> tuple[Floats, Floats]:
+        within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
+        loops = (around @ within)[:, :, None] * twist[:, None]
+        on_path = carried @ within
+        path = (on_path.reshape(n, through.shape[2], 3, twist.shape[2]) * twist[:, None]).sum(axis=2)
+        return loops.reshape(n, 3 * len(around), twist.shape[2]), path
+
+    return _Statics.of(*matrices(twists.free)), matrices(~twists.free), twists.compliance[:, ~twists.free]
 
 
 def _ways(network: Network) -> tuple[Floats, Floats]:
@@ -265,8 +326,13 @@ def _onto_range(matrix: Floats) -> Floats:
     return np.asarray(kept @ kept.swapaxes(1, 2))
 
 
-def _least_energy(statics: _Statics, loops: Floats, path: Floats, compliance: Floats) -> tuple[Floats, Floats]:
-    """Forces in the elastic joints under unit loads, shape (n, joints, size), and the loops' wrenches."""
+def _least_energy(
+    statics: _Statics, loops: Floats, path: Floats, compliance: Floats
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Forces in the elastic joints under unit loads, shape (n, joints, size), and the loops' wrenches.
+
+    The third result projects onto the states of self-stress that store no energy, shape (n, loops, loops).
+    """
     stress = statics.particular
     on_path, around = path.swapaxes(1, 2), loops.swapaxes(1, 2)
     bears = on_path - around @ stress
@@ -275,15 +341,17 @@ def _least_energy(statics: _Statics, loops: Floats, path: Floats, compliance: Fl
     largest = np.abs(stress).max(axis=(1, 2), keepdims=True, initial=0.0)
     bears[np.abs(bears) <= RIGID * (np.abs(on_path) + np.abs(around).sum(axis=2, keepdims=True) * largest)] = 0.0
     if statics.stress is None:
-        return bears, stress
+        return bears, stress, np.zeros((len(loops), loops.shape[1], loops.shape[1]))
     weighted = statics.stress @ loops
     energy = (weighted * compliance[:, None]) @ weighted.swapaxes(1, 2)
     values, vectors = np.linalg.eigh((energy + energy.swapaxes(1, 2)) / 2)
     most = STORED * ((loops**2).sum(axis=1) * compliance).max(axis=1, initial=0.0)
     kept = values > np.maximum(SELF_STRESS * values[:, -1:], most[:, None])
-    inverse = (vectors * np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
+    upright = vectors.swapaxes(1, 2)
+    inverse = (vectors * np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)[:, None]) @ upright
+    rigid = statics.stress - (vectors * kept[:, None]) @ upright
     self_stress = statics.stress @ inverse @ (weighted @ (compliance[:, :, None] * bears))
-    return bears - loops.swapaxes(1, 2) @ self_stress, stress + self_stress
+    return bears - loops.swapaxes(1, 2) @ self_stress, stress + self_stress, rigid
 
 
 def _held(compliance: Floats, statics: _Statics, length: Value, size: int) -> Held:

@@ -102,11 +102,12 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
 
     If the asked link is elastic, the asked body is its cross-section at the point `at`.
     """
-    graph, description = mechanism.graph, mechanism.description
+    asked = ASKED if link is None or link in section.elastic else mechanism.graph.holder(link, at)
+    return _bodies(_Builder(mechanism, section, asked), link, at)
 
-    holder = graph.holder
-    asked = ASKED if link is None or link in section.elastic else holder(link, at)
-    builder = _Builder(mechanism, section, asked)
+
+def _bodies(builder: _Builder, link: str | None, at: str) -> Bodies:
+    graph, description, holder = builder.mechanism.graph, builder.mechanism.description, builder.mechanism.graph.holder
     holders: dict[str, list[str]] = {}
     for body, point in graph.points:
         if ":" not in point:
@@ -127,7 +128,7 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
             other = f"slot:{name}"
             holders[joint.point].append(other)
         builder.slide(name, holder(line.link, through), other, joint.point)
-    if asked == ASKED:
+    if builder.asked == ASKED:
         holders[at].append(ASKED)
         if link is not None:
             clamps.append((holder(link, at), ASKED, at))
@@ -139,11 +140,24 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
     for drive in description.drives.values():
         if drive.kind == "angle" and drive.name not in builder.held:
             builder.motor(drive, pins)
-    for spring in description.springs.values():
+    for spring in description.springs.values() if builder.springs else ():
         builder.spring(spring, holders)
-    for name in section.elastic:
+    for name in builder.section.elastic:
         builder.beams(name)
-    return Bodies(tuple(builder.edges), asked, link, builder.points())
+    return Bodies(tuple(builder.edges), builder.asked, link, builder.points())
+
+
+def build_whole(mechanism: Mechanism, section: StiffnessSection, seats: Mapping[str, Sequence[str]]) -> Network:
+    """The network of all bodies, without springs, with further places on the beams of elastic bodies (`seats`)."""
+    bodies = _bodies(_Builder(mechanism, section, GROUND, springs=False), None, "")
+    edges = list(bodies.edges)
+    for body, places in seats.items():
+        link = mechanism.description.links[link_of(body)]
+        root = corners_of(link)[0]
+        for place in places:
+            beam = Beam(link, root, place, section.elastic[link.name])
+            edges.append(NetworkEdge(f"{body}@{root}", f"{body}@{place}", (beam,), link.name, place))
+    return _looped(tuple(_pinned(edges, bodies)), bodies)
 
 
 @dataclass
@@ -156,6 +170,7 @@ class _Builder:
     mechanism: Mechanism
     section: StiffnessSection
     asked: str
+    springs: bool = True
     edges: list[NetworkEdge] = field(default_factory=list)
     riding: dict[str, dict[str, str]] = field(default_factory=dict)
     held: set[str | None] = field(default_factory=set)

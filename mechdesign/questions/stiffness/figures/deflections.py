@@ -22,6 +22,7 @@ from mechdesign.questions.stiffness.figures.joint_forces import load_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
@@ -36,6 +37,7 @@ MAX_LOADS = 4
 MAX_DIRECTIONS = 4
 MAX_NARROW_DIRECTIONS = 3
 _MAX_TICKS = 6  # below a panel
+_SAME = 1e-6  # of the mechanism's size, between the points of two poses that are one
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 _LETTERS_AN_INCH = 14.5  # of a panel's title
@@ -198,11 +200,15 @@ def _beam(
 def directions_figure(view: StiffnessView) -> Figure | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
     study, tables, shown = view.study, view.result.tables, view.drawn.shown
-    table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
-    assert section is not None
+    table, soft, section = tables["stiffness"], tables["compliance"], StiffnessSection.of(study)
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
     most = MAX_DIRECTIONS if not style.narrow() else MAX_NARROW_DIRECTIONS
-    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).astype(int))
+    # A motion that ends where it began shows its first pose once.
+    ends = [
+        np.ravel(shown.configuration.point(point))[index[[0, -1]]] for point in study.mechanism.points if len(index)
+    ]
+    closed = len(index) > 2 and all(abs(last - first) <= _SAME * study.mechanism.size for first, last in ends)
+    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index)), endpoint=not closed).astype(int))
     posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
     scenes = {k: scene for k, scene in posed.items() if scene is not None}
     if not scenes:
@@ -254,6 +260,5 @@ def directions_figure(view: StiffnessView) -> Figure | None:
 
 def _force(study: Study) -> float:
     """The force of an ellipse: about the largest of the study's loads, or else one unit."""
-    assert study.stiffness is not None
-    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    loads = [abs(complex(*load[:2])) for load in StiffnessSection.of(study).loads]
     return round_down(max(loads)) if any(loads) else 1.0

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from mechdesign.questions.stiffness.figures.view import StiffnessView
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.joints import (
     MAX_JOINTS,
@@ -57,8 +58,7 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
 def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
     """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
     study, over = view.study, view.swept
-    section = study.stiffness
-    assert section is not None
+    section = StiffnessSection.of(study)
     if over is None or "forces" not in view.result.tables:
         return None
     forces, moments = borne(view.result.tables["forces"], view.poses.count, study.mechanism.size)

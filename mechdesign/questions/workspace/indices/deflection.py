@@ -8,6 +8,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.index import Evaluate, Index, length, of_compliance
 
 if TYPE_CHECKING:
@@ -22,8 +23,7 @@ def prepare(study: Study) -> Evaluate:
     StudyError
         If the section has no loads.
     """
-    assert study.stiffness is not None
-    loads = np.array(study.stiffness.loads)
+    loads = np.array(StiffnessSection.of(study).loads)
     if not len(loads):
         message = "the index 'deflection' needs loads, for example {loads: [[100, 0, 0]]}"
         raise StudyError((study.problem(message, "stiffness", "loads"),))
