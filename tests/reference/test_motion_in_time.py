@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 from helpers.studies import study_of
-from reference.test_textbook_dynamics import SQUEEZER
 from scipy.special import ellipk
 
 from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.results import Result, Table
+from tests.reference.test_textbook_dynamics import SQUEEZER
 
 UNITS = "units: {length: m, angle: rad, force: N}\n"
 BAR = f"mass: 1, center: [0.5, 0], inertia: {1 / 12!r}"

@@ -45,7 +45,7 @@ from mechdesign.study.schema.loads import VELOCITY
 
 # Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
 RELATIVE, ABSOLUTE = 1e-11, 1e-12
-MAX_STEPS = 50_000
+MAX_STEPS = 20_000
 MAX_BOUNCES = 1000
 # Another chart takes over where its coordinates move so many times faster.
 FASTER = 3.0
