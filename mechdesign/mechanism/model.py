@@ -49,6 +49,11 @@ class Link:
     ends: tuple[str, str] | None = None
     telescopic: bool = False
 
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """The points between which its beams run where it bends; of a telescopic link a single beam."""
+        return self.ends or tuple(self.points)
+
 
 @dataclass(frozen=True)
 class Mass:

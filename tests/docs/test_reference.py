@@ -100,7 +100,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     )
     legs = mechdesign.load(PLATFORM, [
         "kinematics={motion: {P.x: [{from: 0, to: 0.1, time: 1}], P.y: 1, platform.angle: 0}, instants: 2}",
-        "stiffness.poses=null", "stiffness.characteristic_length=0.2",
+        "stiffness.poses=null", "stiffness.characteristic_length=0.2", "stiffness.loads=[{at: B1, force: [1, 0]}]",
     ])  # fmt: skip
     fall = study_of("""
 mechanism: {links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 1}}, drives: [arm]}

@@ -12,7 +12,7 @@ from helpers.pictures import figure_of
 
 import mechdesign
 from mechdesign.questions.dynamics.analysis import DrawnForces
-from mechdesign.questions.dynamics.free_bodies import actions
+from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
 
@@ -62,7 +62,7 @@ def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
     study, result = answered(text)
     record = DrawnForces.of(result)
     for index in (0, 7, 19):
-        acting = actions(record.motion, record.shown, index)
+        acting = [each.at(0) for each in actions_on(record.motion, record.shown.take(np.array([index])))]
         links = {action.link for action in acting} - {"ground", ""}
         assert links == set(study.mechanism.description.links) - {"ground"}
         largest = max(action.size for action in acting)

@@ -94,7 +94,18 @@ stiffness:
 
 
 def test_moments_are_those_of_stiffness_under_the_same_load() -> None:
-    study = study_of(CLAMPED)
+    agree(CLAMPED)
+
+
+def test_the_mass_of_beams_is_spread_along_them() -> None:
+    heavy = CLAMPED.replace("height: 60 mm", "height: 60 mm, density: 2700 kg/m^3").replace("loads: [[7, -60, 0]]", "")
+    load = "loads: [{at: block.F, force: [7, -60]}]"
+    agree(heavy.replace(load, "gravity: [3, -9.81]").replace("link: block", "link: block\n  dynamics: true"))
+
+
+def agree(text: str) -> None:
+    """Joint forces of dynamics are those of stiffness under its load."""
+    study = study_of(text)
     result, forces = dynamics(study), stiffness(study).tables["forces"]
     assert not result.main["valid"][1]
     names = {"O": "root", "E": "tip"}

@@ -6,28 +6,32 @@ carry the forces along.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.forward import forward
+from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import Courses
+from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
-from mechdesign.results import Drawn, Result, Scope, Table
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Asked
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -39,11 +43,31 @@ TABLES = (*A_ROW_A_POSE, "extremes")
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnForces(Drawn):
-    """The solved poses of a motion, and its columns at each pose."""
+class DrawnForces(DrawnPoses):
+    """The solved poses of a motion, and what acts on the mechanism in them."""
 
-    shown: Shown
-    motion: Motion
+    name: ClassVar[str] = "dynamics"
+
+    def table(self, motion: Motion) -> Table:
+        """``dynamics.csv``."""
+        return dynamics_table(motion)
+
+    def vectors(self, motion: Motion, shown: Shown) -> Iterator[Vectors]:
+        """Velocities, and forces by what exerts them.
+
+        A joint's force is that on its first body. The shaking force stands in the middle of the ground's points.
+        """
+        yield from super().vectors(motion, shown)
+        unit, forces = question_of(motion).study.units.label("force"), dict[str, list[Vector]]()
+        for each in actions_on(motion, shown):
+            if not each.reaction and np.nan_to_num(each.force).any():
+                words = each.name if each.kind == each.name else f"{each.name} on {each.link or 'the pin'}"
+                forces.setdefault(each.kind, []).append((words, each.place, each.force))
+        x, y = (motion.arrays[f"shaking.{axis}"][shown.rows] for axis in "xy")
+        frame = [point for owner, point in shown.configuration.graph.points if owner == GROUND and ":" not in point]
+        place = sum(shown.configuration.point(point) for point in frame) / len(frame) if frame else 0j
+        forces["shaking"] = [("on the frame", np.broadcast_to(place, shown.rows.shape), x + 1j * y)]
+        yield from (Vectors(kind, unit, each) for kind, each in forces.items())
 
 
 @one_thread()
@@ -51,7 +75,7 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     """Efforts and forces at every pose of the study's dynamics; see `mechdesign.dynamics`."""
     if study.dynamics is not None and study.dynamics.forward is not None:
         course, motion, shown = forward(study, progress)
-        return replace(course, drawn=DrawnForces(shown, motion))
+        return replace(course, drawn=DrawnForces(shown, motion, None))
     poses = study_poses(study, "dynamics")
     progress.start(poses.count, "poses")
     passage = pass_over(force_question(study, poses), _marks, progress, jobs)
@@ -108,7 +132,7 @@ def _group(passage: Passage) -> Group:
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends
-        drawn = DrawnForces(passage.shown, passage.motion)
+        drawn = DrawnForces(passage.shown, passage.motion, along)
         result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
 

@@ -39,7 +39,7 @@ def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
     section = DynamicsSection.of(study)
     assert section.forward is not None
     outputs = expand_outputs(study, section.outputs or ())
-    equations = EquationsOfMotion(ForceQuestion(study, section, moves=True), section.forward, outputs)
+    equations = EquationsOfMotion(ForceQuestion.of(study, moves=True), section.forward, outputs)
     course = Integration(equations).run(progress)
     motion, shown = _forces(study, course)
     names = [static.name for static in question_of(motion).statics]
@@ -81,6 +81,11 @@ def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
     motion = Motion(force_question(study, poses), reason=np.zeros(count, dtype=np.int8))
     motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
     motion.smooth = np.zeros(count, dtype=bool)
+    # Efforts are known, also where the drives are singular.
+    for drive, effort in zip(drives, course.rates.efforts, strict=True):
+        motion.put(f"{drive.name}_effort", rows, effort)
+        speed = course.positions.rate(drive, course.rates.velocity)
+        motion.put(f"{drive.name}_power", rows, effort * speed)
     some = evenly(count, MAX_SHOWN_POSES)
     return motion, Shown(study, poses, rows[some], course.configuration.take(rows[some]))
 

@@ -119,8 +119,8 @@ class ForceModel:
         nominal = self.question.study.parameters.nominal
         poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
-        columns = self.question.values(names, poses, linear, slice(None), moving)
-        return [np.where(held, value, np.nan) for value in columns]
+        columns = self.question.lean(names).columns(poses, linear, slice(None), moving)
+        return [np.where(held, columns[name], np.nan) for name in names]
 
     @quiet
     def slopes(
@@ -161,7 +161,7 @@ def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
     """The model of a study, or of designs at their poses; None where no force is asked."""
     if study.dynamics is None or not kinds_of_forces(study):
         return None
-    question = ForceQuestion(study, study.dynamics, pace(study).rated)
+    question = ForceQuestion.of(study, moves=pace(study).rated)
     if poses is None:
         return ForceModel(question)
     return ForceModel(question, poses.parameters, poses.changed, poses.times)

@@ -14,7 +14,7 @@ from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import mass_centers
-from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.drawn import DrawnPoses
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
@@ -49,7 +49,7 @@ def mechanism_figure(study: Study, result: Result) -> Figure:
         scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
         if scenes[1] is not None:
             return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
-    shown = result.drawn.shown if isinstance(result.drawn, DrawnMotion | DrawnForces) else None
+    shown = result.drawn.shown if isinstance(result.drawn, DrawnPoses) else None
     return sketch_and_first_pose(study, shown, masses=isinstance(result.drawn, DrawnForces))
 
 
@@ -178,11 +178,11 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.questions.stiffness.elements import beam_line, corners_of
+    from mechdesign.questions.stiffness.elements import beam_line
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
-    corners = corners_of(link)
+    corners = link.corners
     yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in corners])
     if link.telescopic or len(corners) < 2:
         return

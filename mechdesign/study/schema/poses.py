@@ -120,6 +120,11 @@ class PoseSection(Section):
     """
 
     @property
+    def fallbacks(self) -> tuple[str, ...]:
+        """Sections whose poses it takes without any of its own."""
+        return ("kinematics",)
+
+    @property
     def at_nodes(self) -> bool:
         """Whether the poses are the nodes of the workspace section."""
         return self.poses == ()

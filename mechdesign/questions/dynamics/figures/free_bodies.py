@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.questions.dynamics.free_bodies import Action, actions, mass_centers
+from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.report.figures import shapes, style
 from mechdesign.report.figures.drawing import draw
@@ -61,7 +61,7 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     scene = None if index is None else pose(mechanism, drawn.shown.configuration, index)
     if index is None or scene is None:
         return None
-    acting = actions(drawn.motion, drawn.shown, index)
+    acting = [each.at(0) for each in actions_on(drawn.motion, drawn.shown.take(np.array([index])))]
     largest = max(action.size for action in acting)
     turning = max(abs(action.moment) for action in acting)
     least = max(LEAST * turning, NOTHING * largest * mechanism.size)

@@ -21,11 +21,12 @@ def prepare(study: Study) -> Evaluate:
     Raises
     ------
     StudyError
-        If the section has no loads.
+        If the section has no loads, or one that does not act on the asked point alone.
     """
-    loads = np.array(StiffnessSection.of(study).loads)
-    if not len(loads):
-        message = "the index 'deflection' needs loads, for example {loads: [[100, 0, 0]]}"
+    wrenches = StiffnessSection.of(study).wrenches
+    loads = np.array([wrench for wrench in wrenches if wrench is not None])
+    if not len(loads) or None in wrenches:
+        message = "the index 'deflection' needs loads on the asked point, for example {loads: [[100, 0, 0]]}"
         raise StudyError((study.problem(message, "stiffness", "loads"),))
 
     def evaluate(soft: Floats) -> Floats:
