@@ -36,8 +36,8 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import balance
 from mechdesign.numerics.arrays import Floats
 from mechdesign.progress import NULL, Progress
-from mechdesign.questions.dynamics.forward_schema import NOTHING, ForwardSection
 from mechdesign.questions.dynamics.question import ForceQuestion
+from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
 from mechdesign.questions.loads import Loading
 from mechdesign.questions.poses import radians
 from mechdesign.study.poses import Poses
