@@ -311,15 +311,18 @@ def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, pro
     Returns
     -------
     Answer
-        Tables ``dynamics`` (a row a pose), ``joint_forces`` (a row a pose and joint) and ``extremes``; axes of the
-        world, the study's units.
+        Tables ``dynamics`` (a row a pose), ``joint_forces`` (a row a pose and joint) and ``extremes``; of a motion in
+        time ``forward`` (a row an instant) and ``events`` before them; where they are asked ``flywheel`` and ``modes``.
+        Axes of the world, the study's units.
 
     Raises
     ------
     StudyError
         If the study has no such section.
     AssemblyError
-        If no pose at all can be assembled.
+        If no pose at all can be assembled, or the start of a motion in time cannot.
+    MechanismError
+        If a mechanism that shall move by its efforts has no inertia.
 
     Examples
     --------

@@ -104,6 +104,17 @@ class Forces:
             whole, moment = plus(whole, 1, force), moment + own + cross(nodes[self.bases[body]], force)
         return whole, moment
 
+    @quiet
+    def power(self, velocity: Rates) -> Value:
+        """What all forces together do per time."""
+        total: Value = 0.0
+        for force, speed in zip(self.nodes, velocity.nodes, strict=True):
+            total = total + dot(force + 0j, speed)
+        for body, (force, moment) in self.bodies.items():
+            frame = self.configuration.graph.bodies[body][0]
+            total = total + dot(force + 0j, velocity.nodes[self.bases[body]]) + moment * velocity.angles[frame]
+        return total
+
 
 @dataclass(frozen=True, eq=False)
 class Moving:

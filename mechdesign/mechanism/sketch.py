@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mechdesign.errors import MechanismError
-from mechdesign.mechanism.algebra import cross
+from mechdesign.mechanism.algebra import Value, Vector, cross
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.geometry import Geometry
 from mechdesign.mechanism.graph import Graph
@@ -19,7 +19,7 @@ from mechdesign.mechanism.structure import Group, Structure, whole
 UNDECIDED = 0.01
 SKETCH = "mechanism.sketch"
 # Forms of groups without an assembly mode: with a single assembly, or with one that is searched for.
-_WITHOUT_MODE = ("place", "coupled", "linear", "newton", "two slides")
+WITHOUT_MODE = ("place", "coupled", "linear", "newton", "two slides")
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Sketch(Loops):
         missing = {
             node
             for group in structure.groups
-            if group.form not in _WITHOUT_MODE
+            if group.form not in WITHOUT_MODE
             for k, _ in group.loops[0].edges
             if structure.ties[structure.edges[k].frame].root in group.angles
             for node in (structure.edges[k].tail, structure.edges[k].head)
@@ -50,7 +50,7 @@ class Sketch(Loops):
         return tuple(self._mode(structure, group) for group in structure.groups)
 
     def _mode(self, structure: Structure, group: Group) -> int:
-        if group.form in _WITHOUT_MODE:
+        if group.form in WITHOUT_MODE:
             return 0
         (loop,) = group.loops
         # The direction is missing only of a link that is drawn as a point; then it decides nothing, and any will do.
@@ -58,20 +58,19 @@ class Sketch(Loops):
         nodes = [np.nan if node is None else node for node in self.nodes]
         drawn = replace(self, structure=structure, nodes=nodes, rotations=turns)
         a, b = drawn.columns(group, loop.edges, drawn.chord)[1]
+        away, size = side(group, a, b)
         if group.form == "two angles":
-            side, size = cross(a + b, a), np.abs(a + b) * np.minimum(np.abs(a), np.abs(b))
             ends = [self.graph.nodes[node] for node in (loop.start, loop.end)]
             line = f"the line {'-'.join(ends)}" if ends[0] != ends[1] and ":" not in "".join(ends) else "the line"
         else:
-            side, size = cross(b, a) if group.form == "angle and turning slide" else cross(a, b), np.abs(a)
             line = f"the perpendicular to slide '{self.graph.slides[group.slides[0]]}'"
-        if np.abs(side) <= UNDECIDED * size:
+        if np.abs(away) <= UNDECIDED * size:
             names = " or ".join(f"'{name}'" for name in deciding_joints(self.graph, group))
             raise MechanismError(
                 f"{names} lies within 1 % of {line} that divides the two assemblies; draw it clearly on one side",
                 SKETCH,
             )
-        return 1 if side > 0 else -1
+        return 1 if away > 0 else -1
 
     def value(self, coordinate: Coordinate) -> float | None:
         """Value of a drive as drawn (radians or length), or `None` where the sketch does not show it."""
@@ -170,6 +169,16 @@ def _fit(sketch: Sketch, geometry: Geometry, frame: int) -> complex:
         if edge.frame == frame and edge.slide in graph.telescopic and tail is not None and head is not None:
             total += (head - tail) * complex(vectors.d[k]).conjugate()
     return total
+
+
+def side(group: Group, a: Vector, b: Vector) -> tuple[Value, Value]:
+    """On which side of its dividing line a dyad is, by the columns of its loop, and what that is compared with.
+
+    Both are areas; the first is positive in assembly +1.
+    """
+    if group.form == "two angles":
+        return cross(a + b, a), np.abs(a + b) * np.minimum(np.abs(a), np.abs(b))
+    return cross(b, a) if group.form == "angle and turning slide" else cross(a, b), np.abs(a)
 
 
 def deciding_joints(graph: Graph, group: Group) -> tuple[str, ...]:

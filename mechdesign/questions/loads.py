@@ -38,7 +38,7 @@ class Loading:
         """Add the loads to forces."""
         configuration = forces.configuration
         for load in self.loads:
-            values = [self._value(part, forces, moving) for _, part, _ in load.numbers]
+            values = [self.value(part, forces, moving) for _, part, _ in load.numbers]
             if load.at is not None:
                 force = values[0] + 1j * values[1]
                 if load.in_ is not None:
@@ -50,7 +50,8 @@ class Loading:
             if load.link is not None:
                 forces.on_body(load.link, 0.0, values[-1])
 
-    def _value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
+    def value(self, quantity: Quantity, forces: Forces, moving: Moving) -> Number:
+        """A number of a load or an effort; nan where an expression has no value."""
         if isinstance(quantity, Expression):
             value = quantity.evaluate({name: self._variable(name, forces, moving) for name in quantity.names})
             # Beyond what a study takes as a number it has no value.

@@ -102,7 +102,20 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
         "kinematics={motion: {P.x: [{from: 0, to: 0.1, time: 1}], P.y: 1, platform.angle: 0}, instants: 2}",
         "stiffness.poses=null", "stiffness.characteristic_length=0.2", "stiffness.loads=[{at: B1, force: [1, 0]}]",
     ])  # fmt: skip
+    fall = study_of("""
+mechanism: {links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 1}}, drives: [arm]}
+dynamics:
+  gravity: [0, -9.81 m/s^2]
+  outputs: [P]
+  forward: {duration: 0.1, start: {arm: 0}, events: {passes: {of: arm, value: -10}}, rows: 3}
+""")
+    turn = study_of("""
+mechanism: {links: {ground: {O: [0, 0]}, arm: {from: O, to: P, length: 100, mass: 1}}, drives: [arm]}
+dynamics: {gravity: [0, -9.81 m/s^2], rates: {arm: 10}, flywheel: {fluctuation: 0.1}, modes: true}
+""")
     return (
+        ("motion in time", mechdesign.dynamics(fall), fall),
+        ("flywheel and modes", mechdesign.dynamics(turn), turn),
         ("pieces", mechdesign.workspace(bar), bar),
         ("time and centres", mechdesign.kinematics(crank), crank),
         ("errors over time", mechdesign.reliability(crank), crank),

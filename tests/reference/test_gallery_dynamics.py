@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.gallery import point, row, study_named, unit
+from scipy.special import ellipk
 
 import mechdesign
 from mechdesign.results import Result
@@ -83,3 +84,14 @@ def test_boom_cylinder_of_the_excavator_holds_the_moment_of_all_weights() -> Non
     foot, head = 0.5 - 0.3j, point(places, "B")
     lever = (foot.conjugate() * (head - foot)).imag / np.abs(head - foot)
     assert table["boom_length_effort"] == pytest.approx(moment / lever, rel=1e-11)
+
+
+def test_pendulum_passes_its_lowest_place_every_half_of_its_period() -> None:
+    """4 sqrt(J / (m g r)) K(sin^2(a / 2)), K the complete elliptic integral of the first kind, a = 170 deg."""
+    result = result_of("pendulum")
+    period = 4 * np.sqrt(500**2 / 3 / (9810 * 250)) * ellipk(np.sin(np.radians(85)) ** 2)
+    times = result.tables["events"]["time"]
+    assert times == pytest.approx(period / 4 + period / 2 * np.arange(len(times)), rel=1e-9)
+    assert len(times) == 6
+    energy = result.main["kinetic_energy"] + result.main["potential_energy"]
+    assert np.ptp(energy) < 1e-9 * result.main["kinetic_energy"].max()

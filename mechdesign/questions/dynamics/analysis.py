@@ -18,7 +18,9 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.forward import forward
 from mechdesign.questions.dynamics.free_bodies import actions_on
+from mechdesign.questions.dynamics.further import further_tables
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
@@ -71,6 +73,9 @@ class DrawnForces(DrawnPoses):
 @one_thread()
 def dynamics(study: Study, *, seed: int | None = None, jobs: int | None = 1, progress: Progress = NULL) -> Result:
     """Efforts and forces at every pose of the study's dynamics; see `mechdesign.dynamics`."""
+    if study.dynamics is not None and study.dynamics.forward is not None:
+        course, motion, shown = forward(study, progress)
+        return replace(course, drawn=DrawnForces(shown, motion, None))
     poses = study_poses(study, "dynamics")
     progress.start(poses.count, "poses")
     passage = pass_over(force_question(study, poses), _marks, progress, jobs)
@@ -118,6 +123,7 @@ def _group(passage: Passage) -> Group:
     """The answers of all designs."""
     question, poses = passage.question, passage.question.poses
     answers, along = tables(passage.motion, question, TABLES)
+    answers |= further_tables(passage.motion)
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")

@@ -35,6 +35,32 @@ EXTREMES = TableKind.of("extremes", f"extremes and means of efforts, forces and 
     ("mean", "mean over the way of the motion, in `unit`"),
     ("rms", "root of the mean square over the way of the motion, in `unit`"),
     ("unit", "unit of its numbers"))  # fmt: skip
+FORWARD = TableKind.of("forward", "the motion that given efforts bring about, a row an instant",
+    TIMED, DRIVE, ("<drive>_velocity", "velocity of <drive>", "as the drive, per time"),
+    ("<drive>_acceleration", "acceleration of <drive>", "as the drive, per time^2"),
+    ("<drive>_effort", "torque or force that is given", "force or moment"),
+    ("<output>", "output", "as the output"), ("kinetic_energy", "energy of the motion", "moment"),
+    ("potential_energy", "energy of weights and springs", "moment"),
+    ("work", "work of efforts and loads since the start, less what dampers and stops took: the gain of both energies",
+     "moment"), VALID)  # fmt: skip
+EVENTS = TableKind.of("events", "limits reached and values passed in time, a row each",
+    ("event", "name of the crossing or limit"), ("time", "when", "time"),
+    ("direction", "up where the value rises through it, else down; at a limit down"))  # fmt: skip
+FLYWHEEL = TableKind.of("flywheel", "the flywheel that evens out the speed of the drive over a cycle",
+    ("drive", "drive"), ("mean_speed", "mean velocity of the drive", "as the drive, per time"),
+    ("mean_effort", "mean torque over the cycle: a motor of this torque drives it", "moment"),
+    ("surplus", "largest energy that is taken up and given back over the cycle", "moment",
+     "max - min of the integral of effort less mean effort"),
+    ("inertia", "mean moment of inertia of the mechanism, seen by the drive", "moment_of_inertia",
+     "2 T / omega^2"),
+    ("fluctuation", "coefficient of fluctuation without a flywheel", "", "surplus / (inertia omega^2)"),
+    ("added_inertia", "moment of inertia to add on the drive for the fluctuation asked", "moment_of_inertia",
+     "surplus / (fluctuation omega^2) - inertia, at least 0"))  # fmt: skip
+MODES = TableKind.of("modes", "natural frequencies of small motion about each pose", DRIVE,
+    ("mode", "number of the mode, the slowest first"),
+    ("frequency", "natural frequency, 0 where the motion is indifferent; nan where the pose is unstable", "1/time",
+     "sqrt(eigenvalue of M^-1 K) / (2 pi)"),
+    ("<drive>_shape", "share of <drive> in the mode, the largest 1; lengths in sizes of the mechanism"))  # fmt: skip
 KEY_NUMBERS = (
     KeyNumber(DYNAMICS, "<drive>_effort", "peak effort of {name}", "size"),
     KeyNumber(DYNAMICS, "<drive>_power", "peak {name}", "size"),

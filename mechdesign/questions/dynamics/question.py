@@ -28,6 +28,7 @@ from mechdesign.questions.stiffness.applied import Applied, Density
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.poses import MotionSection
 
 # Parts of what a joint bears, as columns of its own.
@@ -119,8 +120,7 @@ class ForceQuestion:
     ) -> tuple[dict[str, Value], Balance]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         mechanism = self.study.mechanism
-        masses = self.masses(poses, rows, linear.configuration.places)
-        forces, energy = self.forces_at(poses, linear.configuration, rows, moving, masses)
+        forces, energy = self.acting(poses, linear.configuration, rows, moving)
         held = balance(linear, forces, mechanism.pressing)
         columns: dict[str, Value] = {}
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
@@ -133,6 +133,12 @@ class ForceQuestion:
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
         return columns, held
+
+    def acting(
+        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving
+    ) -> tuple[Forces, Energy]:
+        """Loads, springs, weights and inertia forces of all masses at some rows of poses, and the energies."""
+        return self.forces_at(poses, configuration, rows, moving, self.masses(poses, rows, configuration.places))
 
     def forces_at(
         self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving, masses: Mapping[str, Mass]
@@ -215,10 +221,13 @@ def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
     section, rated = DynamicsSection.of(study), pace(study)
     rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
+    if section.forward is not None:
+        # What efforts bring about is a motion over time, whose poses are there already.
+        rates = {"motion": dict.fromkeys(study.mechanism.drives, Course(held=0.0))}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     question = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion.of(study, moves=rated.rated, tempo=question.tempo),
+        borne=ForceQuestion.of(study, moves=motion.rated, tempo=question.tempo),
     )  # fmt: skip

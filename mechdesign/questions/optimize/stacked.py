@@ -66,8 +66,15 @@ class Stack(NamedTuple):
     solved: list[SolvedPoses]
 
 
+def in_time(study: Study, command: str) -> bool:
+    """Whether an answer is that of a motion which efforts bring about."""
+    return command == "dynamics" and study.dynamics is not None and study.dynamics.forward is not None
+
+
 def complete(study: Study, command: str) -> bool:
-    """Whether `TABLES` has all costly tables of a command's answer: not where methods sample."""
+    """Whether `TABLES` has all costly tables of a command's answer: not of what samples, nor of motions in time."""
+    if in_time(study, command):
+        return False
     return command != "reliability" or (
         study.reliability is not None and set(study.reliability.methods) == {"analytic"}
     )
@@ -78,7 +85,7 @@ def shared(study: Study, command: str, names: Collection[str]) -> bool:
 
     They do not where a parameter decides the structure of the mechanism; each design is then a study of its own.
     """
-    if remeasured(study, names):
+    if in_time(study, command) or remeasured(study, names):
         return False
     # The nodes of a workspace follow each design's own boundary, change points its own motion.
     sections = [section for section in (getattr(study, command), study.kinematics) if section is not None]

@@ -24,7 +24,7 @@ VELOCITY = "_velocity"
 Quantity = Amount | Expression
 
 
-def _read(raw: Any, context: Context) -> Quantity:
+def read_quantity(raw: Any, context: Context) -> Quantity:
     """A number, or an expression of parameters alone, as an amount; any other expression as it is."""
     if isinstance(raw, str):
         expression = read_expression(raw, context)
@@ -37,7 +37,7 @@ def _read_force(raw: Any, context: Context) -> tuple[Quantity, ...]:
     parts = raw if isinstance(raw, list) else [raw]
     if not 1 <= len(parts) <= 2 or (isinstance(raw, list) and len(parts) == 1):
         raise failure(f"a force is [fx, fy], or between two points one number, not {fields.shown(raw)}")
-    return tuple(_read(part, context) for part in parts)
+    return tuple(read_quantity(part, context) for part in parts)
 
 
 _FORCE = {"anyOf": [fields.NUMBER_FORM, fields.PAIR_FORM]}
@@ -59,7 +59,7 @@ class Load(fields.Model):
     """Link with which the directions of the force turn. Left out: the world's axes. Example: boom"""
     link: fields.LinkName | None = None
     """Link that the moment acts on. Example: boom"""
-    moment: Annotated[Quantity | None, fields.Read(_read, fields.NUMBER_FORM)] = None
+    moment: Annotated[Quantity | None, fields.Read(read_quantity, fields.NUMBER_FORM)] = None
     """Moment, counter-clockwise positive, or an expression. Example: 3000 Example: -50*sin(theta)"""
 
     @model_validator(mode="after")
@@ -114,10 +114,11 @@ def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, mov
                 checker.kind(place, kind)
                 continue
             for name in sorted(quantity.names - checker.parameters.nominal.keys()):
-                _check_name(checker, name, place, moving=moving, timed=timed)
+                check_name(checker, name, place, moving=moving, timed=timed)
 
 
-def _check_name(checker: Checker, name: str, path: KeyPath, *, moving: bool, timed: bool) -> None:
+def check_name(checker: Checker, name: str, path: KeyPath, *, moving: bool, timed: bool) -> None:
+    """Check a name in an expression of a load or an effort."""
     coordinate = name.removesuffix(VELOCITY)
     if name == TIME:
         if not timed:

@@ -1,0 +1,117 @@
+"""The answer about a motion in time: its tables, and the forces along it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mechdesign.cautions import Caution
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.numerics.arrays import Floats, evenly
+from mechdesign.progress import Progress
+from mechdesign.questions.columns import DRIVE, TIMED, VALID
+from mechdesign.questions.dynamics.columns import EVENTS, FORWARD
+from mechdesign.questions.dynamics.motion_in_time import Course, EquationsOfMotion, Integration
+from mechdesign.questions.dynamics.question import ForceQuestion, force_question
+from mechdesign.questions.dynamics.schema import DynamicsSection
+from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
+from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.outputs import expand_outputs
+from mechdesign.questions.poses import MAX_SHOWN_POSES, Shown, SolvedPoses, in_study_units
+from mechdesign.results import Column, Result, Scope, Table
+from mechdesign.study import Study
+from mechdesign.study.poses import PoseGroup, Poses
+from mechdesign.study.schema.checker import ORDERS
+
+
+def forward(study: Study, progress: Progress) -> tuple[Result, Motion, Shown]:
+    """The motion that the efforts of `dynamics.forward` bring about, the forces along it, and what pictures show.
+
+    Raises
+    ------
+    AssemblyError
+        If the start cannot be assembled, is outside the limits or singular.
+    MechanismError
+        If the mechanism has no inertia along a motion.
+    """
+    section = DynamicsSection.of(study)
+    assert section.forward is not None
+    outputs = expand_outputs(study, section.outputs or ())
+    equations = EquationsOfMotion(ForceQuestion.of(study, moves=True), section.forward, outputs)
+    course = Integration(equations).run(progress)
+    motion, shown = _forces(study, course)
+    names = [static.name for static in question_of(motion).statics]
+    found = {
+        "forward": _forward_table(motion, course, outputs), "events": _events_table(study, course),
+        "dynamics": dynamics_table(motion), "joint_forces": joint_table(motion),
+        "extremes": extremes_table(motion, None, names),
+    }  # fmt: skip
+    scope = Scope(poses_only=True)
+    found = {name: table if name == "events" else replace(table, scope=scope) for name, table in found.items()}
+    warnings = []
+    if course.ended:
+        kind, words = ("unconverged", "ended early") if course.failed else ("incomplete", "ended")
+        warnings.append(
+            Caution(kind, f"the motion in time {words}: {course.ended} {study.units.label('time')}", "forward")
+        )
+    counts = {"instants": len(course.times), "steps": course.steps}
+    return Result("dynamics", found, warnings, counts), motion, shown
+
+
+def _forces(study: Study, course: Course) -> tuple[Motion, Shown]:
+    """Forces along the motion: those of any motion over time, at the poses that were integrated."""
+    mechanism, count = study.mechanism, len(course.times)
+    drives = [mechanism.coordinate(name) for name in mechanism.drives]
+
+    def of(drive: Coordinate, value: Value) -> Floats:
+        return np.array(np.broadcast_to(in_study_units(study, drive, value), (count,)), dtype=float)
+
+    rows = np.arange(count)
+    values = {drive.name: of(drive, course.configuration.value(drive)) for drive in drives}
+    slopes, bends = (
+        {drive.name: of(drive, course.positions.rate(drive, part)) for drive in drives}
+        for part in (course.rates.velocity, course.rates.acceleration)
+    )
+    poses = Poses(
+        (PoseGroup(mechanism.drives, values, rows),), count, False, (count,), motion=True, times=course.times,
+        slopes=slopes, bends=bends,
+    )  # fmt: skip
+    motion = Motion(force_question(study, poses), reason=np.zeros(count, dtype=np.int8))
+    motion.fill(SolvedPoses(rows, mechanism.drives, course.configuration))
+    motion.smooth = np.zeros(count, dtype=bool)
+    # Efforts are known, also where the drives are singular.
+    for drive, effort in zip(drives, course.rates.efforts, strict=True):
+        motion.put(f"{drive.name}_effort", rows, effort)
+        speed = course.positions.rate(drive, course.rates.velocity)
+        motion.put(f"{drive.name}_power", rows, effort * speed)
+    some = evenly(count, MAX_SHOWN_POSES)
+    return motion, Shown(study, poses, rows[some], course.configuration.take(rows[some]))
+
+
+@quiet
+def _forward_table(motion: Motion, course: Course, outputs: list[Coordinate]) -> Table:
+    study, poses, label = motion.question.study, motion.question.poses, motion.question.study.units.label
+    columns: list[Column] = [TIMED.column(course.times, label("time"))]
+    for k, drive in enumerate(motion.question.drives):
+        units = [label(kind) for kind in ORDERS[drive.quantity]]
+        columns.append(DRIVE.column(poses.values[drive.name], units[0], drive=drive.name))
+        for word, values, unit in (
+            ("velocity", poses.slopes[drive.name], units[1]), ("acceleration", poses.bends[drive.name], units[2]),
+            ("effort", course.rates.efforts[k], label("moment" if drive.quantity == "angle" else "force")),
+        ):  # fmt: skip
+            columns.append(FORWARD[f"<drive>_{word}"].column(values, unit, drive=drive.name))
+    for output in outputs:
+        value = np.broadcast_to(in_study_units(study, output, course.configuration.value(output)), course.times.shape)
+        columns.append(FORWARD["<output>"].column(value, label(output.quantity), output=output.name))
+    energies = {"kinetic_energy": course.rates.kinetic, "potential_energy": course.rates.potential, "work": course.work}
+    columns += FORWARD.columns(study.units.labels, **energies)
+    return FORWARD.table([*columns, VALID.column(motion.valid)])
+
+
+def _events_table(study: Study, course: Course) -> Table:
+    names = np.array([event.name for event in course.events], dtype=str)
+    times = np.array([event.time for event in course.events], dtype=float)
+    ways = np.array(["up" if event.rises else "down" for event in course.events], dtype=str)
+    return EVENTS.table(EVENTS.columns(study.units.labels, event=names, time=times, direction=ways))

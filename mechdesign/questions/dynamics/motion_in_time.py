@@ -1,0 +1,464 @@
+"""The motion that given efforts bring about: equations of motion of any mobility, integrated in time.
+
+Inverse dynamics is affine in the accelerations: with q the coordinates of a chart, efforts Q = M(q) q'' + c(q, q', t).
+One call without acceleration and with each unit acceleration gives c and the columns of M; M q'' = Q - c is the motion.
+
+The state holds all positions x of the mechanism and their velocities, of which a chart's are independent. The others
+are solved from these in every pose, in the assembly that the state shows: so loops close to rounding, and the motion
+goes on through poses at which two assemblies meet. There the equations lose rank while the motion itself is smooth: its
+rates are those of poses before and behind, interpolated. Where a chart's coordinates come near to a dead centre, others
+take over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from mechdesign.errors import AssemblyError, MechanismError
+from mechdesign.mechanism import Configuration, Mechanism, Reason
+from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.charts import Atlas, Positions, regularity
+from mechdesign.mechanism.configuration import joined
+from mechdesign.mechanism.coordinates import Coordinate
+from mechdesign.mechanism.core import Bound
+from mechdesign.mechanism.derivatives import STALLED, Linearization
+from mechdesign.mechanism.derivatives import regularity as regularity_of_drives
+from mechdesign.mechanism.forces import Forces, Moving
+from mechdesign.mechanism.outputs import Rates as Directions
+from mechdesign.mechanism.outputs import first
+from mechdesign.mechanism.statics import balance
+from mechdesign.numerics.arrays import Floats
+from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.question import ForceQuestion
+from mechdesign.questions.dynamics.schema import NOTHING, ForwardSection
+from mechdesign.questions.loads import Loading
+from mechdesign.questions.poses import radians
+from mechdesign.study.poses import Poses
+from mechdesign.study.schema.loads import VELOCITY
+
+# Error of a step, as a part of a value and of the mechanism's size: energy keeps nine digits over hundreds of swings.
+RELATIVE, ABSOLUTE = 1e-11, 1e-12
+MAX_STEPS = 20_000
+MAX_BOUNCES = 1000
+# Another chart takes over where its coordinates move so many times faster.
+FASTER = 3.0
+# Below this regularity two assemblies meet. Rates there follow from poses around, each this far from the next (radians,
+# or sizes of the mechanism), by the polynomial through the nearest of them that are regular.
+MEETING = 0.02
+AROUND = 0.03 * np.array([-10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10])
+NEAREST = 8
+# Places within a step at which limits and crossings are looked at.
+LOOKED_AT = np.array([0.25, 0.5, 0.75, 1.0])
+# A velocity below this part of the usual one is rest.
+REST = 1e-6
+# A mass matrix whose inverse condition is below this has no inertia along some motion.
+NO_INERTIA = 1e-13
+
+
+class Rates(NamedTuple):
+    """What the equations of motion give at some poses, each of shape (..., poses); angles in radians."""
+
+    velocity: Floats  # of all positions
+    acceleration: Floats
+    power: Floats  # of efforts and loads, less what dampers take
+    kinetic: Floats
+    potential: Floats
+    efforts: Floats  # of the drives
+
+
+class Event(NamedTuple):
+    """A crossing or a limit that is reached, at a time."""
+
+    name: str
+    time: float
+    rises: bool
+
+
+@dataclass
+class Course:
+    """The motion at the instants asked for, shape (..., instants).
+
+    Attributes
+    ----------
+    times : Floats
+    x, velocity, acceleration : Floats
+        All positions, as `positions` has them.
+    work : Floats
+        Work of efforts and loads since the start, less what dampers and stops have taken.
+    ended : str
+        Why the motion ended before its time; empty if it did not.
+    failed : bool
+        Whether it ended because the equations have no solution further on, or for the number of steps.
+    """
+
+    positions: Positions
+    times: Floats
+    x: Floats
+    rates: Rates
+    work: Floats
+    configuration: Configuration
+    events: list[Event] = field(default_factory=list)
+    ended: str = ""
+    failed: bool = False
+    steps: int = 0
+
+
+class EquationsOfMotion:
+    """Accelerations of a mechanism under its loads and the efforts of its drives.
+
+    Raises
+    ------
+    AssemblyError
+        If the start cannot be assembled, or lies outside the limits.
+    MechanismError
+        If the drives do not determine the start, or the mechanism has no inertia along a motion.
+    """
+
+    def __init__(self, question: ForceQuestion, section: ForwardSection, outputs: Sequence[Coordinate] = ()) -> None:
+        self.question, self.section, self.study = question, section, question.study
+        mechanism = self.study.mechanism
+        at, linear, speeds = self._start(mechanism)
+        drives = [mechanism.coordinate(name) for name in mechanism.drives]
+        self.crossings = [(name, mechanism.coordinate(crossing.of)) for name, crossing in section.events.items()]
+        followed = [*drives, *(coordinate for _, coordinate in self.crossings), *mechanism.counting, *outputs]
+        self.drives = drives
+        self.positions = Positions(mechanism, at, followed)
+        self.atlas = Atlas(self.positions)
+        self.last = at
+        slopes = self.slopes(linear)
+        self.chart, _ = self.atlas.best(slopes)
+        self.start = self.positions.start, slopes @ speeds
+
+    def _start(self, mechanism: Mechanism) -> tuple[Configuration, Linearization, Floats]:
+        """The pose at the start, its derivatives by the drives, and their velocities."""
+        study, given, sketch = self.study, self.section.start, mechanism.sketch_configuration
+        values, speeds = [], []
+        for name in mechanism.drives:
+            drive = mechanism.coordinate(name)
+            value = radians(study, drive, given[name]) if name in given else sketch.value(drive)
+            values.append(np.asarray(value, dtype=float))
+            speeds.append(float(radians(study, drive, given.get(f"{name}{VELOCITY}", 0.0))))
+        pose = mechanism.forward.solve(values)
+        if not pose.valid:
+            raise AssemblyError(f"the start of dynamics.forward: {Reason(int(pose.reason)).text}")
+        linear = mechanism.linearize(pose)
+        if regularity_of_drives(linear) < STALLED:
+            raise AssemblyError(
+                "the start of dynamics.forward is a singular pose: there velocities of the drives do not say how the "
+                "mechanism moves; start beside it"
+            )
+        return pose, linear, np.array(speeds)
+
+    @quiet
+    def slopes(self, linear: Linearization) -> Floats:
+        """Derivatives of all positions by the given coordinates at a single pose, shape (m, mobility)."""
+        return np.array([[np.ravel(first(linear.configuration, c, rates))[0] for rates in linear.by_drives]
+                         for c in self.positions.coordinates], dtype=float)  # fmt: skip
+
+    def rates(self, times: Floats, x: Floats, velocity: Floats) -> Rates:
+        """Rates at poses near to `x`, shape (m, poses), with its and `velocity`'s independent parts."""
+        rates, regular = self._rates(times, x, velocity)
+        for k in np.flatnonzero(~(regular >= MEETING)):
+            beside = self._between(times[k], x[:, k], velocity[:, k])
+            for part, values in zip(rates, beside, strict=True):
+                part[..., k] = values
+        return rates
+
+    def _between(self, time: float, x: Floats, velocity: Floats) -> list[Floats]:
+        """Rates at a pose where two assemblies meet, from poses before and behind."""
+        speed = np.max(np.abs(velocity) / self.positions.scales)
+        steps = AROUND / speed if speed > 0 else np.full(len(AROUND), np.nan)
+        around = x[:, None] + velocity[:, None] * steps
+        rates, regular = self._rates(
+            np.full(len(steps), time), around, np.repeat(velocity[:, None], len(steps), axis=1)
+        )
+        good = np.flatnonzero(regular >= MEETING / 2)
+        good = good[np.argsort(np.abs(AROUND[good]), kind="stable")[:NEAREST]]
+        if len(good) < NEAREST:
+            return [np.full(part.shape[:-1], np.nan) for part in rates]
+        places = AROUND[good]
+        weights = [np.prod([b / (b - a) for b in np.delete(places, k)]) for k, a in enumerate(places)]
+        return [part[..., good] @ np.array(weights) for part in rates]
+
+    @quiet
+    def _rates(self, times: Floats, x: Floats, velocity: Floats) -> tuple[Rates, Floats]:
+        """Rates where the equations have full rank, and how regular they are."""
+        linear, count, shape = self.chart.solve(x, self.last), len(self.chart.rows), times.shape
+        configuration, section, rows = linear.configuration, self.question.section, slice(None)
+        moves = linear.velocity([*velocity[self.chart.rows]])
+        units = np.eye(count + 1)[1:, :, None]
+        moving = Moving(moves, linear.acceleration(moves, [*units]))
+        poses = Poses((), len(times), True, shape, times=times)
+        forces, energy = self.question.acting(poses, configuration, rows, moving)
+        held = balance(linear, forces).efforts
+        table = np.array([np.broadcast_to(effort, (count + 1, *shape)) for effort in held])
+        rest, matrix = table[:, 0], table[:, 1:] - table[:, :1]
+        loading = Loading(self.study, section.loads, poses, rows)
+        given = [loading.value(self.section.efforts.get(d.name, NOTHING), forces, moving) for d in self.drives]
+        efforts = np.array([np.broadcast_to(effort, shape) for effort in given], dtype=float)
+        velocities, columns = self._of_all(moves, shape), self._of_all(moving.acceleration, (count + 1, *shape))
+        # What the unit accelerations add are derivatives of the positions by the chart's coordinates.
+        slopes = columns[:, 1:] - columns[:, :1]
+        by = np.array([self.positions.rate(d, slopes) for d in self.drives])
+        accelerations = _solve(matrix, np.einsum("dp,dkp->kp", efforts, by) - rest)
+        accelerated = columns[:, 0] + np.einsum("mkp,kp->mp", slopes, accelerations)
+        power = np.sum(
+            [e * self.positions.rate(d, velocities) for e, d in zip(efforts, self.drives, strict=True)], axis=0
+        )
+        power = power - energy.lost
+        if section.loads:
+            loads = Forces(configuration)
+            loading.add(loads, moving)
+            power = power + loads.power(moves)
+        power, kinetic, potential = (
+            np.array(np.broadcast_to(value, shape)) for value in (power, energy.kinetic, energy.potential)
+        )
+        return Rates(velocities, accelerated, power, kinetic, potential, efforts), regularity(linear)
+
+    def _of_all(self, rates: Directions | None, shape: tuple[int, ...]) -> Floats:
+        """Derivatives of all positions, shape (m, ...)."""
+        assert rates is not None
+        angles = [rates.angles[frame] for frame in self.positions.rows]
+        return np.array([np.broadcast_to(value, shape) for value in (*angles, *rates.slides)])
+
+    def matrix(self, time: float, x: Floats) -> tuple[Floats, Linearization]:
+        """Mass matrix of the chart's coordinates at a pose, shape (mobility, mobility), and the pose."""
+        linear, count = self.chart.solve(x[:, None], self.last), len(self.chart.rows)
+        still = linear.velocity([0.0] * count)
+        moving = Moving(still, linear.acceleration(still, [*np.eye(count + 1)[1:, :, None]]))
+        poses = Poses((), 1, True, (1,), times=np.array([time]))
+        forces, _ = self.question.acting(poses, linear.configuration, slice(None), moving)
+        table = np.array([np.broadcast_to(e, (count + 1, 1)) for e in balance(linear, forces).efforts])[..., 0]
+        return table[:, 1:] - table[:, :1], linear
+
+
+def _solve(matrix: Floats, right: Floats) -> Floats:
+    """Accelerations of poses, shape (n, poses), from mass matrices of shape (n, n, poses); nan where there are none."""
+    full = np.moveaxis(matrix, -1, 0)
+    good = np.array(np.isfinite(full).all(axis=(1, 2)) & np.isfinite(right).all(axis=0))
+    good[good] = np.linalg.det(full[good]) != 0
+    solution = np.full(right.shape, np.nan)
+    solution[:, good] = np.linalg.solve(full[good], right.T[good][..., None])[..., 0].T
+    return solution
+
+
+def _beyond(coordinate: Coordinate, value: Value, pose: Configuration) -> Value:
+    """By how much a coordinate is beyond a value."""
+    return pose.value(coordinate) - value
+
+
+def _margin(bound: Bound, places: Mapping[str, Value], k: int, pose: Configuration) -> Value:
+    """Margin of a limit by its number."""
+    return bound.margins(pose, places)[k][1]
+
+
+class Integration:
+    """One motion from its start to its end."""
+
+    def __init__(self, equations: EquationsOfMotion) -> None:
+        self.equations, self.positions = equations, equations.positions
+        self.section, self.mechanism = equations.section, equations.study.mechanism
+        self.end = float(self.section.duration)
+        self.count = len(self.positions.scales)
+        x, velocity = equations.start
+        self._check_inertia(x)
+        self.begin = np.concatenate([x, velocity, [0.0]])
+        self.scales = self._scales(x, velocity)
+        self.events: list[Event] = []
+        self._parts: list[tuple[Floats, Floats, Rates, Floats, Configuration]] = []
+        self._ended = ""
+
+    def _check_inertia(self, x: Floats) -> None:
+        matrix, _ = self.equations.matrix(0.0, x)
+        scales = self.positions.scales[self.equations.chart.rows]
+        scaled = matrix * scales[:, None] * scales
+        values = np.linalg.eigvalsh((scaled + scaled.T) / 2)
+        if not values[0] > NO_INERTIA * max(values[-1], 0.0):
+            raise MechanismError(
+                "the mechanism has no inertia along a motion that its drives allow, and so no motion in time; give its "
+                "links a mass",
+                "dynamics.forward",
+            )
+
+    def _scales(self, x: Floats, velocity: Floats) -> Floats:
+        """Sizes of positions, velocities and work, of which errors are parts."""
+        rates = self.equations.rates(np.zeros(1), x[:, None], velocity[:, None])
+        fast = np.max(np.abs(velocity) / self.positions.scales)
+        gain = np.sqrt(np.max(np.abs(rates.acceleration[:, 0]) / self.positions.scales))
+        pace = max(fast, gain) if np.isfinite(gain) and max(fast, gain) > 0 else 1.0 / self.end
+        matrix, _ = self.equations.matrix(0.0, x)
+        rows = self.positions.scales[self.equations.chart.rows]
+        self.pace = pace
+        energy = float(np.max(np.abs(matrix) * rows[:, None] * rows)) * pace**2
+        return np.concatenate([self.positions.scales, self.positions.scales * pace, [energy]])
+
+    def _function(self, time: float, state: Any) -> Any:
+        """Derivative of the state: positions, velocities, work."""
+        x, velocity = state[: self.count, None], state[self.count : -1, None]
+        rates = self.equations.rates(np.array([time]), x, velocity)
+        return np.concatenate([rates.velocity[:, 0], rates.acceleration[:, 0], rates.power])
+
+    def _solver(self, time: float, state: Floats) -> DOP853:
+        tolerance: Any = ABSOLUTE * self.scales  # one each, which the types of SciPy do not know
+        return DOP853(self._function, time, state, self.end, rtol=RELATIVE, atol=tolerance)
+
+    def run(self, progress: Progress = NULL) -> Course:
+        """Integrate; rows are evenly spread over the duration, and one more where the motion ends before."""
+        rows = np.linspace(0.0, self.end, self.section.rows)
+        progress.start(len(rows), "instants")
+        with np.errstate(all="ignore"):
+            solver = self._solver(0.0, self.begin)
+            self._keep(rows[:1], self.begin[:, None])
+            rows = rows[1:]
+            failed, steps, bounces, watches = False, 0, 0, bool(list(self._watched()))
+            while solver.status == "running":
+                begin, steps = solver.t, steps + 1
+                if solver.step() is not None or steps > MAX_STEPS:
+                    failed = True
+                    why = f"{MAX_STEPS} steps are not enough" if steps > MAX_STEPS else "the motion cannot go on"
+                    self._ended = f"{why} at {begin:.6g}"
+                    break
+                if not watches and (not len(rows) or rows[0] > solver.t):
+                    solver = self._switched(solver)
+                    continue
+                dense = solver.dense_output()
+                stop = self._stop(dense, begin, solver.t) if watches else None
+                until = solver.t if stop is None else stop[1]
+                inside = rows[rows <= until]
+                if len(inside):
+                    self._keep(inside, dense(inside))
+                    rows = rows[len(inside) :]
+                    progress.update(len(inside))
+                if stop is None:
+                    solver = self._switched(solver)
+                    continue
+                state = self._bounced(stop, dense(until))
+                bounces += 1
+                if state is None or bounces > MAX_BOUNCES:
+                    self._ended = self._ended or f"after {MAX_BOUNCES} bounces"
+                    if not len(inside) or inside[-1] < until:
+                        self._keep(np.array([until]), dense(np.array([until])))
+                    break
+                solver = self._solver(until, state)
+        return self._course(failed, steps)
+
+    def _keep(self, times: Floats, states: Floats) -> None:
+        """Keep the motion at some times of one chart."""
+        x, velocity = states[: self.count], states[self.count : -1]
+        linear = self.equations.chart.solve(x, self.equations.last)
+        rates = self.equations.rates(times, x, velocity)
+        self._parts.append((times, x, rates, states[-1], linear.configuration))
+
+    def _course(self, failed: bool, steps: int) -> Course:
+        times, x, work = (np.concatenate([part[k] for part in self._parts], axis=-1) for k in (0, 1, 3))
+        rates = Rates(
+            *(np.concatenate(values, axis=-1) for values in zip(*(part[2] for part in self._parts), strict=True))
+        )
+        vectors = self.mechanism.geometry.nominal
+        whole = joined([part[4] for part in self._parts], times.shape, vectors, {})
+        near = self.positions.near(x)
+        whole = replace(whole, near=near, counted=frozenset(near))
+        events = sorted(self.events, key=lambda event: event.time)
+        return Course(self.positions, times, x, rates, work, whole, events, self._ended, failed, steps)
+
+    def _switched(self, solver: DOP853) -> DOP853:
+        """The solver with another chart, where its coordinates move much faster than those of this one."""
+        equations, state = self.equations, solver.y
+        x = state[: self.count, None]
+        linear = equations.chart.solve(x, equations.last)
+        if not regularity(linear)[0] >= MEETING:
+            return solver
+        equations.last = linear.configuration.take(0)
+        if solver.status != "running":
+            return solver
+        slopes, rows = equations.slopes(linear), equations.chart.rows
+        chart, volume = equations.atlas.best(slopes)
+        if chart is equations.chart or volume * np.prod(self.positions.scales[rows]) < FASTER:
+            return solver
+        exact = self.positions.of(linear.configuration)[:, 0]
+        velocity = slopes @ state[self.count : -1][rows]
+        equations.chart = chart
+        return self._solver(solver.t, np.concatenate([exact, velocity, state[-1:]]))
+
+    def _watched(self) -> Iterator[tuple[str, Coordinate | None, Callable[[Configuration], Value]]]:
+        """Crossings and limits: name, of a limit its coordinate, and what changes its sign."""
+        for name, coordinate in self.equations.crossings:
+            value = radians(self.equations.study, coordinate, float(self.section.events[name].value))
+            yield name, None, partial(_beyond, coordinate, value)
+        places = self.mechanism.nominal
+        for bound in self.mechanism.bounds:
+            for k, (label, _) in enumerate(bound.margins(self.equations.last, places)):
+                yield label, bound.coordinate, partial(_margin, bound, places, k)
+
+    def _stop(
+        self, dense: Callable[[Floats], Floats], begin: float, end: float
+    ) -> tuple[str, float, Coordinate] | None:
+        """The first limit that is reached in a step; crossings up to there are noted."""
+        times = begin + np.append(0.0, LOOKED_AT) * (end - begin)
+        places = self._pose(dense(times))
+        found: list[tuple[str, float, Coordinate | None, bool]] = []
+        for name, limit, function in self._watched():
+            values = np.broadcast_to(function(places), times.shape)
+            for k in range(len(times) - 1):
+                one, other = float(values[k]), float(values[k + 1])
+                if limit is not None and other < 0:
+                    # A limit that was just left counts as inside.
+                    time = times[k] if one <= 0 else self._root(dense, function, times[k], times[k + 1])
+                elif limit is None and one * other <= 0 and one != 0:
+                    time = self._root(dense, function, times[k], times[k + 1])
+                else:
+                    continue
+                found.append((name, float(time), limit, other > one))
+                if limit is not None:
+                    break
+        stops = [event for event in found if event[2] is not None]
+        stop = min(stops, key=lambda event: event[1], default=None)
+        for name, time, limit, rises in found:
+            if limit is None and (stop is None or time <= stop[1]):
+                self.events.append(Event(name, time, rises))
+        if stop is None or stop[2] is None:
+            return None
+        self.events.append(Event(stop[0], stop[1], rises=False))
+        return stop[0], stop[1], stop[2]
+
+    def _root(
+        self, dense: Callable[[Floats], Floats], function: Callable[[Configuration], Value], begin: float, end: float
+    ) -> float:
+        def at(time: float) -> float:
+            return float(np.ravel(function(self._pose(dense(np.array([time])))))[0])
+
+        return float(brentq(at, begin, end, xtol=1e-14 * self.end, rtol=1e-14))
+
+    def _pose(self, states: Floats) -> Configuration:
+        return self.equations.chart.solve(states[: self.count], self.equations.last).configuration
+
+    def _bounced(self, stop: tuple[str, float, Coordinate], state: Floats) -> Floats | None:
+        """The state behind a stop; None where the motion ends there.
+
+        An impulse along the limit's coordinate g changes velocities by -(1 + e) M^-1 g (g v) / (g M^-1 g).
+        """
+        name, time, coordinate = stop
+        if self.section.restitution is None:
+            self._ended = f"limit {name} is reached at {time:.6g}"
+            return None
+        matrix, linear = self.equations.matrix(time, state[: self.count])
+        rows = self.equations.chart.rows
+        along = np.array([np.ravel(first(linear.configuration, coordinate, part))[0] for part in linear.by_drives])
+        velocity = state[self.count : -1][rows]
+        speed = float(along @ velocity)
+        scale = self.mechanism.size if coordinate.quantity == "length" else 1.0
+        if not self.section.restitution * abs(speed) > REST * self.pace * scale:
+            self._ended = f"the mechanism rests at limit {name} from {time:.6g} on"
+            return None
+        impulse = np.linalg.solve(matrix, along)
+        after = velocity - (1 + self.section.restitution) * impulse * speed / (along @ impulse)
+        lost = 0.5 * (after @ matrix @ after - velocity @ matrix @ velocity)
+        exact = self.positions.of(linear.configuration)[:, 0]
+        return np.concatenate([exact, self.equations.slopes(linear) @ after, [state[-1] + lost]])
