@@ -13,7 +13,7 @@ from mechdesign.numerics.arrays import Complexes, Flags, Floats, Ints
 from mechdesign.study.point_paths import bends, between, table_of
 from mechdesign.study.schema.motion_laws import LAWS, Phase
 from mechdesign.study.schema.motions import Course
-from mechdesign.study.schema.paths import read_table
+from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.inputs import Folder
 
 HELP_PAGE = "howto/motion_laws"

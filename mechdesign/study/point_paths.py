@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
-from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection, read_table
+from mechdesign.study.schema.paths import CIRCLE_POSES, LINE_POSES, PathSection
+from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.fields import MIN_NUMBER
 from mechdesign.study.text.inputs import Folder
 from mechdesign.study.text.units import Amount

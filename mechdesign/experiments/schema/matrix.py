@@ -15,9 +15,9 @@ from mechdesign.expressions import Expression
 from mechdesign.questions.optimize.schema import WORDS as WORDS
 from mechdesign.questions.optimize.schema import Chosen, check_result, read_result
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.paths import read_cells
 from mechdesign.study.schema.variable import LIST_FORM, plainly, read_values
 from mechdesign.study.text import fields
+from mechdesign.study.text.csv_files import read_cells
 from mechdesign.study.text.document import KeyPath, read
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder

@@ -35,7 +35,7 @@ from mechdesign.mechanism.model import (
 from mechdesign.mechanism.sketch import locate
 from mechdesign.study.building import section as models
 from mechdesign.study.building.builder import ROOT, Builder
-from mechdesign.study.schema.paths import read_table
+from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.units import Amount
 

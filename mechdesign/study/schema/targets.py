@@ -15,7 +15,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.study.building.section import WrittenTarget
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.paths import read_table
+from mechdesign.study.text.csv_files import read_table
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import own_numbers
 from mechdesign.study.text.reporter import Reporter

@@ -23,8 +23,8 @@ from mechdesign.questions.reliability.schema.iso_tolerances import (
 )
 from mechdesign.study.building.parameters import Parameters
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.paths import read_column
 from mechdesign.study.text import fields
+from mechdesign.study.text.csv_files import read_column
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import Context, failure, read_number, shown
 from mechdesign.study.text.inputs import Folder
