@@ -39,11 +39,14 @@ class Forces:
         Force on the pin at each node.
     bodies : dict
         By body, the force on it at its base, and the moment about that.
+    slides : dict
+        By slide, the force along it on its slider, and against that on its guide.
     """
 
     configuration: Configuration
     nodes: list[Vector] = field(default_factory=list)
     bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
+    slides: dict[int, Value] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.nodes = [0.0] * len(self.configuration.nodes)
@@ -57,6 +60,10 @@ class Forces:
         """Add a force on a body at an arm from its base, and a moment."""
         before = self.bodies.get(body, (0.0, 0.0))
         self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
+
+    def on_slide(self, slide: int, force: Value) -> None:
+        """Add a force along a slide, on its slider and against that on its guide."""
+        self.slides[slide] = self.slides.get(slide, 0.0) + force
 
     def at(self, point: str, force: Vector) -> None:
         """Add a force at a point: on the pin there, or as ``rod.B`` on the link alone."""
@@ -87,6 +94,9 @@ class Forces:
         both.bodies = dict(self.bodies)
         for body, (force, moment) in other.bodies.items():
             both.on_body(body, force, moment)
+        both.slides = dict(self.slides)
+        for slide, along in other.slides.items():
+            both.on_slide(slide, along)
         return both
 
     @property

@@ -52,11 +52,15 @@ class Balance:
 
 
 @quiet
-def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) -> Balance:
+def balance(
+    linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = (), *, pressed: Sequence[Value] | None = None
+) -> Balance:  # fmt: skip
     """Efforts of the drives that hold forces in equilibrium, and the force that each edge transmits.
 
     Efforts are moments (per radian) or forces, positive where they drive their coordinate up. At a singularity they are
-    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth.
+    not finite. The efforts of couplings are moments alone, but those of `meshes` the forces of their teeth. These are
+    pressed apart whichever way they drive; as those of the `pressed` efforts where these are given, which makes all
+    that they bear linear in the forces.
     """
     held = _balance(linear, forces)
     if not meshes:
@@ -64,14 +68,15 @@ def balance(linear: Linearization, forces: Forces, meshes: Sequence[Mesh] = ()) 
     # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
     teeth = Forces(linear.configuration)
     for mesh in meshes:
-        engage(teeth, mesh, held.couplings[mesh.index])
+        effort = held.couplings[mesh.index]
+        engage(teeth, mesh, effort, 1.0 if pressed is None else np.sign(effort * pressed[mesh.index]))
     return _balance(linear, forces.plus(teeth))
 
 
-def engage(teeth: Forces, mesh: Mesh, effort: Value) -> None:
+def engage(teeth: Forces, mesh: Mesh, effort: Value, apart: Value = 1.0) -> None:
     """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
 
-    Teeth press each other apart by their pressure angle; a belt only pulls, and its pretension is not known.
+    Teeth press each other `apart` by their pressure angle; a belt only pulls, and its pretension is not known.
     """
     configuration = teeth.configuration
     place, along = mesh.contact(configuration)
@@ -79,7 +84,7 @@ def engage(teeth: Forces, mesh: Mesh, effort: Value) -> None:
     force = along * (effort if mesh.slide >= 0 else effort / radius)
     inwards = 1j * along
     inwards = inwards * np.where(dot(inwards, place - configuration.nodes[mesh.axes[1]]) > 0, 1.0, -1.0)
-    force = force + np.abs(force) * np.tan(mesh.pressure_angle) * inwards
+    force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * inwards
     for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
         teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
 
@@ -89,7 +94,7 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
     structure, bodies = linear.structure, linear.graph.bodies
     nodes = list(forces.nodes)
     frames: list[Value] = [0.0] * linear.graph.classes
-    slides: list[Value] = [0.0] * len(linear.slides)
+    slides: list[Value] = [forces.slides.get(slide, 0.0) for slide in range(len(linear.slides))]
     edges: list[Vector] = [0.0] * len(structure.edges)
     for body, (force, moment) in forces.bodies.items():
         base = forces.bases[body]
@@ -170,7 +175,7 @@ def _balance(linear: Linearization, forces: Forces) -> Balance:
                 transmit(k, sign * force)
     efforts: list[Value] = [plus(0.0, -1, along(k)) for k in range(len(structure.given))]
     acting = replace(forces)
-    acting.nodes, acting.bodies = on_pins, forces.bodies
+    acting.nodes, acting.bodies, acting.slides = on_pins, forces.bodies, forces.slides
     return Balance(linear, acting, efforts, edges, [couplings[k] for k in structure.numbers])
 
 

@@ -71,7 +71,12 @@ def _marks(motion: Motion) -> Mapping[str, Flags]:
     (effort, *_) = (static.name for static in question_of(motion).statics)
     unknown = ~np.isfinite(sum(motion.arrays[name] for name in (effort, "shaking", "shaking_moment")))
     regular = motion.arrays["conditioning"] >= STALLED
-    return {"singular": motion.valid & unknown & ~regular, "undefined": motion.valid & unknown & regular}
+    marks: dict[str, Flags] = {}
+    if (friction := question_of(motion).friction) is not None:
+        marks = {name: motion.valid & where for name, where in friction.marks(motion.arrays).items()}
+        unknown &= ~friction.jammed(motion.arrays)
+    singular, undefined = motion.valid & unknown & ~regular, motion.valid & unknown & regular
+    return {"singular": singular, "undefined": undefined, **marks}
 
 
 def tables(
@@ -128,6 +133,9 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if mark.number:
         message = f"an expression of the loads has no value at {mark.number} of {count} poses: forces are nan there"
         warnings.append(Caution("undefined", message, "dynamics", mark.first))
+    friction = question_of(passage.motion).friction
+    if friction is not None:
+        warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
     if chains := ", ".join(sorted(question_of(passage.motion).joints.open)):
         message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"

@@ -19,6 +19,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
+from mechdesign.questions.friction import Friction, Slipping
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
@@ -44,6 +45,12 @@ class ForceQuestion:
         """The joints of the mechanism."""
         return self.section.joints(self.study.mechanism)
 
+    @cached_property
+    def friction(self) -> Friction | None:
+        """Friction in the joints, if the study gives any."""
+        mechanism = self.study.mechanism
+        return Friction(mechanism, self.joints) if mechanism.description.friction else None
+
     @property
     def forces(self) -> list[str]:
         """Names of the contacts' forces."""
@@ -54,7 +61,7 @@ class ForceQuestion:
         """Columns of a row a pose, and of the size of each joint's force."""
         mechanism, label = self.study.mechanism, self.study.units.label
         moment = self.size * mechanism.size
-        sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo}
+        sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo, "none": 1.0}
         of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
                     for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip
         kinds = column_kinds(mechanism, self.joints, moving=self.moves)
@@ -87,7 +94,7 @@ class ForceQuestion:
     def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
         """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
         columns, held = self._held(poses, linear, rows, moving)
-        for name, reaction in zip(self.forces, reactions(self.joints, held), strict=True):
+        for name, reaction in zip(self.forces, self._borne(held), strict=True):
             columns |= self._parts(name, reaction)
         return columns
 
@@ -98,13 +105,13 @@ class ForceQuestion:
         """Some of the columns of `statics`; joint forces are computed only where one is among them."""
         columns, held = self._held(poses, linear, rows, moving)
         if not set(names).isdisjoint(self.forces):
-            borne = zip(self.forces, reactions(self.joints, held), strict=True)
+            borne = zip(self.forces, self._borne(held), strict=True)
             columns |= {name: np.abs(reaction.force) for name, reaction in borne}
         return [columns[name] for name in names]
 
     def _held(
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
-    ) -> tuple[dict[str, Value], Balance]:
+    ) -> tuple[dict[str, Value], Balance | Slipping]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
         study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
         forces = Forces(linear.configuration)
@@ -113,8 +120,12 @@ class ForceQuestion:
         energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
         masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
         energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
-        held = balance(linear, forces, self.study.mechanism.meshes)
         columns: dict[str, Value] = {}
+        if self.friction is None:
+            held: Balance | Slipping = balance(linear, forces, mechanism.meshes)
+        else:
+            held = self.friction.solve(linear, forces, moving.velocity)
+            columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
             if moving.velocity is not None:
@@ -125,6 +136,9 @@ class ForceQuestion:
         columns |= {"kinetic_energy": energy.kinetic} if moving.velocity is not None else {}
         columns["potential_energy"] = energy.potential
         return columns, held
+
+    def _borne(self, held: Balance | Slipping) -> list[Reaction]:
+        return held.reactions if isinstance(held, Slipping) else reactions(self.joints, held)
 
     def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""

@@ -9,11 +9,13 @@ from pydantic import Field
 from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.statics import Joints
 from mechdesign.study.schema.checker import Checker
-from mechdesign.study.schema.loads import Load, check_loads
+from mechdesign.study.schema.loads import Load, check_friction, check_loads, joints_of
 from mechdesign.study.schema.poses import MotionSection
 from mechdesign.study.text import fields
 
 HELP_PAGE = "theory/dynamics"
+# Columns of a mechanism with friction, without units.
+EFFICIENCIES = ("efficiency", "back_efficiency")
 
 
 class DynamicsSection(MotionSection):
@@ -32,17 +34,12 @@ class DynamicsSection(MotionSection):
         section = self if self.moves else checker.parts.get("kinematics") or self
         timed = section.motion is not None
         check_loads(checker, self.loads, (self.command, "loads"), moving=section.rated, timed=timed)
+        check_friction(checker)
         return super().checked(checker)
 
     def joints(self, mechanism: Mechanism) -> Joints:
         """The joints of a mechanism, where loads and springs act on some pins."""
-        springs = [spring for spring in mechanism.description.springs.values() if not spring.turning]
-        points = [load.at for load in self.loads if load.at is not None]
-        points += [point for load in self.loads for point in load.between or ()]
-        points += [point for spring in springs for point in spring.between]
-        graph = mechanism.graph
-        loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
-        return Joints(mechanism.description, graph, loaded)
+        return joints_of(mechanism, self.loads, mechanism.description.springs.values())
 
     @property
     def moves(self) -> bool:
@@ -51,11 +48,15 @@ class DynamicsSection(MotionSection):
 
 
 def column_kinds(mechanism: Mechanism, joints: Joints, *, moving: bool) -> dict[str, str]:
-    """Kind of quantity of each number of a pose: efforts, shaking forces, energies, and the size of joint forces."""
+    """Kind of quantity of each number of a pose: efforts, shaking forces, energies, sizes of joint forces."""
     kinds: dict[str, str] = {}
     for drive in mechanism.drives:
         kinds[f"{drive}_effort"] = "moment" if mechanism.quantity(drive) == "angle" else "force"
         kinds |= {f"{drive}_power": "power"} if moving else {}
     kinds |= {"shaking.x": "force", "shaking.y": "force", "shaking": "force", "shaking_moment": "moment"}
     kinds |= {"kinetic_energy": "moment"} if moving else {}
-    return kinds | {"potential_energy": "moment"} | dict.fromkeys(joints.names, "force")
+    kinds |= {"potential_energy": "moment"}
+    if mechanism.description.friction:
+        kinds |= {"friction_power": "power"} if moving else {}
+        kinds |= dict.fromkeys(EFFICIENCIES, "none")
+    return kinds | dict.fromkeys(joints.names, "force")
