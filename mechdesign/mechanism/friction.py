@@ -138,7 +138,9 @@ class Rubs:
             )
             pair = (1.0 if radius is None else radius, 0.0 if length is None else 2 / length)
             weights.append([self._flat(weight) for weight in pair])
-        self.weights = np.array(weights)
+        # The second number of a contact, the moment of a slide, counts where a length is given.
+        sides = 2 if any(contact.friction.length is not None for contact in contacts) else 1
+        self.weights = np.array(weights)[:, :sides]
 
     def _flat(self, value: Value) -> Floats:
         return np.broadcast_to(np.asarray(value, dtype=float), self.shape).reshape(-1)
@@ -200,18 +202,18 @@ class Rubs:
         return acting
 
     def _slopes(self, held: Balance) -> Complexes:
-        """What a unit of friction in each contact changes of what the contacts bear, shape (j, 2, k, poses)."""
+        """What a unit of friction in each contact changes of what the contacts bear, shape (j, 1 or 2, k, poses)."""
         count, size = len(self.contacts), int(np.prod(self.shape))
-        slopes = np.empty((count, 2, count, size), dtype=complex)
+        slopes = np.empty((count, self.weights.shape[1], count, size), dtype=complex)
         for k, unit in enumerate(np.eye(count)):
             alone = self._acting(np.broadcast_to(unit[:, None], (count, size)))
             slopes[:, :, k] = self._borne(balance(self.linear, alone, self.meshes, pressed=held.couplings))
         return slopes
 
     def _borne(self, held: Balance) -> Complexes:
-        """The force of each pin, and the force across and the moment of each slide, shape (contacts, 2, poses)."""
+        """The force of each pin, and the force across and the moment of each slide, shape (contacts, 1 or 2, poses)."""
         whole = reactions(self.joints, held)
-        borne = np.zeros((len(self.contacts), 2, int(np.prod(self.shape))), dtype=complex)
+        borne = np.zeros(self.weights.shape, dtype=complex)
         for row, contact in zip(borne, self.contacts, strict=True):
             reaction = whole[contact.contact]
             if contact.slide is None:
@@ -246,8 +248,11 @@ class _System:
     """The equations of friction m + strength size(V + A m) = 0 at a flat batch of poses."""
 
     def __init__(self, borne: Complexes, slopes: Complexes, strength: Floats, weights: Floats) -> None:
-        self.start, self.slopes, self.strength, self.weights = borne, slopes, strength, weights
         # Contacts at rest take no part, also where what they bear is not known.
+        rest = strength == 0
+        if rest.any():
+            borne, slopes = np.where(rest[:, None], 0.0, borne), np.where(rest[:, None, None], 0.0, slopes)
+        self.start, self.slopes, self.strength, self.weights = borne, slopes, strength, weights
         self.count, self.poses = strength.shape
 
     def take(self, rows: Ints) -> _System:
@@ -262,35 +267,37 @@ class _System:
     def residual(self, friction: Floats, growth: Floats) -> tuple[Floats, Floats, Floats]:
         """Residuals, shape (contacts, poses), the matrix of their derivatives, and the sizes of friction."""
         borne = self.borne(friction)
-        sizes = self.weights * np.abs(borne)
-        side = sizes.argmax(axis=1)[:, None]
-        size = np.take_along_axis(sizes, side, axis=1)[:, 0]
-        one, weight = (np.take_along_axis(values, side, axis=1)[:, 0] for values in (borne, self.weights))
-        toward = np.where(one == 0, 0.0, np.conj(one) / np.where(one == 0, 1.0, np.abs(one)))
-        slope = np.take_along_axis(self.slopes, side[:, :, None], axis=1)[:, 0]
-        pull = growth * self.strength
-        matrix = (pull * weight)[:, None] * (toward[:, None] * slope).real
-        matrix = np.where((self.strength == 0)[:, None], 0.0, matrix) + np.eye(self.count)[:, :, None]
-        friction_size = np.where(self.strength == 0, 0.0, self.strength * size)
-        return friction + growth * friction_size, matrix, friction_size
+        one, weight, slope = borne[:, 0], self.weights[:, 0], self.slopes[:, 0]
+        if borne.shape[1] > 1:
+            second = self.weights[:, 1] * np.abs(borne[:, 1]) > weight * np.abs(one)
+            one, weight = np.where(second, borne[:, 1], one), np.where(second, self.weights[:, 1], weight)
+            slope = np.where(second[:, None], self.slopes[:, 1], slope)
+        length = np.abs(one)
+        pull = self.strength * weight
+        toward = growth * pull * np.conj(one) / np.where(length == 0, 1.0, length)
+        matrix = toward.real[:, None] * slope.real - toward.imag[:, None] * slope.imag + np.eye(self.count)[:, :, None]
+        size = pull * length
+        return friction + growth * size, matrix, size
 
-    @property
+    @cached_property
     def bounds(self) -> Floats:
         """Largest change of each contact's friction by that of another, shape (j, k, poses)."""
-        bounds = np.abs(self.strength)[:, None] * (self.weights[:, :, None] * np.abs(self.slopes)).max(axis=1)
-        return np.where((self.strength == 0)[:, None], 0.0, bounds)
+        return np.asarray(np.abs(self.strength)[:, None] * (self.weights[:, :, None] * np.abs(self.slopes)).max(axis=1))
+
+    @cached_property
+    def _least(self) -> Floats:
+        return np.asarray(np.abs(self.strength) * (self.weights * np.abs(self.start)).max(axis=1))
 
     def tolerance(self, friction: Floats) -> Floats:
         """Residual that is rounding."""
-        borne = np.abs(self.start) + np.einsum("jwkn,kn->jwn", np.abs(self.slopes), np.abs(friction))
-        terms = np.abs(friction) + np.abs(self.strength) * (self.weights * borne).max(axis=1)
-        return np.asarray(SOLVED * np.where(self.strength == 0, 1.0, terms))
+        size = np.abs(friction)
+        terms = self._least + np.einsum("jkn,kn->jn", self.bounds, size) + size
+        return np.asarray(SOLVED * terms)
 
     def solve(self, rates: Floats) -> tuple[Floats, Ints]:
         """Friction, nan where there is no equilibrium, and the number of the contact that jams there, else -1."""
         friction, jams = np.full((self.count, self.poses), np.nan), np.full(self.poses, -1)
-        finite = np.isfinite(self.bounds).all(axis=(0, 1))
-        finite &= np.isfinite(np.where(self.strength == 0, 0.0, np.abs(self.start).max(axis=1))).all(axis=0)
+        finite = np.isfinite(self.bounds).all(axis=(0, 1)) & np.isfinite(self._least).all(axis=0)
         # A matrix K >= 0 has a spectral radius below 1 where (I - K) v = 1 has a solution v > 0.
         bounds = np.where(finite, self.bounds, 0.0)
         weights, regular = _solved(np.eye(self.count)[:, :, None] - bounds, np.ones((self.count, self.poses)))

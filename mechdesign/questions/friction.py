@@ -9,7 +9,7 @@ import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.mechanism import Mechanism
-from mechdesign.mechanism.algebra import Value, quiet
+from mechdesign.mechanism.algebra import Value, largest, quiet
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces
 from mechdesign.mechanism.friction import Rubbing, Rubs, efficiency, rubbings
@@ -23,8 +23,11 @@ from mechdesign.study.poses import Poses
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
 _JAMS, _HOLDS = "jams in", "is held by"
-# A moment below this part of the force times the size of the mechanism is rounding.
-_NO_MOMENT = 1e-9
+# A slide bears a moment of note from this part of the largest joint force times the size of the mechanism.
+NOTABLE_MOMENT = 0.01
+# The mechanism is called self-locking where friction holds it in at least this part of the poses: at a dead centre, and
+# against inertia, friction holds every mechanism.
+OFTEN = 0.5
 _MOMENT = "moment without length"
 
 
@@ -78,11 +81,11 @@ class Friction:
 
     def _moments_without_length(self, whole: Sequence[Reaction]) -> Value:
         """One more than the number of a slide that bears a moment, which its friction leaves out; else 0."""
-        number: Value = 0.0
+        number, force = 0.0, largest(np.abs(reaction.force) for reaction in whole)
         for contact, own in zip(self.contacts, self._number.tolist(), strict=True):
             joint, reaction = self.joints.contacts[contact.contact], whole[contact.contact]
             if joint.slides and contact.friction.length is None:
-                large = np.abs(reaction.moment) > _NO_MOMENT * np.abs(reaction.force) * self.mechanism.size
+                large = np.abs(reaction.moment) > NOTABLE_MOMENT * force * self.mechanism.size
                 number = np.where(large, own, number)
         return number
 
@@ -102,19 +105,19 @@ class Friction:
         self, study: Study, poses: Poses, marks: Mapping[str, tuple[int, int]], table: str
     ) -> list[Caution]:  # fmt: skip
         """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
-        warnings = []
+        warnings, count = [], poses.count // poses.designs
         for name in self.names:
-            for what, kind, text in (
-                (_JAMS, "jammed", f"friction in {name} jams the mechanism: no effort of the drives moves it on, and "
+            for what, kind, least, text in (
+                (_JAMS, "jammed", 1, f"friction in {name} jams the mechanism: no effort of the drives moves it on, and "
                  "efforts and joint forces are nan; a longer guide, a smaller offset or coefficient frees it"),
-                (_HOLDS, "self_locking", f"friction holds what the loads would move, most of it in {name}: the "
+                (_HOLDS, "self_locking", OFTEN * count, f"friction holds what the loads would move, most of it in {name}: the "
                  "mechanism is self-locking there, and the drives must push in either direction"),
-                (_MOMENT, "incomplete", f"{name} bears a moment, which presses on both ends of its guide, and its "
+                (_MOMENT, "incomplete", 1, f"{name} bears a moment, which presses on both ends of its guide, and its "
                  "friction counts the force across alone; give its 'length'"),
             ):  # fmt: skip
                 number, row = marks[f"{what} {name}"]
-                if number:
+                if number >= least:
                     where = pose_in_words(study, poses, row)
-                    words = f"in {number} of {poses.count // poses.designs} poses {text}; the first: {where}"
+                    words = f"in {number} of {count} poses {text}; the first: {where}"
                     warnings.append(Caution(kind, words, table, row, where))
         return warnings
