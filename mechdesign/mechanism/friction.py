@@ -94,12 +94,15 @@ class Rubbed:
         The relative rates.
     jams : Ints, shape of the poses
         Number of the rubbing that jams, -1 where the mechanism moves.
+    apart : Floats, likewise
+        How far from jamming it is, from 0 to 1: forces lose so many digits.
     """
 
     balance: Balance
     friction: Floats
     rates: Floats
     jams: Ints
+    apart: Floats
 
     @property
     def power(self) -> Floats:
@@ -171,11 +174,11 @@ class Rubs:
         """The equilibrium while the mechanism moves at some rates, or `back` against them; their signs count."""
         relative = -self.relative(rates) if back else self.relative(rates)
         strength = np.sign(relative) * self.coefficients
-        friction, jams = np.zeros_like(relative), np.full(relative.shape[1], -1)
+        friction = np.zeros_like(relative)
         borne, slopes = self._free
         for _ in range(ROUNDS):
             system = _System(borne - np.einsum("jwkn,kn->jwn", slopes, friction), slopes, strength, self.weights)
-            friction, jams = system.solve(relative)
+            friction, jams, apart = system.solve(relative)
             held = balance(self.linear, self.forces.plus(self._acting(friction)), self.meshes)
             borne, told = self._borne(held), system.borne(friction)
             wrong = np.abs(borne - told).max(axis=(0, 1)) > 1e-9 * np.abs(borne).max(axis=(0, 1))
@@ -186,8 +189,8 @@ class Rubs:
             friction[:, wrong] = np.nan
             jams[wrong] = np.abs(system.strength).argmax(axis=0)[wrong]
             held = balance(self.linear, self.forces.plus(self._acting(friction)), self.meshes)
-        friction, relative = (values.reshape(-1, *self.shape) for values in (friction, relative))
-        return Rubbed(held, friction, relative, jams.reshape(self.shape))
+        friction, relative = (values.reshape(len(self.contacts), *self.shape) for values in (friction, relative))
+        return Rubbed(held, friction, relative, jams.reshape(self.shape), apart.reshape(self.shape))
 
     def _acting(self, friction: Floats) -> Forces:
         """Moments and forces of friction on the members of all contacts."""
@@ -294,8 +297,11 @@ class _System:
         terms = self._least + np.einsum("jkn,kn->jn", self.bounds, size) + size
         return np.asarray(SOLVED * terms)
 
-    def solve(self, rates: Floats) -> tuple[Floats, Ints]:
-        """Friction, nan where there is no equilibrium, and the number of the contact that jams there, else -1."""
+    def solve(self, rates: Floats) -> tuple[Floats, Ints, Floats]:
+        """Friction, nan where there is no equilibrium; the contact that jams there, else -1; and how far from jamming.
+
+        That is the determinant of the equations' derivatives, from 0, where they jam, to 1.
+        """
         friction, jams = np.full((self.count, self.poses), np.nan), np.full(self.poses, -1)
         finite = np.isfinite(self.bounds).all(axis=(0, 1)) & np.isfinite(self._least).all(axis=0)
         # A matrix K >= 0 has a spectral radius below 1 where (I - K) v = 1 has a solution v > 0.
@@ -307,7 +313,10 @@ class _System:
         rows = np.flatnonzero(finite & np.isnan(friction).any(axis=0))
         if len(rows):
             friction[:, rows], jams[rows] = self.take(rows)._followed(rates[:, rows])
-        return friction, jams
+        # One step more, which is exact beside the corners of the sizes.
+        residual, matrix, _ = self.residual(friction, np.ones(self.poses))
+        step, _ = _solved(matrix, residual)
+        return friction - np.nan_to_num(step), jams, np.clip(_determinant(matrix), 0.0, 1.0)
 
     def _contracted(self, scale: Floats) -> Floats:
         """The one solution, where the equations are a contraction in the largest of the residuals over `scale`."""
@@ -352,15 +361,19 @@ class _System:
             friction = friction - _solved(matrix, residual)[0]
         residual, matrix, _ = self.residual(friction, growth)
         good = (np.abs(residual) <= self.tolerance(friction)).all(axis=0)
-        determinant = np.linalg.det(np.moveaxis(np.nan_to_num(matrix), -1, 0))
-        return friction, np.asarray(good & (determinant > 0))
+        return friction, np.asarray(good & (_determinant(matrix) > 0))
+
+
+def _determinant(matrix: Floats) -> Floats:
+    """Determinants of matrices, shape (k, k, poses); 0 where one is not finite."""
+    lead = np.moveaxis(matrix, -1, 0)
+    good = np.isfinite(lead).all(axis=(1, 2))
+    return np.asarray(np.linalg.det(np.where(good[:, None, None], lead, 0.0)))
 
 
 def _solved(matrix: Floats, right: Floats) -> tuple[Floats, Flags]:
     """Solutions of linear systems, shape (k, poses), nan where a matrix is singular; and where it is regular."""
-    lead = np.moveaxis(matrix, -1, 0)
-    good = np.isfinite(lead).all(axis=(1, 2))
-    good &= np.linalg.det(np.where(good[:, None, None], lead, 0.0)) != 0
+    lead, good = np.moveaxis(matrix, -1, 0), _determinant(matrix) != 0
     safe = np.where(good[:, None, None], lead, np.eye(lead.shape[-1]))
     solution = np.linalg.solve(safe, right.T[..., None])[..., 0].T
     return np.where(good, solution, np.nan), good

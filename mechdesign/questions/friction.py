@@ -23,6 +23,8 @@ from mechdesign.study.poses import Poses
 
 # Columns that no table has: one more than the number of the joint, 0 where there is nothing to be said.
 _JAMS, _HOLDS = "jams in", "is held by"
+# Another: how far a pose is from jamming, from 0 to 1; forces lose so many digits.
+APART = "apart from jamming"
 # A slide bears a moment of note from this part of the largest joint force times the size of the mechanism.
 NOTABLE_MOMENT = 0.01
 # The mechanism is called self-locking where friction holds it in at least this part of the poses: at a dead centre, and
@@ -75,6 +77,7 @@ class Friction:
         if moves:
             columns["friction_power"] = np.sum(ahead.power, axis=0)
         columns |= {_JAMS: np.where(ahead.jams < 0, 0, self._number[ahead.jams]), _HOLDS: holds}
+        columns[APART] = np.minimum(ahead.apart, np.where(back.jams < 0, back.apart, 1.0))
         whole = rubs.reactions(ahead)
         columns[_MOMENT] = self._moments_without_length(whole)
         return Slipping(ahead.balance, whole, columns)
@@ -110,8 +113,8 @@ class Friction:
             for what, kind, least, text in (
                 (_JAMS, "jammed", 1, f"friction in {name} jams the mechanism: no effort of the drives moves it on, and "
                  "efforts and joint forces are nan; a longer guide, a smaller offset or coefficient frees it"),
-                (_HOLDS, "self_locking", OFTEN * count, f"friction holds what the loads would move, most of it in {name}: the "
-                 "mechanism is self-locking there, and the drives must push in either direction"),
+                (_HOLDS, "self_locking", OFTEN * count, "friction holds what the loads would move, most of it in "
+                 f"{name}: the mechanism is self-locking there, and the drives must push in either direction"),
                 (_MOMENT, "incomplete", 1, f"{name} bears a moment, which presses on both ends of its guide, and its "
                  "friction counts the force across alone; give its 'length'"),
             ):  # fmt: skip

@@ -60,7 +60,7 @@ class ForceQuestion:
     def statics(self) -> list[Static]:
         """Columns of a row a pose, and of the size of each joint's force."""
         mechanism, label = self.study.mechanism, self.study.units.label
-        moment = self.size * mechanism.size
+        moment = self.size * (mechanism.size or 1.0)
         sizes = {"force": self.size, "moment": moment, "power": moment * self.tempo, "none": 1.0}
         of_drive = {f"{drive}_{word}": (f"<drive>_{word}", {"drive": drive})
                     for drive in mechanism.drives for word in ("effort", "power")}  # fmt: skip

@@ -18,6 +18,7 @@ from mechdesign.mechanism.four_bars import FourBar
 from mechdesign.mechanism.margins import SINGULARITY, Cause
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.columns import GIVEN
+from mechdesign.questions.friction import APART
 from mechdesign.questions.kinematics import targets
 from mechdesign.questions.kinematics.columns import OVER
 from mechdesign.questions.kinematics.motion import Motion, rates_of_advantage
@@ -191,7 +192,7 @@ class Along:
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)
-        return table, motion.arrays["conditioning"]
+        return table, np.minimum(motion.arrays["conditioning"], motion.arrays.get(APART, 1.0))
 
     @cached_property
     def present(self) -> Floats:
