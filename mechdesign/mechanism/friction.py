@@ -36,7 +36,7 @@ SOLVED = 1e-12
 # Most steps of Newton's method; where there is one solution, with steps of the contraction between them.
 STEPS = 200
 # Following a solution: steps of Newton's method, the longest and the shortest step of the coefficients' growth.
-FOLLOWING_STEPS, LONGEST, SHORTEST = 12, 1 / 16, 1e-7
+FOLLOWING_STEPS, LONGEST, SHORTEST = 12, 1 / 16, 1e-6
 # Rounds in which the teeth of wheels, that are pressed apart whichever way they drive, find their sides.
 ROUNDS = 8
 # Power below this part of the largest is rounding.
@@ -356,11 +356,14 @@ class _System:
 
     def _corrected(self, friction: Floats, growth: Floats) -> tuple[Floats, Flags]:
         """Solutions near to some, and where they are found on the same side of all folds and poles."""
-        for _ in range(FOLLOWING_STEPS):
-            residual, matrix, _ = self.residual(friction, growth)
-            friction = friction - _solved(matrix, residual)[0]
         residual, matrix, _ = self.residual(friction, growth)
-        good = (np.abs(residual) <= self.tolerance(friction)).all(axis=0)
+        good = np.zeros(self.poses, dtype=bool)
+        for _ in range(FOLLOWING_STEPS):
+            friction = friction - _solved(matrix, residual)[0]
+            residual, matrix, _ = self.residual(friction, growth)
+            good = (np.abs(residual) <= self.tolerance(friction)).all(axis=0)
+            if good.all():
+                break
         return friction, np.asarray(good & (_determinant(matrix) > 0))
 
 

@@ -18,6 +18,7 @@ from mechdesign.mechanism.derivatives import STALLED
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
 from mechdesign.questions.dynamics.question import force_question
+from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
 from mechdesign.questions.kinematics.courses import follow
@@ -88,8 +89,9 @@ def tables(
     Of the extremes those of some `outputs`, or all; the columns of `requests` are followed besides.
     """
     names = [static.name for static in question_of(motion).statics if outputs is None or static.name in outputs]
-    integrals = [Asked(name, integral=True) for name in names] if "extremes" in chosen else []
-    along = along_of(question, names, requests=[*requests, *integrals])
+    followed = [name for name in names if name not in EFFICIENCIES]
+    integrals = [Asked(name, integral=True) for name in followed] if "extremes" in chosen else []
+    along = along_of(question, followed, requests=[*requests, *integrals])
     parts = {name: make(motion) for name, make in A_ROW_A_POSE.items() if name in chosen}
     if "extremes" in chosen:
         parts["extremes"] = extremes_table(motion, along, names)
