@@ -151,7 +151,7 @@ class Rubs:
     def relative(self, rates: Rates) -> Floats:
         """Relative rates of the contacts, 0 where both members are at rest against each other."""
         bodies = self.linear.graph.bodies
-        speed = largest([*rates.nodes, *rates.slides])
+        speed = largest([*(np.abs(node) for node in rates.nodes), *rates.slides])
         turning = np.maximum(largest(rates.angles), speed / self.size)
         values = []
         for contact in self.contacts:
@@ -315,8 +315,9 @@ class _System:
             friction[:, rows], jams[rows] = self.take(rows)._followed(rates[:, rows])
         # One step more, which is exact beside the corners of the sizes.
         residual, matrix, _ = self.residual(friction, np.ones(self.poses))
-        step, _ = _solved(matrix, residual)
-        return friction - np.nan_to_num(step), jams, np.clip(_determinant(matrix), 0.0, 1.0)
+        better = friction - _solved(matrix, residual)[0]
+        good = (np.abs(self.residual(better, np.ones(self.poses))[0]) <= np.abs(residual)).all(axis=0)
+        return np.where(good, better, friction), jams, np.clip(_determinant(matrix), 0.0, 1.0)
 
     def _contracted(self, scale: Floats) -> Floats:
         """The one solution, where the equations are a contraction in the largest of the residuals over `scale`."""
@@ -357,11 +358,11 @@ class _System:
     def _corrected(self, friction: Floats, growth: Floats) -> tuple[Floats, Flags]:
         """Solutions near to some, and where they are found on the same side of all folds and poles."""
         residual, matrix, _ = self.residual(friction, growth)
-        good = np.zeros(self.poses, dtype=bool)
+        good: Flags = np.zeros(self.poses, dtype=bool)
         for _ in range(FOLLOWING_STEPS):
             friction = friction - _solved(matrix, residual)[0]
             residual, matrix, _ = self.residual(friction, growth)
-            good = (np.abs(residual) <= self.tolerance(friction)).all(axis=0)
+            good = np.asarray((np.abs(residual) <= self.tolerance(friction)).all(axis=0))
             if good.all():
                 break
         return friction, np.asarray(good & (_determinant(matrix) > 0))
@@ -370,13 +371,13 @@ class _System:
 def _determinant(matrix: Floats) -> Floats:
     """Determinants of matrices, shape (k, k, poses); 0 where one is not finite."""
     lead = np.moveaxis(matrix, -1, 0)
-    good = np.isfinite(lead).all(axis=(1, 2))
+    good = np.asarray(np.isfinite(lead).all(axis=(1, 2)))
     return np.asarray(np.linalg.det(np.where(good[:, None, None], lead, 0.0)))
 
 
 def _solved(matrix: Floats, right: Floats) -> tuple[Floats, Flags]:
     """Solutions of linear systems, shape (k, poses), nan where a matrix is singular; and where it is regular."""
-    lead, good = np.moveaxis(matrix, -1, 0), _determinant(matrix) != 0
+    lead, good = np.moveaxis(matrix, -1, 0), np.asarray(_determinant(matrix) != 0)
     safe = np.where(good[:, None, None], lead, np.eye(lead.shape[-1]))
     solution = np.linalg.solve(safe, right.T[..., None])[..., 0].T
     return np.where(good, solution, np.nan), good

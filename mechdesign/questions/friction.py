@@ -84,7 +84,8 @@ class Friction:
 
     def _moments_without_length(self, whole: Sequence[Reaction]) -> Value:
         """One more than the number of a slide that bears a moment, which its friction leaves out; else 0."""
-        number, force = 0.0, largest(np.abs(reaction.force) for reaction in whole)
+        number: Value = 0.0
+        force = largest(np.abs(reaction.force) for reaction in whole)
         for contact, own in zip(self.contacts, self._number.tolist(), strict=True):
             joint, reaction = self.joints.contacts[contact.contact], whole[contact.contact]
             if joint.slides and contact.friction.length is None:
@@ -109,18 +110,30 @@ class Friction:
     ) -> list[Caution]:  # fmt: skip
         """Warnings of the poses of one design; `marks` have how many of all poses, and the first row."""
         warnings, count = [], poses.count // poses.designs
+
+        def told(what: str, name: str, least: float, text: str) -> tuple[str, str, int, str] | None:
+            number, row = marks[f"{what} {name}"]
+            where = pose_in_words(study, poses, row) if number >= least else ""
+            words = f"in {number} of {count} poses {text}; the first: {where}"
+            return (words, table, row, where) if number >= least else None
+
         for name in self.names:
-            for what, kind, least, text in (
-                (_JAMS, "jammed", 1, f"friction in {name} jams the mechanism: no effort of the drives moves it on, and "
-                 "efforts and joint forces are nan; a longer guide, a smaller offset or coefficient frees it"),
-                (_HOLDS, "self_locking", OFTEN * count, "friction holds what the loads would move, most of it in "
-                 f"{name}: the mechanism is self-locking there, and the drives must push in either direction"),
-                (_MOMENT, "incomplete", 1, f"{name} bears a moment, which presses on both ends of its guide, and its "
-                 "friction counts the force across alone; give its 'length'"),
-            ):  # fmt: skip
-                number, row = marks[f"{what} {name}"]
-                if number >= least:
-                    where = pose_in_words(study, poses, row)
-                    words = f"in {number} of {count} poses {text}; the first: {where}"
-                    warnings.append(Caution(kind, words, table, row, where))
+            text = (
+                f"friction in {name} jams the mechanism: no effort of the drives moves it on, and efforts and joint "
+                "forces are nan; a longer guide, a smaller offset or coefficient frees it"
+            )
+            if jams := told(_JAMS, name, 1, text):
+                warnings.append(Caution("jammed", *jams))
+            text = (
+                f"friction holds what the loads would move, most of it in {name}: the mechanism is self-locking there, "
+                "and the drives must push in either direction"
+            )
+            if holds := told(_HOLDS, name, max(OFTEN * count, 1), text):
+                warnings.append(Caution("self_locking", *holds))
+            text = (
+                f"{name} bears a moment, which presses on both ends of its guide, and its friction counts the force "
+                "across alone; give its 'length'"
+            )
+            if turns := told(_MOMENT, name, 1, text):
+                warnings.append(Caution("incomplete", *turns))
         return warnings
