@@ -83,3 +83,13 @@ def test_boom_cylinder_of_the_excavator_holds_the_moment_of_all_weights() -> Non
     foot, head = 0.5 - 0.3j, point(places, "B")
     lever = (foot.conjugate() * (head - foot)).imag / np.abs(head - foot)
     assert table["boom_length_effort"] == pytest.approx(moment / lever, rel=1e-11)
+
+
+def test_push_of_the_wedge_press_is_that_of_a_slope_steeper_by_two_angles_of_friction() -> None:
+    result = result_of("wedge_press")
+    angle = np.arctan(0.1)
+    assert result.main["push_effort"] == pytest.approx(1000 * np.tan(np.radians(8) + 2 * angle), rel=1e-12)
+    smooth = 1000 * np.tan(np.radians(8))
+    assert result.main["efficiency"] == pytest.approx(smooth / result.main["push_effort"], rel=1e-12)
+    assert not result.main["back_efficiency"].any()
+    assert "self_locking" in [warning.kind for warning in result.warnings]
