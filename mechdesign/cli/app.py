@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from mechdesign.cli import options as given
 from mechdesign.cli import process
@@ -19,8 +19,43 @@ from mechdesign.cli.options import Options
 from mechdesign.commands import COMMANDS, MERGE, SENSITIVITIES, SWEEP
 from mechdesign.errors import EXIT_CODES, Interrupted
 
+# Typer brings its own Click, or is built on the one that is installed.
+_UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+
+
+@contextmanager
+def _usage() -> Iterator[None]:
+    """Tell a wrong use of the command line as other mistakes are told: in plain words, folded on a terminal."""
+    try:
+        yield
+    except _UsageError as error:
+        from mechdesign.cli.terminal import folded
+
+        context, words = error.ctx, error.format_message()  # type: ignore[attr-defined]
+        words = words.rstrip(".").replace("(Possible options: ", "(there is ")
+        name = context.info_name if context is not None and context.parent is not None else ""
+        command = f"mechdesign {name}".rstrip()
+        message = f"{command}: {words[0].lower()}{words[1:]}\n{command} -h says what it takes"
+        print(folded(message, sys.stderr), file=sys.stderr)
+        raise typer.Exit(2) from None
+
+
+class _Group(TyperGroup):
+    """All commands."""
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        # Without arguments there is the help.
+        with _usage() if args else nullcontext():
+            return super().make_context(info_name, args, parent, **extra)
+
+    def invoke(self, ctx: Any) -> Any:
+        with _usage():
+            return super().invoke(ctx)
+
+
 app = typer.Typer(
     name="mechdesign",
+    cls=_Group,
     help="Design studies of planar mechanisms: one study file, six questions, tables and pictures.",
     epilog="Exit codes: " + ". ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     no_args_is_help=True,

@@ -7,7 +7,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import redirect_stderr, suppress
+from contextlib import nullcontext, redirect_stderr, suppress
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -21,6 +21,7 @@ from mechdesign.cli.docs import explained
 from mechdesign.cli.execution import (
     Outcome,
     answer,
+    drawing_ahead,
     interrupted,
     load_source,
     source,
@@ -103,7 +104,8 @@ def run(paths: Sequence[Path] | None, options: Options, only: Sequence[str] = ()
     unless `options.fail_fast`. After an interrupt the summary and the JUnit file show what was finished.
     """
     files = study_files(paths)
-    with LiveTable(quiet=options.quiet) as live_table:
+    alone = drawing_ahead(options) if len(files) == 1 else nullcontext()
+    with LiveTable(quiet=options.quiet) as live_table, alone:
         record = BatchRecord(options, files, live_table)
         try:
             tasks = _read(files, options, record, only)

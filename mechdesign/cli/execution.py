@@ -8,6 +8,7 @@ import math
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -36,13 +37,14 @@ from mechdesign.study import Study, load, template_path
 from mechdesign.study.loading import Source, load_bytes, read_file
 from mechdesign.study.text.document import MAX_BYTES
 from mechdesign.study.text.inputs import Folder
-from mechdesign.work import shards
-from mechdesign.work.chunks import Divided, divided
+from mechdesign.work import ahead, shards
+from mechdesign.work.chunks import Divided, divided, worker_count
 from mechdesign.work.journal import NAME, Journal
 from mechdesign.work.shards import Shard
 from mechdesign.work.threads import one_thread
 
 STANDARD_INPUT = Path("-")
+PICTURES = "mechdesign.report.figures.pictures"  # with it all of Matplotlib that pictures need is imported
 _ROWS_AT_ONCE = 20_000  # rows read at a time from the file of a table
 OUTCOMES = {
     0: "done",
@@ -373,20 +375,31 @@ def interrupted(study: Study, command: str, directory: Path, error: KeyboardInte
     return Outcome(study.label, command, directory, code, 0, failed=words, written=isinstance(error, Interrupted))
 
 
+def drawing_ahead(options: Options) -> AbstractContextManager[None]:
+    """Context of the answers to one study, in which pictures are drawn by a process that imports Matplotlib at once.
+
+    A report needs Matplotlib in this process.
+    """
+    if options.no_plots or options.report or options.part is not None:
+        return nullcontext()
+    return ahead.importing(PICTURES, worker_count(options.jobs))
+
+
 @one_thread()
 def ask(command: str, path: Path | None, options: Options) -> Outcome:
     """Load a study, answer one question, write and show the result."""
-    study = load_study(path, options)
-    directory = place(folder(study, command, options), options)
-    with owned(directory):
-        try:
-            outcome = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
-        except Interrupted as error:
+    with drawing_ahead(options):
+        study = load_study(path, options)
+        directory = place(folder(study, command, options), options)
+        with owned(directory):
+            try:
+                outcome = answer(study, command, directory, options, terminal.Bar(quiet=options.quiet))
+            except Interrupted as error:
+                if options.report:
+                    write_report(directory, study, [interrupted(study, command, directory, error)], options)
+                raise
             if options.report:
-                write_report(directory, study, [interrupted(study, command, directory, error)], options)
-            raise
-        if options.report:
-            write_report(directory, study, [outcome], options)
+                write_report(directory, study, [outcome], options)
     if outcome.shard:
         tell(outcome, study, options)
         return outcome

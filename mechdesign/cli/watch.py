@@ -6,10 +6,11 @@ import re
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 from mechdesign.cli import batch, terminal
-from mechdesign.cli.execution import STANDARD_INPUT, load_study
+from mechdesign.cli.execution import PICTURES, STANDARD_INPUT, load_study
 from mechdesign.cli.options import Options
 from mechdesign.commands import QUESTIONS
 from mechdesign.errors import Interrupted, MechdesignError, StudyError, suggestion
@@ -37,6 +38,9 @@ def watch(path: Path, commands: Sequence[str], options: Options) -> int:
             raise StudyError(f"{command!r} is no question{suggestion(command, QUESTIONS)}; there are {listed}")
     if path == STANDARD_INPUT or (path.exists() and not path.is_file()):
         raise StudyError(f"{path}: is no file that could be watched")
+    if not options.no_plots:
+        # Once, and not at each answer.
+        import_module(PICTURES)
     files = {path}
     with suppress(KeyboardInterrupt):
         while True:

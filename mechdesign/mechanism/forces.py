@@ -41,12 +41,15 @@ class Forces:
         By body, the force on it at its base, and the moment about that.
     slides : dict
         By slide, the force along it on its slider, and against that on its guide.
+    parts : list of (str, Vector, Value, Vector)
+        What these add up: the body, the force, the moment about where it acts, and the arm from the base to there.
     """
 
     configuration: Configuration
     nodes: list[Vector] = field(default_factory=list)
     bodies: dict[str, tuple[Vector, Value]] = field(default_factory=dict)
     slides: dict[int, Value] = field(default_factory=dict)
+    parts: list[tuple[str, Vector, Value, Vector]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.nodes = [0.0] * len(self.configuration.nodes)
@@ -58,6 +61,7 @@ class Forces:
 
     def on_body(self, body: str, force: Vector, moment: Value = 0.0, arm: Vector = 0.0) -> None:
         """Add a force on a body at an arm from its base, and a moment."""
+        self.parts.append((body, force, moment, arm))
         before = self.bodies.get(body, (0.0, 0.0))
         self.bodies[body] = plus(before[0], 1, force), before[1] + moment + cross(arm, force)
 
@@ -91,9 +95,8 @@ class Forces:
         """The sum of two systems of forces."""
         both = Forces(self.configuration)
         both.nodes = [plus(one, 1, more) for one, more in zip(self.nodes, other.nodes, strict=True)]
-        both.bodies = dict(self.bodies)
-        for body, (force, moment) in other.bodies.items():
-            both.on_body(body, force, moment)
+        for part in (*self.parts, *other.parts):
+            both.on_body(*part)
         both.slides = dict(self.slides)
         for slide, along in other.slides.items():
             both.on_slide(slide, along)
@@ -156,19 +159,28 @@ def inertia(
         base = forces.bases[body]
         arm = _arm(forces, geometry, body, given) * configuration.body_rotation(body)
         frame = configuration.graph.bodies[body][0]
-        force: Vector = mass * gravity
         turning: Value = 0.0
         if moving.velocity is not None:
             omega = moving.velocity.angles[frame]
             speed = moving.velocity.nodes[base] + 1j * omega * arm
             kinetic = kinetic + 0.5 * (mass * norm2(speed) + moment * omega * omega)
             if moving.acceleration is not None:
-                alpha = moving.acceleration.angles[frame]
-                force = force - mass * (moving.acceleration.nodes[base] + (1j * alpha - omega * omega) * arm)
-                turning = -1.0 * moment * alpha
-        forces.on_body(body, force, turning, arm)
+                turning = -1.0 * moment * moving.acceleration.angles[frame]
+        forces.on_body(body, inertia_force(forces, moving, body, mass, gravity, arm), turning, arm)
         potential = potential - mass * dot(gravity, configuration.nodes[base] + arm)
     return Energy(kinetic, potential)
+
+
+def inertia_force(
+    forces: Forces, moving: Moving, body: str, mass: Value, gravity: Vector, arm: Vector
+) -> Vector:  # fmt: skip
+    """Weight and inertia force of a mass (force per acceleration) at an arm from the base of its body."""
+    force: Vector = mass * gravity
+    if moving.velocity is not None and moving.acceleration is not None:
+        frame = forces.configuration.graph.bodies[body][0]
+        omega, alpha = moving.velocity.angles[frame], moving.acceleration.angles[frame]
+        force = force - mass * (moving.acceleration.nodes[forces.bases[body]] + (1j * alpha - omega * omega) * arm)
+    return force
 
 
 def center(forces: Forces, geometry: Geometry, body: str, given: Mass) -> Vector:

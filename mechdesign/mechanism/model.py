@@ -49,6 +49,11 @@ class Link:
     ends: tuple[str, str] | None = None
     telescopic: bool = False
 
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """The points between which its beams run where it bends; of a telescopic link a single beam."""
+        return self.ends or tuple(self.points)
+
 
 @dataclass(frozen=True)
 class Mass:
@@ -172,7 +177,7 @@ class Coupling:
 
     `of` gives the value of coordinate `sets` from coordinates and parameters, both in the study's units. A name in it
     is a parameter as in a `Measure`, or a place of the coupling's own. Its `wheels` are gears, whose teeth have a
-    `pressure_angle` (radians), or pulleys of a belt.
+    `pressure_angle` (radians), or pulleys of a belt with the `radius` of the one that follows.
     """
 
     name: str
@@ -180,6 +185,7 @@ class Coupling:
     of: Expression
     wheels: str = "gears"
     pressure_angle: float = 0.0
+    radius: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -68,10 +68,10 @@ class Plan:
         (coordinate,) = self.structure.given
         period = 2 * np.pi if coordinate.quantity == "angle" else max(self.core.size, 1e-300)
         sketch = float(self.core.sketch_configuration.value(coordinate))
-        return ChangePoints(
-            self.structure.groups, self.modes, sketch, period,
-            lambda values, modes: self.run([values], self.core.geometry.nominal, None, modes).closures,
-        )  # fmt: skip
+        return ChangePoints(self.structure.groups, self.modes, sketch, period, self._closures)
+
+    def _closures(self, values: Floats, modes: Sequence[Value]) -> Sequence[Value]:
+        return self.run([values], self.core.geometry.nominal, None, modes).closures
 
     def modes_at(self, given: Sequence[Value]) -> Sequence[Value]:
         """Assembly mode of each group at given values: as drawn, or changed at change points that are followed."""

@@ -15,14 +15,15 @@ closed form. What is left at the given coordinates are the efforts of the drives
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from mechdesign.mechanism.algebra import Value, Vector, cross, dot, plus, quiet
+from mechdesign.mechanism.configuration import Configuration
 from mechdesign.mechanism.coordinates import Coordinate, coupled
 from mechdesign.mechanism.derivatives import Linearization
 from mechdesign.mechanism.forces import Forces, bases
@@ -49,6 +50,7 @@ class Balance:
     efforts: list[Value]
     edges: list[Vector]
     couplings: list[Value]
+    teeth: Mapping[str, Vector] = field(default_factory=dict)  # force on the link that follows, by coupling
 
 
 @quiet
@@ -67,26 +69,34 @@ def balance(
         return held
     # The forces of the teeth do what the efforts of the couplings do, on any motion: those of the drives stay.
     teeth = Forces(linear.configuration)
+    pressing = {}
     for mesh in meshes:
         effort = held.couplings[mesh.index]
-        engage(teeth, mesh, effort, 1.0 if pressed is None else np.sign(effort * pressed[mesh.index]))
-    return _balance(linear, forces.plus(teeth))
+        apart = 1.0 if pressed is None else np.sign(effort * pressed[mesh.index])
+        pressing[mesh.coupling] = engage(teeth, mesh, effort, effort if pressed is None else pressed[mesh.index], apart)
+    return replace(_balance(linear, forces.plus(teeth)), teeth=pressing)
 
 
-def engage(teeth: Forces, mesh: Mesh, effort: Value, apart: Value = 1.0) -> None:
+def engage(teeth: Forces, mesh: Mesh, effort: Value, pressed: Value, apart: Value) -> Vector:
     """Add the forces of a mesh at the place where its pitch circles touch, of an effort on the link that follows.
 
     Teeth press each other `apart` by their pressure angle; a belt only pulls, and its pretension is not known.
     """
     configuration = teeth.configuration
-    place, along = mesh.contact(configuration)
     radius = mesh.radii(configuration)[0]
-    force = along * (effort if mesh.slide >= 0 else effort / radius)
-    inwards = 1j * along
-    inwards = inwards * np.where(dot(inwards, place - configuration.nodes[mesh.axes[1]]) > 0, 1.0, -1.0)
-    force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * inwards
+    if mesh.belt:
+        # Its tight part pulls.
+        place, _, along = mesh.strand(configuration, np.where(pressed > 0, -1.0, 1.0))
+        force: Vector = along * (apart * np.abs(effort / radius))
+    else:
+        place, along = mesh.contact(configuration)
+        force = along * (effort if mesh.slide >= 0 else effort / radius)
+        inwards = 1j * along
+        inwards = inwards * np.where(dot(inwards, place - configuration.nodes[mesh.axes[1]]) > 0, 1.0, -1.0)
+        force = force + apart * np.abs(force) * np.tan(mesh.pressure_angle) * inwards
     for link, sign in ((mesh.links[0], 1.0), (mesh.links[1], -1.0)):
         teeth.on_body(link, sign * force, arm=place - configuration.nodes[teeth.bases[link]])
+    return force
 
 
 @quiet
@@ -183,7 +193,8 @@ class Contact(NamedTuple):
     """A joint between two bodies, or between a body and a pin that several share.
 
     The force on `on` by `by` acts at `node`: a signed sum of the forces of edges, less those on `bodies` whose base is
-    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge.
+    the node. It also transmits a moment unless it `turns`. Of a slide it `slides` along the line of its one edge. Teeth
+    press each other where the pitch circles of their `mesh` touch.
     """
 
     joint: str
@@ -194,6 +205,12 @@ class Contact(NamedTuple):
     bodies: tuple[str, ...] = ()
     turns: bool = True
     slides: bool = False
+    mesh: Mesh | None = None
+
+    def place(self, configuration: Configuration) -> Vector:
+        """Where it is."""
+        place: Vector = configuration.nodes[self.node]
+        return place if self.mesh is None else self.mesh.contact(configuration)[0]
 
 
 class _Member(NamedTuple):
@@ -211,7 +228,9 @@ class Joints:
     At `loaded` nodes a force acts on the pin itself: what the bodies there bear are no opposite forces.
     """
 
-    def __init__(self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset()) -> None:
+    def __init__(
+        self, description: Description, graph: Graph, loaded: frozenset[int] = frozenset(), meshes: Sequence[Mesh] = ()
+    ) -> None:  # fmt: skip
         self.description, self.graph, self.bases = description, graph, bases(graph)
         self.couplings = [coupled(coupling, description, graph) for coupling in description.couplings.values()]
         self.loaded = loaded | {node for coupling in self.couplings for _, node in coupling.gap.ends}
@@ -226,7 +245,8 @@ class Joints:
             if isinstance(joint, Fixed):
                 one, other = joint.links
                 self.ties[name] = self.graph.holder(one, joint.point), self.graph.holder(other, joint.point)
-        self.contacts = tuple(self._slides()) + tuple(self._pins())
+        wheels = [Contact(mesh.coupling, *mesh.links, mesh.axes[0], (), mesh=mesh) for mesh in meshes]
+        self.contacts = (*self._slides(), *self._pins(), *wheels)
         self.order, self.open = self._tie_order()
 
     @cached_property
@@ -394,6 +414,10 @@ def reactions(joints: Joints, balance: Balance) -> list[Reaction]:
         if not nothing(force := balance.forces.nodes[node]):
             turn(body, cross(linear.nodes[node] - linear.nodes[joints.bases[body]], force))
     for contact in joints.contacts:
+        if contact.mesh is not None:
+            # What teeth do is among the forces on the bodies already.
+            forces.append(balance.teeth[contact.joint])
+            continue
         force = 0.0
         for k, sign in contact.edges:
             force = plus(force, sign, balance.edges[k])

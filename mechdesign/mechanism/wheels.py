@@ -35,8 +35,8 @@ class Mesh:
 
     Parameters
     ----------
-    index : int
-        Number of the coupling, whose `gap` is zero.
+    coupling, index : str, int
+        Name and number of the coupling, whose `gap` is zero.
     links : tuple of str
         The link that follows, a wheel or what slides with a rack, then the wheel that it follows.
     carrier : str
@@ -49,8 +49,11 @@ class Mesh:
         Whether a belt joins the wheels.
     pressure_angle : float
         Of their teeth (radians).
+    radius : float
+        Of a belt's pulley that follows; 0 where it is not known.
     """
 
+    coupling: str
     index: int
     gap: Coordinate
     links: tuple[str, str]
@@ -59,6 +62,12 @@ class Mesh:
     slide: int
     belt: bool
     pressure_angle: float
+    radius: float
+
+    @property
+    def presses(self) -> bool:
+        """Whether the forces between its links are known."""
+        return not self.belt or self.radius > 0
 
     def ratio(self, configuration: Configuration) -> Value:
         """Rate of the link that follows per rate of the wheel, both against the carrier; of a rack a length."""
@@ -72,7 +81,8 @@ class Mesh:
             return 0.0, size
         apart: Value = np.abs(configuration.nodes[self.axes[0]] - configuration.nodes[self.axes[1]])
         if self.belt:
-            return PULLEY * apart / np.maximum(1.0, size), PULLEY * apart * np.minimum(1.0, size)
+            radius = self.radius or PULLEY * apart / np.maximum(1.0, size)
+            return radius, size * radius
         driven = apart / np.where(ratio < 0, 1.0 + size, np.abs(1.0 - size))
         return driven, size * driven
 
@@ -90,6 +100,19 @@ class Mesh:
         touch = centre + side * self.radii(configuration)[1] * way
         return touch, 1j * (touch - driven) / np.abs(touch - driven)
 
+    def strand(self, configuration: Configuration, side: Value) -> tuple[Vector, Vector, Vector]:
+        """Where a belt's straight part leaves both wheels, and its direction from the one that follows to the other.
+
+        `side` is 1 for the part on the left of the way from axis to axis, -1 on the right. Belts of a negative ratio
+        are crossed.
+        """
+        driven, centre = (configuration.nodes[axis] for axis in self.axes)
+        radius, other = self.radii(configuration)
+        other = np.where(self.ratio(configuration) > 0, other, -other)
+        apart = np.abs(centre - driven)
+        normal = (centre - driven) / apart * np.exp(1j * side * np.arccos((radius - other) / apart))
+        return driven + radius * normal, centre + other * normal, -1j * side * normal
+
 
 def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled], drawn: Configuration) -> list[Mesh]:
     """The wheels of all couplings that wheels can make: those linear in angles about axes on one carrier."""
@@ -105,7 +128,8 @@ def meshes(description: Description, graph: Graph, couplings: Sequence[Coupled],
             slide = coupling.follower.slide
             equal = slide < 0 and abs(float(_ratio(_rates(coupling.gap, drawn), links[1], carrier)) - 1.0) < SAME_RATE
             belt = given.wheels == "belt" or equal
-            found.append(Mesh(index, coupling.gap, links, carrier, nodes, slide, belt, given.pressure_angle))
+            looks = belt, given.pressure_angle, given.radius
+            found.append(Mesh(coupling.name, index, coupling.gap, links, carrier, nodes, slide, *looks))
     return found
 
 

@@ -58,18 +58,22 @@ class Friction:
         self._number = np.array([self.names.index(contact.joint) + 1 for contact in self.contacts])
 
     @quiet
-    def solve(self, linear: Linearization, forces: Forces, velocity: Rates | None) -> Slipping:
-        """Equilibrium under forces while the mechanism moves; where it stands still, as if all drives moved up."""
+    def solve(self, linear: Linearization, forces: Forces, velocity: Rates | None, *, back: bool = True) -> Slipping:
+        """Equilibrium under forces while the mechanism moves; where it stands still, as if all drives moved up.
+
+        With `back` also what it does on its way back.
+        """
         mechanism, moves = self.mechanism, velocity is not None
         drives = [mechanism.coordinate(name) for name in mechanism.drives]
         if velocity is None:
             velocity = linear.velocity([1.0 if c.quantity == "angle" else mechanism.size for c in drives])
         rates = [first(linear.configuration, drive, velocity) for drive in drives]
-        rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.meshes, mechanism.size)
-        ahead, back = rubs.solve(velocity), rubs.solve(velocity, back=True)
+        rubs = Rubs(self.joints, self.contacts, linear, forces, mechanism.pressing, mechanism.size)
+        ahead = rubs.solve(velocity)
+        ways = [ahead, rubs.solve(velocity, back=True)] if back else [ahead]
         columns: dict[str, Value] = {}
         holds: Value = 0.0
-        for name, rubbed, sign in zip(EFFICIENCIES, (ahead, back), (1.0, -1.0), strict=True):
+        for name, rubbed, sign in zip(EFFICIENCIES, ways, (1.0, -1.0), strict=False):
             lost = np.sum(rubbed.power, axis=0)
             ratio = efficiency(rubbed.balance.efforts, [sign * rate for rate in rates], lost)
             columns[name] = ratio.value
@@ -77,7 +81,7 @@ class Friction:
         if moves:
             columns["friction_power"] = np.sum(ahead.power, axis=0)
         columns |= {_JAMS: np.where(ahead.jams < 0, 0, self._number[ahead.jams]), _HOLDS: holds}
-        columns[APART] = np.minimum(ahead.apart, np.where(back.jams < 0, back.apart, 1.0))
+        columns[APART] = np.min([np.where(way.jams < 0, way.apart, 1.0) for way in ways], axis=0)
         whole = rubs.reactions(ahead)
         columns[_MOMENT] = self._moments_without_length(whole)
         return Slipping(ahead.balance, whole, columns)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,24 +60,28 @@ def study_poses(study: Study, section: str, numbers: Numbers = OWN) -> Poses:
     StudyError
         Where nothing sensible can be assumed.
     """
-    for name in dict.fromkeys((section, "kinematics")):
-        owner: PoseSection | None = getattr(study, name)
-        if owner is not None and owner.at_nodes:
+    for owner in _with_poses(study, section):
+        if owner.at_nodes:
             # Here, for regions need SciPy, which is slow to import.
             from mechdesign.region.curves import workspace_nodes
 
             return workspace_nodes(study)
-        if owner is not None:
-            poses = expand(owner, study.folder, numbers)
-            if poses is not None:
-                return poses
+        poses = expand(owner, study.folder, numbers)
+        if poses is not None:
+            return poses
     return default(study.mechanism.description, numbers)
+
+
+def _with_poses(study: Study, section: str) -> list[PoseSection]:
+    """The sections of a study that may give the poses of one, in their order."""
+    own: PoseSection | None = getattr(study, section)
+    names = (section, *(own.fallbacks if own is not None else ("kinematics",)))
+    return [part for name in dict.fromkeys(names) if (part := getattr(study, name)) is not None]
 
 
 def alike(designs: Designs, section: str, rows: Ints) -> Iterator[Ints]:
     """Some designs in groups that have as many poses, `POSES_AT_ONCE` at most unless they are of one design."""
-    sections = (getattr(designs.study, name) for name in dict.fromkeys((section, "kinematics")))
-    owner = next((part for part in sections if part is not None and part.source is not None), None)
+    owner = next((part for part in _with_poses(designs.study, section) if part.source is not None), None)
     counts = (
         np.zeros((len(rows), 0))
         if owner is None
@@ -311,6 +316,10 @@ class Shown:
     poses: Poses
     rows: Ints
     configuration: Configuration
+
+    def take(self, index: Ints) -> Self:
+        """Some of the poses."""
+        return replace(self, rows=self.rows[index], configuration=self.configuration.take(index))
 
 
 @dataclass(eq=False)

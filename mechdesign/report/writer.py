@@ -21,6 +21,7 @@ from mechdesign.report.requirements import Verdict, judged_again
 from mechdesign.report.tables import csv_blocks
 from mechdesign.results import LongTable, Result, Table
 from mechdesign.study import Study
+from mechdesign.work import ahead
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +80,7 @@ def write(
         drawn: dict[str, bytes] = {}
         plots = output.plots and not result.interrupted
         if plots:
-            drawn, warnings = pictures(study, result, output, jobs, before)
+            drawn, warnings = ahead.call(pictures, study, result.seen, output, jobs, before)
         if output.report:
             from mechdesign.report.page import section
 

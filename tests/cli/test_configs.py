@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from helpers.pages import faults
+from helpers.pages import faults, lost_curves
 from helpers.tables import unsaid
 from matplotlib.figure import Figure
 
@@ -67,12 +67,12 @@ def fewer_designs(config: Path) -> Iterator[str]:
 
 @pytest.fixture
 def judged_pages(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A picture with text over text or off the page, or with places on unequal axes, fails as it is drawn."""
+    """A picture fails as it is drawn if text lies over text or off the page, axes of places differ, curves are lost."""
     encoded = style.encoded
 
     def judged(figure: Figure, kind: str = "png") -> bytes:
         data = encoded(figure, kind)
-        wrong = list(faults(figure))
+        wrong = [*faults(figure), *lost_curves(figure)]
         assert not wrong, "; ".join(wrong)
         return data
 

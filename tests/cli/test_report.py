@@ -262,7 +262,7 @@ def test_the_finished_part_of_an_interrupted_question_is_in_its_page(folder, ana
         check(page)
         assert "✗ interrupted: 2 of 3 poses" in page.said("p")
         assert "all 3 rows" in page.said("caption")
-        assert {"the sketch, assembled"} == {each["aria-label"] for each in page.all("svg")}
+        assert {"The sketch, assembled"} == {each["aria-label"] for each in page.all("svg")}
 
 
 def test_questions_after_a_failure_stand_as_not_asked(asks, analysis, invoke):

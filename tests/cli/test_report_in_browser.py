@@ -11,6 +11,7 @@ import pytest
 from helpers.pictures import figure_of
 
 from mechdesign.experiments.sweep import sweep
+from mechdesign.questions.dynamics.analysis import dynamics
 from mechdesign.questions.kinematics.analysis import kinematics
 from mechdesign.questions.optimize.analysis import optimize
 from mechdesign.questions.reliability.analysis import reliability
@@ -47,6 +48,7 @@ def answers():
         ("gallery/four_bar", kinematics, "kinematics.sweep.crank.step=45"),
         ("gallery/straight_line_front", optimize, "optimize.evaluations=200"),
         ("gallery/offset_slider_crank", sweep, *FEW_CASES),
+        ("gallery/twin_cylinder", dynamics, "dynamics.sweep.crank.step=30"),
     ):  # fmt: skip
         study = load(CONFIGS / f"{name}.yaml", overrides)
         found[Path(name).name] = study, command(study)
@@ -106,7 +108,7 @@ def poses_of(answers, name):
     """Places of the poses that a page draws, in rows of the table of motion."""
     result = answers[name][1]
     marked = [number.place for number in headlines(result) if number.place is not None]
-    drawn, _ = frames(result.drawn, result.tables["motion"], marked)
+    drawn, *_ = frames(result.drawn, result.tables["motion"], marked)
     return drawn.poses.numbers.tolist()
 
 
@@ -350,6 +352,32 @@ def test_between_rows_of_the_table_pins_are_where_the_solver_has_them(opened, an
         slider.fill(str(poses.index(number)))
         x, y, error = place(page, "C")
         assert abs(complex(x, y) - complex(row["C.x"], row["C.y"])) < error
+
+
+def test_forces_move_with_the_linkage_and_can_be_hidden(opened, answers):
+    page = opened("twin_cylinder")
+    table = answers["twin_cylinder"][1].tables["joint_forces"]
+
+    def arrow(words):
+        found = page.locator(f"path:has(title:text-is('{words}'))").first
+        steps = re.findall(r"-?[\d.]+", found.get_attribute("d"))
+        begin, end = complex(*map(float, steps[:2])), complex(*map(float, steps[-2:]))
+        return begin, end - begin
+
+    slider = page.locator(".moving input[type=range]")
+    slider.evaluate("e => { e.value = 0; e.dispatchEvent(new Event('input')); }")
+    begin, first = arrow("Joint forces: O on crank")
+    row = (table["joint"] == "O") & (table["crank"] == 0)
+    force = complex(table["fx"][row][0], -table["fy"][row][0])
+    assert np.angle(first / force) == pytest.approx(0, abs=0.01)
+    slider.evaluate("e => { e.value = 5; e.dispatchEvent(new Event('input')); }")
+    begin_later, later = arrow("Joint forces: O on crank")
+    assert begin_later == begin
+    assert abs(later - first) > 1
+    box = page.get_by_label("Joint forces")
+    assert box.is_checked()
+    box.uncheck()
+    assert page.locator("g.moving-off:has(title:text-is('Joint forces: O on crank'))").count() == 1
 
 
 def test_one_map_is_chosen_by_its_index(opened):

@@ -251,3 +251,31 @@ def test_what_does_not_fit_is_listed_without_a_break_in_a_word(capsys, monkeypat
     rest = Path("a-folder-with-a-long-name") / "motion-of-the-crank-and-the-rod.csv"
     terminal.show(summary([Outcome("s", "kinematics", Path(), 1, 0)]), as_json=False, rest=rest)
     assert str(rest) in capsys.readouterr().out.splitlines()
+
+
+def test_a_wrong_option_is_told_in_lines_that_break_between_words(tmp_path):
+    code, shown = at_terminal(tmp_path, 0.0, "--no-plotz", "an_argument_that_no_command_takes_after_the_study")
+    assert code == 2
+    lines = shown.replace("\r", "").strip().splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    assert lines[0].startswith("mechdesign kinematics: no such option: --no-plotz")
+    assert "--no-plots" in " ".join(lines)
+    assert lines[-1] == "mechdesign kinematics -h says what it takes"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nope"], "mechdesign: no such command 'nope'"),
+        (["watch"], "mechdesign watch: missing argument"),
+        (["kinematics", "slider.yaml", "--jobs", "x"], "mechdesign kinematics: invalid value for '--jobs'"),
+        (["--nope"], "mechdesign: no such option: --nope"),
+    ],
+    ids=["command", "argument", "number", "option"],
+)
+def test_a_wrong_command_line_is_told_without_usage_lines(arguments, words, invoke):
+    done = invoke(*arguments)
+    assert done.exit_code == 2
+    assert done.stderr.startswith(words)
+    assert "Usage" not in done.stderr
+    assert len(done.stderr.splitlines()) == 2

@@ -100,7 +100,7 @@ def asked() -> tuple[tuple[str, Result, Any], ...]:
     )
     legs = mechdesign.load(PLATFORM, [
         "kinematics={motion: {P.x: [{from: 0, to: 0.1, time: 1}], P.y: 1, platform.angle: 0}, instants: 2}",
-        "stiffness.poses=null", "stiffness.characteristic_length=0.2",
+        "stiffness.poses=null", "stiffness.characteristic_length=0.2", "stiffness.loads=[{at: B1, force: [1, 0]}]",
     ])  # fmt: skip
     return (
         ("pieces", mechdesign.workspace(bar), bar),

@@ -1,4 +1,4 @@
-"""What is wrong with the layout of a figure: text over text or off the page, places on unequal axes."""
+"""What is wrong with the layout of a figure: text over text or off the page, places on unequal axes, lost curves."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from mechdesign.report.figures import style
+
 # Texts may share so many pixels: letters seldom fill their box to its corners.
 SHARED = 2.0
 # Of a letter's height: the part of a box that letters without strokes above and below leave free.
 LOOSE = 0.15
 # Letters of a number along an axis.
 MOST_DIGITS = 8
+# Inches by which a picture may exceed the height of its page.
+HIGHER = 0.05
 # Of an axis: a curve that varies, but over less than this, is read as constant.
 FLAT = 0.02
 
@@ -47,6 +51,8 @@ def faults(figure: Figure) -> Iterator[str]:
     """What is wrong with a figure that has been drawn, in words."""
     found = list(texts(figure))
     page = figure.bbox
+    if figure.get_figheight() > style.tallest() + HIGHER:
+        yield f"{figure.get_figheight():.2f} inches high on a page of {style.tallest():.2f}"
     for words, box, _ in found:
         if box.x0 < -SHARED or box.y0 < -SHARED or box.x1 > page.width + SHARED or box.y1 > page.height + SHARED:
             yield f"{words!r} leaves the page"
@@ -65,13 +71,17 @@ def faults(figure: Figure) -> Iterator[str]:
 
 def lost_curves(figure: Figure) -> Iterator[str]:
     """Curves of a legend that vary over too little of their axis to be read, and those that a later one covers."""
-    for axes in figure.axes:
+    # Of places nothing is read along one axis alone.
+    for axes in (axes for axes in figure.axes if axes.get_aspect() == "auto"):
         curves = [line for line in axes.get_lines() if not line.get_label().startswith("_")]  # type: ignore[attr-defined]
+        # Flat beside dots or a band it tells that it varies less than these.
+        alone = not axes.collections and all(line.get_linestyle() != "None" for line in axes.get_lines())
         low, high = axes.get_ybound()
         for k, curve in enumerate(curves):
             y = np.asarray(curve.get_ydata(), dtype=float)
-            reach = float(np.nanmax(y) - np.nanmin(y))
-            if axes.get_yscale() == "linear" and 1e-9 * (high - low) < reach < FLAT * (high - low):
+            y = y[np.isfinite(y)]
+            reach = float(np.ptp(y)) if len(y) else 0.0
+            if alone and axes.get_yscale() == "linear" and 1e-9 * (high - low) < reach < FLAT * (high - low):
                 yield f"{curve.get_label()!r} is flat along {axes.get_ylabel()!r}"
             for other in curves[k + 1 :]:
                 alike = np.array_equal(curve.get_xydata(), other.get_xydata(), equal_nan=True)

@@ -86,3 +86,16 @@ mechanism:
         style.encoded(figure)
         assert not list(faults(figure))
         assert not figure.texts
+
+
+def test_a_drawing_of_slides_tells_that_their_lengths_are_not_to_scale():
+    table = """
+mechanism:
+  links: {ground: {O: [0, 0]}, carriage: {A: [0, 0]}, tool: {T: [0, 0]}}
+  joints: {feed: {prismatic: [ground, carriage]}, cross: {prismatic: [carriage, tool], direction: 90}}
+  drives: {x: {slide: feed}, y: {slide: cross}}
+"""
+    with style.context():
+        titles = [dimensions_figure(study_of(text)).axes[0].get_title(loc="left") for text in (table, FOUR_BAR)]
+    assert "not to scale" in titles[0]
+    assert "not to scale" not in titles[1]

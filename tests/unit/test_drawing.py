@@ -45,7 +45,7 @@ def drawn(study):
 @pytest.mark.slow
 def test_every_joint_drive_slide_and_link_is_named_in_both_poses(study):
     figure, _ = drawn(study)
-    assert [axes.get_title(loc="left")[:5] for axes in figure.axes] == ["sketc", "first"]
+    assert [axes.get_title(loc="left")[:5] for axes in figure.axes] == ["Sketc", "First"]
     for axes in figure.axes:
         names = {text.get_text() for text in axes.texts}
         assert names >= {"O", "A", "B", "P", "theta", "crank", "rod"}

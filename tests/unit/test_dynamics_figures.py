@@ -12,7 +12,7 @@ from helpers.pictures import figure_of
 
 import mechdesign
 from mechdesign.questions.dynamics.analysis import DrawnForces
-from mechdesign.questions.dynamics.free_bodies import actions
+from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.report.figures import style
 from mechdesign.report.figures.pictures import figures
 
@@ -62,7 +62,7 @@ def test_actions_on_every_moving_link_are_in_equilibrium(text: str) -> None:
     study, result = answered(text)
     record = DrawnForces.of(result)
     for index in (0, 7, 19):
-        acting = actions(record.motion, record.shown, index)
+        acting = [each.at(0) for each in actions_on(record.motion, record.shown.take(np.array([index])))]
         links = {action.link for action in acting} - {"ground", ""}
         assert links == set(study.mechanism.description.links) - {"ground"}
         largest = max(action.size for action in acting)
@@ -107,3 +107,16 @@ def test_bearing_forces_in_the_frame_turn_with_the_link() -> None:
     assert own == pytest.approx(way / crank, abs=1e-9 * np.abs(way).max())
     assert np.ptp(np.unwrap(np.angle(way))) > 6
     assert np.ptp(np.angle(own)) < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "links"), [("excavator_lift", 8), ("flywheel_press", 3)])
+def test_free_bodies_on_paper_are_those_that_a_page_holds(name: str, links: int) -> None:
+    study = study_named(name)
+    result = mechdesign.dynamics(study)
+    with style.context("paper"):
+        figure = figures(study, result)["free_bodies"]
+        style.encoded(figure)
+        assert not list(faults(figure))
+    words = " ".join(text.get_text().replace("\n", " ") for text in figure.texts)
+    assert (f"of {links} links those 3 with the largest forces" in words) == (links > 3)

@@ -27,9 +27,11 @@ ORDER = (
     ("mechdesign.curve",),
     ("mechdesign.questions", "mechdesign.region"),
     ("mechdesign.questions.kinematics",),
+    # The force method, by which dynamics finds moments that equilibrium leaves open.
+    tuple(f"mechdesign.questions.stiffness.{name}" for name in
+          ("__init__", "applied", "compliance", "elements", "force_method", "network", "screws")),
     ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.stiffness",),
-    ("mechdesign.questions.dynamics",),
     ("mechdesign.questions.reliability",),
     ("mechdesign.questions.workspace",),
     ("mechdesign.questions.optimize",),

@@ -2,22 +2,26 @@
 
 import numpy as np
 import pytest
+from helpers.pages import faults
 from helpers.pictures import figure_of
 from helpers.studies import study_of
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon
 from matplotlib.text import Text
 
 import mechdesign
+from mechdesign.questions.kinematics.figures.animation import _frames as frames_of
 from mechdesign.questions.kinematics.figures.animation import in_order
 from mechdesign.questions.kinematics.figures.centrodes import centrodes
 from mechdesign.questions.kinematics.figures.curves import curves_figure, motion_figure
 from mechdesign.questions.kinematics.figures.hodographs import hodographs_figure
-from mechdesign.questions.kinematics.figures.paths import path_looks
+from mechdesign.questions.kinematics.figures.paths import draw_paths, path_looks
 from mechdesign.questions.kinematics.figures.polygons import centripetal, images
 from mechdesign.questions.kinematics.figures.poses import place_of
 from mechdesign.questions.kinematics.figures.transmission import transmission_figure
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import framed
 from mechdesign.report.figures.mechanism import sketch_figure
 from mechdesign.report.figures.pictures import figures
 from mechdesign.report.figures.scene import Sweep, ranks
@@ -275,7 +279,7 @@ kinematics: {sweep: {q1: 30, q2: {from: -97, to: 200, step: 11}}, rates: {q2: 10
     poses = mechdesign.kinematics(study).drawn.special
     singular = [each for each in poses.shown if each.event == "singular: det_J is 0"]
     assert [each.place for each in singular] == pytest.approx([0, 180], abs=1e-8)
-    assert drawn(study, "poses").texts[0].get_text() == "singular poses, poses between"
+    assert drawn(study, "poses").texts[0].get_text() == "Singular poses, poses between"
 
 
 def test_special_poses_of_one_configuration_are_shown_once():
@@ -526,3 +530,33 @@ def test_a_curve_of_two_names_is_drawn_once():
     study = study_of(FOUR_BAR.replace("C: [45, 40]", "E: [90, 0]"), "kinematics.outputs=[B, E]")
     labels = [line.get_label() for axes in drawn(study, "motion").axes for line in axes.lines]
     assert {"B.x, E.x", "B.y, E.y"} <= set(labels)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("study", [FOUR_BAR, FIVE_BAR], ids=["four-bar", "five-bar"])
+def test_polygons_on_paper_stay_on_the_page(study):
+    rates = RATES if study == FOUR_BAR else ()
+    asked = study_of(study, *rates, "kinematics.pictures=[polygons]")
+    result = mechdesign.kinematics(asked)
+    with style.context("paper"):
+        figure = figure_of(asked, result, "polygons")
+        style.encoded(figure)
+        assert not [*faults(figure)]
+        legend = figure.legends[0].get_window_extent()
+        assert legend.x1 <= figure.bbox.x1
+
+
+@pytest.mark.slow
+def test_in_a_moving_picture_paths_are_seen_over_moving_plates():
+    sweep = sweep_of(study_of(FOUR_BAR))
+    look = next(look for look in path_looks(sweep) if look.point == "C")
+    with style.context():
+        figure, axes = framed(sweep.extent, "", height=4.0)
+        draw_paths(axes, sweep)
+        shown = frames_of(figure, axes, sweep, sweep.valid[::9])
+        across, up = axes.transData.transform(np.column_stack([look.path.real, look.path.imag])).round().astype(int).T
+    color = 255 * np.array(to_rgb(look.color))
+    for picture in shown:
+        pixels = np.asarray(picture, dtype=float)[-1 - up, across]
+        # Pins and bars alone cover the path.
+        assert (np.abs(pixels - color).max(axis=1) < 60).mean() > 0.85

@@ -1,5 +1,6 @@
 """The mechanism in the report: what the script is given is the motion of the tables, part by part."""
 
+import dataclasses
 import json
 from functools import cache
 from xml.etree import ElementTree
@@ -14,7 +15,7 @@ import mechdesign
 from mechdesign.questions.workspace.analysis import workspace
 from mechdesign.report.page.frames import frames
 from mechdesign.report.page.moving import moving
-from mechdesign.report.page.tracks import PLACES, TURNS
+from mechdesign.report.page.tracks import PLACES, TURNS, joined
 from mechdesign.study import load
 
 
@@ -41,7 +42,7 @@ def test_points_are_where_the_table_of_motion_has_them_within_half_a_step(name):
     data, table = part.data, result.tables["motion"]
     error = 0.5 / PLACES / data["scale"]
     points = [column[:-2] for column in table.names if column.endswith(".x")]
-    drawn, _ = frames(result.drawn, table, ())
+    drawn, *_ = frames(result.drawn, table, ())
     rows = np.searchsorted(drawn.poses.numbers, np.arange(len(table)))
     for point in points:
         found = in_study(data, places(data, point))[rows]
@@ -162,12 +163,81 @@ def test_numbers_and_velocities_are_those_of_the_table():
         assert decoded(steps, data["poses"], 10**decimals) == pytest.approx(table[column], abs=0.51 * 10**-decimals)
         assert float(cells[row][cell].text) == pytest.approx(table[column][0], abs=0.51 * 10**-decimals)
         assert cells[row][cell].unit.replace("²", "^2") == table.column(column).unit
-    vx, vy = (decoded(steps, data["poses"], PLACES) for steps in data["arrows"]["C"])
+    ((length, words), layer) = data["arrows"][0]["key"], data["arrows"][0]["layers"][0]
+    assert not layer["on"]
+    vx, vy = way_of(data, "Velocities", "C")
     scale = np.hypot(vx, vy).max() / np.hypot(table["C.x_velocity"], table["C.y_velocity"]).max()
     assert vx == pytest.approx(scale * table["C.x_velocity"], abs=1 / PLACES)
     assert vy == pytest.approx(-scale * table["C.y_velocity"], abs=1 / PLACES)
-    length, words = data["arrow"]
     assert length == pytest.approx(scale * float(words.split()[0]), rel=2e-3)
+
+
+def way_of(data, title, words):
+    """Components of an arrow of a drawing, whose y axis points down."""
+    layers = [layer for group in data["arrows"] for layer in group["layers"] if layer["title"] == title]
+    (parts,) = [way for layer in layers for name, _, way in layer["shafts"] if name == words]
+    return [decoded(steps, data["poses"], PLACES) for steps in parts]
+
+
+CRANK = """
+mechanism:
+  links:
+    ground: {O: [0, 0]}
+    crank: {from: O, to: A, length: 100, mass: 2, center: [50, 0], inertia: 100}
+  drives: {theta: {angle: crank}}
+"""
+MOTION = "{sweep: {theta: {from: 0, to: 360, step: 30}}, rates: {theta: 60 rpm}}"
+
+
+def test_forces_move_with_the_linkage_and_are_right_between_the_rows():
+    study = study_of(CRANK + f"dynamics: {MOTION}")
+    part = moving(study, mechdesign.dynamics(study))
+    data = part.data
+    theta = np.radians(number(part, "theta")[0])
+    # 2 kg at 50 mm turn at 2 pi rad/s: 3.95 N toward O; the pin pulls the crank so, and the frame is pulled away.
+    force = 2 * 0.05 * (2 * np.pi) ** 2
+    (group,) = (group for group in data["arrows"] if group["key"][1].endswith(" N"))
+    length, words = group["key"]
+    scale = length / float(words.split()[0])
+    for title, name, sign in (
+        ("Joint forces", "O on crank", -1),
+        ("Inertia", "inertia", 1),
+        ("Shaking force", "on the frame", 1),
+    ):
+        x, y = way_of(data, title, name)
+        assert x == pytest.approx(sign * scale * force * np.cos(theta), abs=0.1)
+        assert y == pytest.approx(-sign * scale * force * np.sin(theta), abs=0.1)
+    (at,) = (at for layer in group["layers"] if layer["title"] == "Inertia" for _, at, _ in layer["shafts"])
+    center = in_study(data, decoded(at[0], data["poses"], PLACES) + 1j * decoded(at[1], data["poses"], PLACES))
+    assert center == pytest.approx(50 * np.exp(1j * theta), abs=0.1)
+    # Between the poses it draws the arrow's tip is as near to its way as a pin is to its path.
+    middle = np.exp(1j * (theta[1:] + theta[:-1]) / 2)
+    x, y = way_of(data, "Inertia", "inertia")
+    tip = x - 1j * y
+    assert np.abs((tip[1:] + tip[:-1]) / 2 - scale * force * middle).max() < 0.6
+
+
+def test_one_linkage_has_the_forces_of_dynamics_along_the_motion_of_kinematics():
+    study = study_of(CRANK + f"kinematics: {MOTION}\ndynamics: {{gravity: [0, -9.81 m/s^2]}}")
+    first, second = (
+        dataclasses.asdict(moving(study, ask(study))) for ask in (mechdesign.kinematics, mechdesign.dynamics)
+    )
+    both = joined(first, second)
+    assert first["data"]["course"] == second["data"]["course"]
+    data = both["data"]
+    theta = np.radians(
+        decoded(data["numbers"][data["given"][0][2]][1], data["poses"], 10.0 ** data["numbers"][data["given"][0][2]][0])
+    )
+    x, y = way_of(data, "Weights", "weight")
+    assert x == pytest.approx(0, abs=0.1)
+    assert y == pytest.approx(y[0])
+    assert y[0] > 5
+    # m g r cos(theta), whatever the speed.
+    (cell,) = (cells[0] for name, cells in both["rows"] if name == "theta_effort")
+    decimals, steps = data["numbers"][cell["number"]]
+    effort = decoded(steps, data["poses"], 10**decimals)
+    assert effort == pytest.approx(2 * 9.81 * 50 * np.cos(theta), abs=2)
+    assert sum(layer["title"] == "Velocities" for group in data["arrows"] for layer in group["layers"]) == 1
 
 
 def test_time_goes_as_the_rates_have_it():

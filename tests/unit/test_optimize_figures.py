@@ -11,6 +11,7 @@ from helpers.studies import study_of
 from matplotlib.collections import PolyCollection
 
 import mechdesign
+from mechdesign.questions.optimize.figures.designs import enlarge_dots, value_text
 from mechdesign.questions.optimize.figures.front import front_figure
 from mechdesign.questions.optimize.figures.scores import (
     ENVELOPE_STEPS,
@@ -140,6 +141,23 @@ def test_the_front_is_drawn_with_its_knee() -> None:
     assert stairs.get_drawstyle() == "steps-post"
     inside = [(axes.viewLim.contains(*place)) for place in designs.values[designs.feasible]]
     assert axes.get_title(loc="right") == f"{inside.count(False)} worse designs outside"
+
+
+def test_very_small_values_have_a_power_of_ten() -> None:
+    texts = [value_text(value) for value in (5.0268e-9, 0.0, 0.12345, -2e7, "left")]
+    assert texts == ["5.03·10⁻⁹", "0", "0.1235", "-2.00·10⁷", "left"]
+
+
+def test_dots_of_a_legend_can_be_seen() -> None:
+    with style.context():
+        figure = style.new_figure(2.0)
+        axes = figure.add_subplot()
+        (dots,) = axes.plot([1], [2], ".", markersize=2, alpha=0.5, label="designs")
+        enlarge_dots(shown := axes.legend())
+    (handle,) = shown.legend_handles
+    assert handle.get_markersize() >= 6
+    assert handle.get_alpha() == 1.0
+    assert dots.get_markersize() == 2
 
 
 @pytest.mark.parametrize("look", ["screen", "paper"])

@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from helpers.pages import faults
 
 import mechdesign
 from mechdesign.errors import StudyError
 from mechdesign.numerics.differences import STEPS, slope
+from mechdesign.report.figures import style
+from mechdesign.report.figures.pictures import figures
 
 SLIDER = """
 mechanism:
@@ -175,3 +178,15 @@ def test_warnings_of_the_cases_are_told():
 def test_mistakes_are_told_before_anything_is_computed(change, message):
     with pytest.raises(StudyError, match=message):
         mechdesign.sensitivities(mechdesign.load(text=SLIDER, overrides=[change]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_their_picture_stays_on_the_page(look):
+    long = SLIDER.replace("{r: 30", "{the_radius_of_the_crank: 30").replace("A, r]", "A, the_radius_of_the_crank]")
+    study = mechdesign.load(text=long.replace("[r, l,", "[the_radius_of_the_crank, l,"))
+    result = mechdesign.sensitivities(study)
+    with style.context(look):
+        figure = figures(study, result)["sensitivities"]
+        style.encoded(figure)
+        assert not list(faults(figure))

@@ -122,6 +122,13 @@ def test_coil_runs_from_its_point_to_its_anchor() -> None:
     assert abs(across).max() == pytest.approx(0.24, rel=1e-2)
 
 
+@pytest.mark.parametrize(("inside", "side"), [(2 + 0j, 1), (-2 + 0j, -1)])
+def test_the_stiffness_of_a_spring_stands_away_from_the_others(inside: complex, side: int) -> None:
+    upright = Coil("", 0j, 3j, 0j, 1.0, False, inside).label
+    assert upright.heading is not None
+    assert np.exp(1j * upright.heading) == pytest.approx(-side)
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [

@@ -21,7 +21,7 @@ from helpers.stiffness import (
 from helpers.studies import study_of
 
 import mechdesign
-from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge, corners_of
+from mechdesign.questions.stiffness.elements import Beam, Guide, Hinge
 
 LINKS = study_of(SLIDER).mechanism.description.links
 CRANK, ROD = LINKS["crank"], LINKS["rod"]
@@ -130,7 +130,7 @@ def test_link_with_more_points_is_beams_along_them() -> None:
     bracket, _ = legs_of(BENT)
     study = study_of(BENT)
     link = study.mechanism.description.links["bracket"]
-    assert corners_of(link) == ("O", "M", "A", "X")
+    assert link.corners == ("O", "M", "A", "X")
     assert [e for e in bracket.elements if isinstance(e, Beam)] == [Beam(link, "O", "A", "beam")]
     pose = study.mechanism.solve({"bracket": 2})
     place = {name: complex(pose[f"{name}.x"], pose[f"{name}.y"]) for name in study.mechanism.points}
@@ -162,7 +162,7 @@ def test_points_on_a_binary_link_lie_along_it() -> None:
     text += "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     beams = [e for e in legs_of(text)[0].elements if isinstance(e, Beam)]
     link = study_of(text).mechanism.description.links["a1"]
-    assert corners_of(link) == ("O1", "E1")
+    assert link.corners == ("O1", "E1")
     assert beams == [Beam(link, "O1", "E1", "beam")]
     plain = FIVE_BAR + "  sections: {beam: {E: 200 GPa, width: 0.02, height: 0.04}}\n  elastic: {a1: beam}\n"
     assert matrix(ask_stiffness(text), "K") == pytest.approx(matrix(ask_stiffness(plain), "K"), rel=1e-9)

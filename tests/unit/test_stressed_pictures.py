@@ -134,7 +134,7 @@ def answered(command: str, text: str) -> tuple[Study, Result]:
     ("command", "study", "expected"),
     [
         ("workspace", ORIENTATIONS, {"workspace", "inscribed", "drives", "inverse_condition", "resistivity"}),
-        ("workspace", STRIP, {"workspace", "inscribed", "drives", "inverse_condition", "resistivity"}),
+        ("workspace", STRIP, {"workspace", "inscribed", "drives", "joint_space", "inverse_condition", "resistivity"}),
         ("reliability", PRESS, {"bands", "deviations", "histogram", "convergence", "estimate", "reliability",
                                 "contributions"}),
         ("optimize", GOALS, {"CPI", "designs", "pareto", "hypervolume", "optimum"}),

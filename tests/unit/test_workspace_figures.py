@@ -7,6 +7,7 @@ import pytest
 from helpers.pictures import figure_of
 from helpers.studies import study_of
 from matplotlib.collections import LineCollection
+from matplotlib.patches import Circle
 from matplotlib.text import Text
 
 import mechdesign
@@ -230,3 +231,101 @@ workspace: {point: T, scan: {about: [100, 50], rays: 31}, indices: inverse_condi
         page = figure_of(study, mechdesign.workspace(study), "inverse_condition")
     assert len(page.axes) == 1
     assert "1 everywhere" in " ".join(text.get_text() for text in page.findobj(Text)).replace("\n", " ")
+
+
+LEGS = """
+units: {length: dimensionless}
+mechanism:
+  links:
+    ground: {B1: [1, 0], B2: [-1, 0]}
+    leg_1: {from: B1, to: C, telescopic: true}
+    leg_2: {from: B2, to: C, telescopic: true}
+  drives: {l1: {length: leg_1}, l2: {length: leg_2}}
+  limits: [{drive: l1, min: 0.5, max: 2}, {drive: l2, min: 0.5, max: 2}]
+  sketch: {C: [0, 1.2]}
+workspace: {point: C, scan: {about: [0, 0], rays: 61}, assembly: any, indices: []}
+"""
+RODS = """
+units: {length: mm}
+mechanism:
+  links:
+    ground: {O1: [-100, 0], O2: [100, 0]}
+    upper_1: [O1, A1, 80]
+    upper_2: [O2, A2, 80]
+    lower_1: [A1, P, 110]
+    lower_2: [A2, P, 110]
+  drives: {q1: {angle: upper_1}, q2: {angle: upper_2}}
+  sketch: {A1: [-90, 79], A2: [90, 79], P: [0, 142]}
+workspace: {point: P, scan: {about: [0, 0], rays: 61}, assembly: any, indices: inverse_condition}
+"""
+SERIAL = """
+mechanism:
+  links: {ground: {O: [0, 0]}, upper: [O, E, 100], lower: [E, P, 60]}
+  drives: {q1: {angle: upper}, q2: {angle: lower, from: upper}}
+  sketch: {E: [80, 60], P: [80, 120]}
+workspace: {point: P, scan: {about: [0, 0], rays: 61}, indices: []}
+"""
+
+
+def joint_space(text: str) -> tuple[dict[str, np.ndarray], str]:
+    """Curves of the picture by their colours, shape (points, 2), and its words."""
+    study = study_of(text)
+    result = mechdesign.workspace(study)
+    with style.context():
+        figure = figure_of(study, result, "joint_space")
+        style.encoded(figure)
+    (axes,) = figure.axes
+    drawn = {
+        str(line.get_color()): np.asarray(line.get_xydata()) for line in axes.get_lines() if len(line.get_xydata()) > 2
+    }
+    words = " ".join(text.get_text() for text in figure.findobj(Text))
+    return {color: curve[np.isfinite(curve).all(axis=1)] for color, curve in drawn.items()}, words
+
+
+@pytest.mark.slow
+def test_in_the_plane_of_two_strokes_limits_are_a_square_and_the_stretched_legs_a_line() -> None:
+    curves, words = joint_space(LEGS)
+    assert curves[style.VERMILION].sum(axis=1) == pytest.approx(2, abs=1e-6)
+    limits = curves[style.INK]
+    assert np.minimum(abs(limits - 0.5), abs(limits - 2)).min(axis=1) == pytest.approx(0, abs=1e-9)
+    assert "parallel singularity" in words
+    assert "cut open" not in words
+
+
+@pytest.mark.slow
+def test_in_the_plane_of_two_cranks_a_singularity_is_where_the_rods_are_in_line() -> None:
+    curves, _ = joint_space(RODS)
+    ends = [
+        place + 80 * np.exp(1j * np.radians(angle))
+        for place, angle in zip((-100, 100), curves[style.VERMILION].T, strict=True)
+    ]
+    assert abs(ends[1] - ends[0]) == pytest.approx(220, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_the_plane_of_drives_that_turn_is_cut_open_once() -> None:
+    curves, words = joint_space(SERIAL)
+    assert "cut open" in words
+    for color, elbow in ((style.BLUE, 0.0), (style.PURPLE, 180.0)):
+        q1, q2 = curves[color].T
+        assert abs(q2) == pytest.approx(elbow, abs=1e-4)
+        assert np.ptp(q1) == pytest.approx(360, abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", ["screen", "paper"])
+def test_the_size_of_a_rectangle_keeps_off_the_outline_of_the_circle(look: str) -> None:
+    study = study_of(FIVE_BAR)
+    result = mechdesign.workspace(study)
+    with style.context(look):
+        figure = inscribed_figure(WorkspaceView(study, result))
+        figure.canvas.draw()
+        (axes,) = figure.axes
+        (circle,) = (patch for patch in axes.patches if isinstance(patch, Circle))
+        (size,) = (text for text in axes.texts if " x " in text.get_text())
+        box = Text.get_window_extent(size).transformed(axes.transData.inverted())
+    corners = np.array(box.corners()) @ [1, 1j] - complex(*circle.center)
+    nearest = complex(
+        np.clip(0, corners.real.min(), corners.real.max()), np.clip(0, corners.imag.min(), corners.imag.max())
+    )
+    assert abs(corners).max() < circle.radius or abs(nearest) > circle.radius

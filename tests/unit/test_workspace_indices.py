@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from helpers.studies import study_of
 
 import mechdesign
+from mechdesign import indices
 from mechdesign.errors import StudyError
 from mechdesign.indices import USUAL
 from mechdesign.questions.poses import study_poses
@@ -279,6 +281,41 @@ def test_reliability_as_an_index_needs_limits() -> None:
     study = study_of(FIVE_BAR, "reliability={dimensions: {q1: 0.1}}", "workspace.indices=[reliability]")
     with pytest.raises(StudyError, match="needs limits"):
         mechdesign.workspace(study)
+
+
+def test_limits_of_efforts_and_joint_forces_are_an_index() -> None:
+    """Of an arm whose links of 2 and 1 kg weigh with errors: a normal torque at the first joint, in closed form."""
+    study = study_of(
+        ARM.replace("length: dimensionless", "length: m")
+        .replace("[O, E, a]", "{from: O, to: E, length: a, mass: 2}")
+        .replace("[E, P, b]", "{from: E, to: P, length: b, mass: 1}"),
+        "dynamics={gravity: [0, -9.81], poses: [{q1: 0, q2: 90}]}",
+        "reliability={dimensions: {upper.mass: 0.3, lower.mass: 0.6}, limits: {q1_effort: 4, O_force: {usl: 31}}}",
+        "workspace.indices=[reliability]",
+    )
+    places = np.array([2.0 + 0.5j, 0.3 + 1.9j, -1.2 + 1.1j])
+    found = Local.at(questions(study)[0].field, places, {})
+    (index,) = prepare(study, ["reliability"])
+    elbow = L1 * np.exp(1j * np.asarray(found.configuration.value(study.mechanism.coordinate("q1"))))
+    arms = 9.81 * np.array([elbow.real / 2, (elbow.real + places.real) / 2])
+    deviations = np.array([0.1, 0.2])
+    rng = np.random.default_rng(1)
+    drawn = deviations[:, None] * rng.standard_normal((2, 400_000))
+    kept = (np.abs(arms.T @ drawn) < 4) & (9.81 * (3 + drawn.sum(axis=0)) < 31)
+    assert np.asarray(index.values(found)) == pytest.approx(kept.mean(axis=1), abs=0.003)
+
+
+@pytest.mark.slow
+def test_an_index_with_an_upper_bound_is_nowhere_infinite(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that grows as 1/distance towards a singularity, as far as its bound."""
+    growing = replace(
+        indices.index("resistivity"), bounds=(0.0, 1.0),
+        prepare=lambda study: lambda local: np.minimum(1e-12 / np.abs(local.determinant), 1.0),
+    )  # fmt: skip
+    monkeypatch.setattr(indices, "index", lambda name: growing)
+    study = study_of(ARM, "workspace.indices=[resistivity]", "workspace.integrate.tolerance=1e-3")
+    row = mechdesign.workspace(study).main
+    assert 0 < row["resistivity_mean"][0] < row["resistivity_max"][0] <= 1
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ MOST_RESULTS, MOST_BARS = 8, 20
 # Inches.
 _LEFT, _RIGHT, _TOP, _BOTTOM, _DOWN = 1.75, 0.2, 0.75, 0.5, 0.75
 _BAR = 0.26
+_LETTER = 0.083
 _WORDS = 0.42  # part of the width of a panel at its right, for the derivatives in figures
 _NAME, _FIGURES, _TITLE = 9.0, 8.0, 10.0  # points
 # Elasticities below this part of the largest count as zero.
@@ -30,16 +31,25 @@ def sensitivities_figure(view: View) -> Figure:
     shown = [np.flatnonzero(table["result"] == name) for name in results[:MOST_RESULTS]]
     shown = [rows[_order(table["elasticity"][rows])][:MOST_BARS] for rows in shown]
     tall = _BAR * max(map(len, shown)) + 0.1
+    left = min(_LEFT, 0.3 + _LETTER * max(len(_short(name)) for rows in shown for name in table["parameter"][rows]))
+    room = style.width() - left - _RIGHT
+    titles = [style.folded(_named(table, int(rows[0])), _NAME, room) for rows in shown]
+    label = "change of the result, in % of its size, for 1 % of the number more"
+    label, fold = style.folded(label, _NAME, room), style.line(_NAME)
+    lines = max(words.count("\n") for words in titles)
     figure, panels = style.page(
-        len(shown), 1, tall, left=_LEFT, right=_RIGHT, top=_TOP, bottom=_BOTTOM, down=_DOWN
+        len(shown), 1, tall, left=left, right=_RIGHT, top=_TOP + fold * lines,
+        bottom=_BOTTOM + fold * label.count("\n"), down=_DOWN + fold * lines,
     )  # fmt: skip
-    for axes, rows in zip(panels, shown, strict=True):
+    for axes, rows, words in zip(panels, shown, titles, strict=True):
         _panel(axes, table, rows)
-    panels[0].set_title("derivative", fontsize=_FIGURES, loc="right")
-    panels[-1].set_xlabel("change of the result, in % of its size, for 1 % of the number more", fontsize=_NAME)
+        axes.set_title(words, fontsize=_NAME, loc="left")
+    if not style.narrow():
+        panels[0].set_title("derivative", fontsize=_FIGURES, loc="right")
+    panels[-1].set_xlabel(label, fontsize=_NAME)
     cut = [f"{len(results) - len(shown)} more results"] if len(results) > len(shown) else []
     cut += ["the largest of each"] if any(len(rows) == MOST_BARS for rows in shown) else []
-    words = "sensitivities: what 1 % of each number changes, and the derivatives" + "".join(f"; {note}" for note in cut)
+    words = "Sensitivities: what 1 % of each number changes, and the derivatives" + "".join(f"; {note}" for note in cut)
     figure.text(0.01, 1 - 0.08 / figure.get_figheight(), style.folded(words, _TITLE, style.width() - 0.2), va="top",
                 fontsize=_TITLE)  # fmt: skip
     return figure
@@ -69,15 +79,22 @@ def _panel(axes: Axes, table: Table, rows: Ints) -> None:
     ticks = [tick for tick in axes.get_xticks() if low <= tick <= high]
     axes.set_xticks(ticks)
     axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.set_yticks(places, [str(name).removeprefix("mechanism.") for name in table["parameter"][rows]])
+    axes.set_yticks(places, [_short(name) for name in table["parameter"][rows]])
     axes.tick_params(labelsize=_NAME)
     for place, row in enumerate(rows.tolist()):
         axes.text(1.0, place, _figures(table, row), transform=axes.get_yaxis_transform(), ha="right", va="center",
                   fontsize=_FIGURES)  # fmt: skip
-    first = int(rows[0])
-    unit = style.printed(str(table["value_unit"][first]))
-    name = f"{table['result'][first]} = {table['value'][first]:.6g} {unit}".rstrip()
-    axes.set_title(name, fontsize=_NAME, loc="left")
+
+
+def _short(name: str) -> str:
+    """A parameter by its name in the mechanism."""
+    return str(name).removeprefix("mechanism.")
+
+
+def _named(table: Table, row: int) -> str:
+    """A result with its value."""
+    unit = style.printed(str(table["value_unit"][row]))
+    return f"{table['result'][row]} = {table['value'][row]:.6g} {unit}".rstrip()
 
 
 def _figures(table: Table, row: int) -> str:

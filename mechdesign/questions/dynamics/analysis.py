@@ -6,28 +6,31 @@ carry the forces along.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from typing import ClassVar
 
 import numpy as np
 
 from mechdesign.cautions import Caution
 from mechdesign.errors import AssemblyError
 from mechdesign.mechanism.derivatives import STALLED
+from mechdesign.mechanism.graph import GROUND
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL, Progress
+from mechdesign.questions.dynamics.free_bodies import actions_on
 from mechdesign.questions.dynamics.question import force_question
 from mechdesign.questions.dynamics.schema import EFFICIENCIES
 from mechdesign.questions.dynamics.tables import dynamics_table, extremes_table, joint_table, question_of
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import follow
+from mechdesign.questions.kinematics.courses import Courses
+from mechdesign.questions.kinematics.drawn import DrawnPoses, Vector, Vectors
 from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.kinematics.passage import Passage, pass_over
 from mechdesign.questions.kinematics.question import MotionQuestion
 from mechdesign.questions.poses import Shown, invalid_in_words, judge_failures, study_poses
 from mechdesign.questions.together import Answers, End, Group
-from mechdesign.results import Drawn, Result, Scope, Table
+from mechdesign.results import Result, Scope, Table
 from mechdesign.statistics import Asked
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -39,11 +42,31 @@ TABLES = (*A_ROW_A_POSE, "extremes")
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnForces(Drawn):
-    """The solved poses of a motion, and its columns at each pose."""
+class DrawnForces(DrawnPoses):
+    """The solved poses of a motion, and what acts on the mechanism in them."""
 
-    shown: Shown
-    motion: Motion
+    name: ClassVar[str] = "dynamics"
+
+    def table(self, motion: Motion) -> Table:
+        """``dynamics.csv``."""
+        return dynamics_table(motion)
+
+    def vectors(self, motion: Motion, shown: Shown) -> Iterator[Vectors]:
+        """Velocities, and forces by what exerts them.
+
+        A joint's force is that on its first body. The shaking force stands in the middle of the ground's points.
+        """
+        yield from super().vectors(motion, shown)
+        unit, forces = question_of(motion).study.units.label("force"), dict[str, list[Vector]]()
+        for each in actions_on(motion, shown):
+            if not each.reaction and np.nan_to_num(each.force).any():
+                words = each.name if each.kind == each.name else f"{each.name} on {each.link or 'the pin'}"
+                forces.setdefault(each.kind, []).append((words, each.place, each.force))
+        x, y = (motion.arrays[f"shaking.{axis}"][shown.rows] for axis in "xy")
+        frame = [point for owner, point in shown.configuration.graph.points if owner == GROUND and ":" not in point]
+        place = sum(shown.configuration.point(point) for point in frame) / len(frame) if frame else 0j
+        forces["shaking"] = [("on the frame", np.broadcast_to(place, shown.rows.shape), x + 1j * y)]
+        yield from (Vectors(kind, unit, each) for kind, each in forces.items())
 
 
 @one_thread()
@@ -105,12 +128,12 @@ def _group(passage: Passage) -> Group:
     closely = along is not None and not along.functions.unresolved.any()
     ends = [_end(passage, along, k) for k in range(poses.designs)]
     whole = Scope(not closely, ends[0].missing if poses.designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(follow, question)))
+    a_pose = replace(whole, course=Courses(question))
     scoped = {name: replace(table, scope=a_pose if name == "dynamics" else whole) for name, table in answers.items()}
     result = Result("dynamics", scoped)
     if poses.designs == 1:
         (end,) = ends
-        drawn = DrawnForces(passage.shown, passage.motion)
+        drawn = DrawnForces(passage.shown, passage.motion, along)
         result = replace(result, warnings=end.warnings, counts=end.counts, failed=end.failed, drawn=drawn)
     return Group(np.arange(poses.designs), result, ends)
 
@@ -139,7 +162,21 @@ def _end(passage: Passage, along: Along | None, k: int) -> End:
     if friction is not None:
         warnings += friction.cautions(study, poses, passage.marks[k], "dynamics")
     missing = [invalid_in_words(reason), along.missing(k) if along is not None else ""]
-    if chains := ", ".join(sorted(question_of(passage.motion).joints.open)):
-        message = f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them"
+    if chains := ", ".join(_open_moments(passage.motion, slice(k * count, (k + 1) * count))):
+        message = (
+            f"moments of {chains} are nan: equilibrium leaves open how a chain of slides and clamps shares them; beams "
+            "or bearings with 'moment' in 'stiffness' settle it"
+        )
         warnings.append(Caution("undefined", message, "joint_forces"))
     return End(warnings, failed, " and ".join(filter(None, missing)), counts)
+
+
+def _open_moments(motion: Motion, rows: slice) -> list[str]:
+    """Joints whose moment neither equilibrium nor elasticity determines where their force is known."""
+    question, arrays = question_of(motion), motion.arrays
+    joints = question.joints
+    return sorted({
+        contact.joint for name, contact in zip(question.forces, joints.contacts, strict=True)
+        if contact.joint in joints.open
+        and (np.isnan(arrays[f"{name}.moment"][rows]) & np.isfinite(arrays[f"{name}.fx"][rows])).any()
+    })  # fmt: skip

@@ -12,20 +12,40 @@ from mechdesign.mechanism.algebra import Vector
 from mechdesign.mechanism.forces import Forces, Moving, center, inertia, springs
 from mechdesign.mechanism.graph import rod_of
 from mechdesign.mechanism.statics import PIN, Contact
+from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.dynamics.tables import question_of
 from mechdesign.questions.kinematics.motion import Motion
-from mechdesign.questions.kinematics.rates import drive_rates
+from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.loads import Loading
 from mechdesign.questions.poses import Shown, SolvedPoses
 from mechdesign.study import Study
 
 
-@dataclass(frozen=True)
-class Action:
-    """A force (x + iy) at a place, or a moment about it, on a link or on the pin of several ('').
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """A force (x + iy) at a place and a moment about it in n poses, on a link or on the pin of several ('').
 
     Its `kind` is ``joint``, ``weight``, ``inertia``, ``load``, ``spring`` or ``effort``, its `name` that of what acts.
+    What a joint does to its second body is a `reaction` to what it does to its first.
     """
+
+    kind: str
+    name: str
+    link: str
+    place: Complexes
+    force: Complexes
+    moment: Floats
+    reaction: bool = False
+
+    def at(self, index: int) -> Action:
+        """The action in one of the poses; what is not known is 0 there."""
+        force, moment = np.nan_to_num(self.force[index]), np.nan_to_num(self.moment[index])
+        return Action(self.kind, self.name, self.link, complex(self.place[index]), complex(force), float(moment))
+
+
+@dataclass(frozen=True)
+class Action:
+    """What acts in one pose; see `Acting`."""
 
     kind: str
     name: str
@@ -42,35 +62,29 @@ class Action:
 
 def mass_centers(study: Study, configuration: Configuration, index: int) -> dict[str, complex]:
     """Centre of mass of each body that has a mass, in one pose of a (flattened) batch."""
-    mechanism = study.mechanism
+    geometry, masses = study.mechanism.geometry, study.mechanism.description.masses
     forces = Forces(configuration)
-    centers = {body: center(forces, mechanism.geometry, body, mass)
-               for body, mass in mechanism.description.masses.items()}  # fmt: skip
-    return {body: _pick(configuration, place, index) for body, place in centers.items()}
+    return {body: complex(_all(configuration, center(forces, geometry, body, mass)).flat[index])
+            for body, mass in masses.items()}  # fmt: skip
 
 
-def actions(motion: Motion, shown: Shown, index: int) -> list[Action]:
-    """What acts on all links in the pose of that index among those shown; of a joint what it does to both sides."""
-    return list(_Pose(motion, shown, index).actions())
+def actions_on(motion: Motion, shown: Shown) -> list[Acting]:
+    """All that acts on the links in the poses shown; of a joint what it does to both sides, unless it is one link."""
+    return list(_Poses(motion, shown).acting())
 
 
-class _Pose:
-    """One pose with its rates."""
+class _Poses:
+    """Poses with their rates."""
 
-    def __init__(self, motion: Motion, shown: Shown, index: int) -> None:
+    def __init__(self, motion: Motion, shown: Shown) -> None:
         self.motion, self.question = motion, question_of(motion)
         self.study, self.poses = self.question.study, motion.question.poses
-        self.rows = shown.rows[index : index + 1]
-        self.configuration = shown.configuration.take(np.array([index]))
-        self.moving = Moving()
-        if self.question.moves:
-            linear = self.study.mechanism.linearize(self.configuration)
-            solved = SolvedPoses(self.rows, self.poses.groups[0].names, self.configuration)
-            rates = drive_rates(self.study, motion.question.section, self.poses, solved, linear)
-            velocity = linear.velocity(rates.velocities)
-            self.moving = Moving(velocity, linear.acceleration(velocity, rates.accelerations))
+        self.rows, self.configuration = shown.rows, shown.configuration
+        linear = self.study.mechanism.linearize(self.configuration)
+        solved = SolvedPoses(self.rows, self.poses.groups[0].names, self.configuration)
+        self.moving = moving_at(self.study, motion.question.section, self.poses, solved, linear)
 
-    def actions(self) -> Iterator[Action]:
+    def acting(self) -> Iterator[Acting]:
         """Those of joints first."""
         yield from self._joints()
         yield from self._masses()
@@ -78,44 +92,46 @@ class _Pose:
         yield from self._springs()
         yield from self._efforts()
 
-    def _place(self, node: int) -> complex:
-        return _pick(self.configuration, self.configuration.nodes[node])
+    def _acting(
+        self, kind: str, name: str, link: str, place: Vector, force: Vector = 0j, moment: Vector = 0.0,
+        *, reaction: bool = False,
+    ) -> Acting:  # fmt: skip
+        """An action with a value in every pose."""
+        at, way, turning = (_all(self.configuration, values) for values in (place, force, moment))
+        return Acting(kind, name, link, at, way, turning.real, reaction)
 
-    def _joints(self) -> Iterator[Action]:
+    def _joints(self) -> Iterator[Acting]:
         for name, contact in zip(self.question.forces, self.question.joints.contacts, strict=True):
-            x, y, moment = (self._value(f"{name}.{part}") for part in ("fx", "fy", "moment"))
-            place, sides = self._place(contact.node), _sides(contact)
+            x, y, moment = (self.motion.arrays[f"{name}.{part}"][self.rows] for part in ("fx", "fy", "moment"))
+            place, sides = contact.place(self.configuration), _sides(contact)
             if sides[0] != sides[1]:
                 for side, sign in zip(sides, (1, -1), strict=True):
-                    yield Action("joint", contact.joint, side, place, sign * complex(x, y), sign * moment)
+                    force = sign * (x + 1j * y)
+                    yield self._acting("joint", contact.joint, side, place, force, sign * moment, reaction=sign < 0)
 
-    def _value(self, name: str) -> float:
-        return float(np.nan_to_num(self.motion.arrays[name][self.rows[0]]))
-
-    def _masses(self) -> Iterator[Action]:
-        mechanism, section = self.study.mechanism, self.poses.section(self.question.section, self.rows)
+    def _masses(self) -> Iterator[Acting]:
+        geometry, section = self.study.mechanism.geometry, self.poses.section(self.question.section, self.rows)
         factor, still = self.study.units.inertia_factor, Moving()
-        for body, mass in mechanism.description.masses.items():
-            place = mass_centers(self.study, self.configuration, 0)[body]
-            base = self._place(Forces(self.configuration).bases[body])
-            for kind, gravity, moving in (("weight", complex(*section.gravity), still), ("inertia", 0j, self.moving)):
+        gravity = section.gravity[0] + 1j * section.gravity[1]
+        for body, mass in self.question.masses(self.poses, self.rows, self.configuration.places).items():
+            for kind, fall, moving in (("weight", gravity, still), ("inertia", 0j, self.moving)):
                 forces = Forces(self.configuration)
-                inertia(forces, mechanism.geometry, {body: mass}, moving, gravity, factor)
-                force, moment = (_pick(self.configuration, part) for part in forces.bodies[body])
-                turning = moment.real - ((place - base).conjugate() * force).imag
-                yield Action(kind, kind, _link(body), place, force, turning)
+                inertia(forces, geometry, {body: mass}, moving, fall, factor)
+                force, moment = forces.bodies[body]
+                place = center(forces, geometry, body, mass)
+                arm = place - self.configuration.nodes[forces.bases[body]]
+                yield self._acting(kind, kind, _link(body), place, force, moment - (np.conj(arm) * force).imag)
 
-    def _loads(self) -> Iterator[Action]:
+    def _loads(self) -> Iterator[Acting]:
         for load in self.question.section.loads:
             forces = Forces(self.configuration)
             Loading(self.study, [load], self.poses, self.rows).add(forces, self.moving)
             ends = (load.at,) if load.at is not None else load.between or ()
             yield from self._at_points("load", "load", forces, ends)
             if load.link is not None:
-                moment = _pick(self.configuration, forces.bodies[load.link][1]).real
-                yield Action("load", "load", load.link, self._base(load.link), 0j, moment)
+                yield self._acting("load", "load", load.link, self._base(load.link), 0j, forces.bodies[load.link][1])
 
-    def _springs(self) -> Iterator[Action]:
+    def _springs(self) -> Iterator[Acting]:
         mechanism = self.study.mechanism
         for name, spring in mechanism.description.springs.items():
             forces = Forces(self.configuration)
@@ -124,10 +140,9 @@ class _Pose:
                 yield from self._at_points("spring", name, forces, spring.between)
                 continue
             for link in spring.between:
-                yield Action("spring", name, link, self._base(link), 0j,
-                             _pick(self.configuration, forces.bodies[link][1]).real)  # fmt: skip
+                yield self._acting("spring", name, link, self._base(link), 0j, forces.bodies[link][1])
 
-    def _at_points(self, kind: str, name: str, forces: Forces, ends: Sequence[str]) -> Iterator[Action]:
+    def _at_points(self, kind: str, name: str, forces: Forces, ends: Sequence[str]) -> Iterator[Acting]:
         """Forces at points: of one link, or of the pin there."""
         graph = self.configuration.graph
         for end in ends:
@@ -135,23 +150,23 @@ class _Pose:
             body = link if link in forces.bodies or not link else rod_of(link)
             force = forces.bodies[body][0] if link else forces.nodes[node]
             owner = _link(body) if link else _link(self.question.joints.sole.get(node, ""))
-            yield Action(kind, name, owner, self._place(node), _pick(self.configuration, force))
+            yield self._acting(kind, name, owner, self.configuration.nodes[node], force)
 
-    def _efforts(self) -> Iterator[Action]:
+    def _efforts(self) -> Iterator[Acting]:
         mechanism = self.study.mechanism
         for drive in mechanism.drives:
-            coordinate, effort = mechanism.coordinate(drive), self._value(f"{drive}_effort")
+            coordinate, effort = mechanism.coordinate(drive), self.motion.arrays[f"{drive}_effort"][self.rows]
             if coordinate.kind == "angle":
                 for body, sign in ((coordinate.body, 1), (coordinate.reference, -1)):
-                    yield Action("effort", drive, _link(body), self._base(body), 0j, sign * effort)
+                    yield self._acting("effort", drive, _link(body), self._base(body), 0j, sign * effort)
 
-    def _base(self, link: str) -> complex:
+    def _base(self, link: str) -> Vector:
         bases = Forces(self.configuration).bases
-        return self._place(bases[link]) if link in bases else 0j
+        return self.configuration.nodes[bases[link]] if link in bases else 0j
 
 
-def _pick(configuration: Configuration, values: Vector, index: int = 0) -> complex:
-    return complex(np.broadcast_to(np.asarray(values, dtype=complex), configuration.shape).flat[index])
+def _all(configuration: Configuration, values: Vector) -> Complexes:
+    return np.broadcast_to(np.asarray(values, dtype=complex), configuration.shape)
 
 
 def _link(body: str) -> str:

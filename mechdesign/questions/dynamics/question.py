@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -11,21 +11,25 @@ from itertools import pairwise
 import numpy as np
 
 from mechdesign.expressions import Expression
-from mechdesign.mechanism.algebra import Value, angle_of, norm2, quiet
+from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import Value, Vector, angle_of, norm2, quiet
 from mechdesign.mechanism.derivatives import Linearization
-from mechdesign.mechanism.forces import Forces, Moving, inertia, springs
+from mechdesign.mechanism.forces import Energy, Forces, Moving, inertia, inertia_force, springs
 from mechdesign.mechanism.model import Mass, Term
 from mechdesign.mechanism.outputs import first
 from mechdesign.mechanism.statics import Balance, Joints, Reaction, balance, reactions
 from mechdesign.numerics.arrays import Ints
+from mechdesign.questions.dynamics.open_moments import chain_network, with_open_moments
 from mechdesign.questions.dynamics.schema import DynamicsSection, column_kinds
 from mechdesign.questions.friction import Friction, Slipping
 from mechdesign.questions.kinematics.question import MotionQuestion, Static, motion_question
 from mechdesign.questions.kinematics.schema import KinematicsSection
 from mechdesign.questions.loads import Loading
-from mechdesign.questions.stiffness.elements import corners_of
+from mechdesign.questions.stiffness.applied import Applied, Density
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
+from mechdesign.study.schema.poses import MotionSection
 
 # Parts of what a joint bears, as columns of its own.
 PARTS = ("fx", "fy", "moment", "magnitude", "angle", "normal")
@@ -37,13 +41,16 @@ class ForceQuestion:
 
     study: Study
     section: DynamicsSection
+    joints: Joints
     moves: bool  # whether there are rates; else the mechanism stands still in each pose
-    tempo: float = 0.0  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
+    tempo: float  # about how fast, by which rounding between the poses is judged; see `MotionQuestion.tempo`
+    wanted: frozenset[str] | None = None  # columns of `statics` to be computed; None of all with what joints bear
 
-    @cached_property
-    def joints(self) -> Joints:
-        """The joints of the mechanism."""
-        return self.section.joints(self.study.mechanism)
+    @classmethod
+    def of(cls, study: Study, *, moves: bool, tempo: float = 0.0) -> ForceQuestion:
+        """What the section `dynamics` of a study asks."""
+        section = DynamicsSection.of(study)
+        return cls(study, section, section.joints(study.mechanism), moves, tempo)
 
     @cached_property
     def friction(self) -> Friction | None:
@@ -90,41 +97,43 @@ class ForceQuestion:
                     forces.append(abs(quantity) / (length if kind == "moment" else 1.0))
         return sum(forces)
 
-    @quiet
-    def columns(self, poses: Poses, linear: Linearization, rows: Ints, moving: Moving) -> Mapping[str, Value]:
-        """Efforts, powers, shaking forces and energies, and parts of what joints bear, as ``A_force.fx``."""
-        columns, held = self._held(poses, linear, rows, moving)
-        for name, reaction in zip(self.forces, self._borne(held), strict=True):
-            columns |= self._parts(name, reaction)
-        return columns
+    def lean(self, names: Collection[str]) -> ForceQuestion:
+        """The question for some of the columns of `statics` alone."""
+        return replace(self, wanted=frozenset(names))
 
     @quiet
-    def values(
-        self, names: Sequence[str], poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
-    ) -> list[Value]:
-        """Some of the columns of `statics`; joint forces are computed only where one is among them."""
+    def columns(
+        self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
+    ) -> Mapping[str, Value]:  # fmt: skip
+        """Efforts, powers, shaking forces and energies, and what joints bear: parts of it as ``A_force.fx``.
+
+        Where some columns alone are wanted it is the sizes of joint forces, if they are among these.
+        """
         columns, held = self._held(poses, linear, rows, moving)
-        if not set(names).isdisjoint(self.forces):
-            borne = zip(self.forces, self._borne(held), strict=True)
-            columns |= {name: np.abs(reaction.force) for name, reaction in borne}
-        return [columns[name] for name in names]
+        if self.wanted is None or not self.wanted.isdisjoint(self.forces):
+            borne, stiffness = self._borne(held), self.study.stiffness
+            if self.wanted is None and self.joints.open and stiffness is not None and self.friction is None:
+                section = poses.section(stiffness, rows)
+                applied = Applied(chain_network(self.joints, self.study.mechanism, section), linear.configuration, 1)
+                self.apply(applied, 0, poses, rows, moving)
+                borne = with_open_moments(borne, self.joints, applied, section, self.study.mechanism.size or 1.0)
+            for name, reaction in zip(self.forces, borne, strict=True):
+                columns |= self._parts(name, reaction) if self.wanted is None else {name: np.abs(reaction.force)}
+        return columns
 
     def _held(
         self, poses: Poses, linear: Linearization, rows: Ints | slice, moving: Moving
     ) -> tuple[dict[str, Value], Balance | Slipping]:
         """Efforts, powers, shaking forces and energies, and the equilibrium that they follow from."""
-        study, mechanism, section = self.study, self.study.mechanism, poses.section(self.section, rows)
-        forces = Forces(linear.configuration)
-        Loading(study, section.loads, poses, rows).add(forces, moving)
-        description, gravity = mechanism.description, section.gravity[0] + 1j * section.gravity[1]
-        energy = springs(forces, mechanism.geometry, list(description.springs.values()), moving)
-        masses = {**self._beams(poses, rows, linear.configuration.places), **description.masses}
-        energy += inertia(forces, mechanism.geometry, masses, moving, gravity, study.units.inertia_factor)
+        mechanism = self.study.mechanism
+        masses = self.masses(poses, rows, linear.configuration.places)
+        forces, energy = self.forces_at(poses, linear.configuration, rows, moving, masses)
         columns: dict[str, Value] = {}
         if self.friction is None:
-            held: Balance | Slipping = balance(linear, forces, mechanism.meshes)
+            held: Balance | Slipping = balance(linear, forces, mechanism.pressing)
         else:
-            held = self.friction.solve(linear, forces, moving.velocity)
+            back = self.wanted is None or "back_efficiency" in self.wanted
+            held = self.friction.solve(linear, forces, moving.velocity, back=back)
             columns |= held.columns
         for drive, effort in zip(mechanism.drives, held.efforts, strict=True):
             columns[f"{drive}_effort"] = effort
@@ -140,6 +149,35 @@ class ForceQuestion:
     def _borne(self, held: Balance | Slipping) -> list[Reaction]:
         return held.reactions if isinstance(held, Slipping) else reactions(self.joints, held)
 
+    def forces_at(
+        self, poses: Poses, configuration: Configuration, rows: Ints | slice, moving: Moving, masses: Mapping[str, Mass]
+    ) -> tuple[Forces, Energy]:
+        """What acts on the mechanism: loads, springs, and weights and inertia of some masses; and their energies."""
+        study, section = self.study, poses.section(self.section, rows)
+        geometry, gravity = study.mechanism.geometry, section.gravity[0] + 1j * section.gravity[1]
+        forces = Forces(configuration)
+        Loading(study, section.loads, poses, rows).add(forces, moving)
+        energy = springs(forces, geometry, list(study.mechanism.description.springs.values()), moving)
+        energy += inertia(forces, geometry, masses, moving, gravity, study.units.inertia_factor)
+        return forces, energy
+
+    def apply(self, applied: Applied, case: int, poses: Poses, rows: Ints | slice, moving: Moving) -> None:
+        """Add what acts to a load on the network of stiffness; the mass of beams is spread along them."""
+        masses, gravity = self.study.mechanism.description.masses, poses.section(self.section, rows).gravity
+        forces, _ = self.forces_at(poses, applied.configuration, rows, moving, masses)
+        applied.add(case, forces)
+        stiffness = poses.section(StiffnessSection.of(self.study), rows)
+        for link in weighed_beams(self.study):
+            if link not in masses and link in applied.beams:
+                profile = stiffness.sections[stiffness.elastic[link]]
+                assert profile.density is not None
+                weight = self.study.units.inertia_factor * profile.density * profile.extent[0]
+                applied.spread(case, link, _density(forces, moving, link, weight, gravity[0] + 1j * gravity[1]))
+
+    def masses(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
+        """Masses of bodies: those given, and of other links those of their beams."""
+        return {**self._beams(poses, rows, places), **self.study.mechanism.description.masses}
+
     def _beams(self, poses: Poses, rows: Ints | slice, places: Mapping[str, Value]) -> dict[str, Mass]:
         """Masses of the links that have beams with a density: thin bars along them, from corner to corner."""
         stiffness, mechanism = self.study.stiffness, self.study.mechanism
@@ -149,7 +187,7 @@ class ForceQuestion:
         for name in weighed_beams(self.study):
             link, section = mechanism.description.links[name], sections[stiffness.elastic[name]]
             assert section.density is not None
-            corners = [mechanism.geometry.place(name, point, places) for point in corners_of(link)]
+            corners = [mechanism.geometry.place(name, point, places) for point in link.corners]
             spans = [(b - a, (a + b) / 2) for a, b in pairwise(corners)]
             bars = [section.density * section.extent[0] * np.abs(along) for along, _ in spans]
             mass = sum(bars)
@@ -176,16 +214,26 @@ def weighed_beams(study: Study) -> list[str]:
     ]  # fmt: skip
 
 
+def _density(forces: Forces, moving: Moving, link: str, weight: Value, gravity: Vector) -> Density:
+    """Weight and inertia force of a link's beams per length; `weight` is a force per acceleration and length."""
+    base = forces.configuration.nodes[forces.bases[link]]
+    return lambda place: inertia_force(forces, moving, link, weight, gravity, place - base)
+
+
+def pace(study: Study) -> MotionSection:
+    """The section that gives the rates of a study's dynamics: its own, or without any that of kinematics."""
+    own = study.dynamics
+    return own if own is not None and own.moves else study.kinematics or KinematicsSection()
+
+
 def force_question(study: Study, poses: Poses) -> MotionQuestion:
     """The motion of a study's dynamics with its forces, and nothing else; without rates those of kinematics."""
-    section, own = study.dynamics, study.kinematics or KinematicsSection()
-    assert section is not None
-    pace = section if section.moves else own
-    rates = {key: getattr(pace, key) for key in ("rates", "accelerations", "speed", "motion")}
+    section, rated = DynamicsSection.of(study), pace(study)
+    rates = {key: getattr(rated, key) for key in ("rates", "accelerations", "speed", "motion")}
     motion = KinematicsSection().model_copy(update={**rates, "outputs": (), "loads": section.loads})
     question = motion_question(replace(study, kinematics=motion, targets={}), poses)
     # The loads count among the forces, and here for the coordinates that their expressions follow.
     return replace(
         question, section=motion.model_copy(update={"loads": ()}), outputs=[], listed=[], square=False,
-        borne=ForceQuestion(study, section, pace.rated, question.tempo),
+        borne=ForceQuestion.of(study, moves=rated.rated, tempo=question.tempo),
     )  # fmt: skip

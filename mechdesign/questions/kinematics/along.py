@@ -190,7 +190,7 @@ class Along:
             for end in (0, 3) if self._toggles else (3,):
                 arrays[f"sine {k} {end}"], arrays[f"cosine {k} {end}"] = loop.squareness(configuration, end)
         arrays |= {name: column for name, column in poses.named.items() if name not in arrays}
-        self._evaluated_names = arrays.keys()
+        self._evaluated_names = frozenset(arrays)
         table = np.empty((len(self._names), len(s)))
         for row, name in zip(table, self._names, strict=True):
             row[:] = arrays.get(name.removeprefix(_MEAN_OF), 1.0)

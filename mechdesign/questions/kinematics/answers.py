@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -16,7 +15,7 @@ from mechdesign.mechanism.four_bars import FourBar, chains, four_bars
 from mechdesign.numerics.arrays import Flags
 from mechdesign.progress import NULL
 from mechdesign.questions.kinematics.along import Along, along_of
-from mechdesign.questions.kinematics.courses import follow
+from mechdesign.questions.kinematics.courses import Courses
 from mechdesign.questions.kinematics.drawn import DrawnMotion
 from mechdesign.questions.kinematics.extremes import extremes, targets_table
 from mechdesign.questions.kinematics.limits import Limit, change_points, hidden, limits_of, limits_table, passed
@@ -80,7 +79,7 @@ def answers_of(passage: Passage) -> list[Group]:
     ends = [_end(passage, events, k) for k in range(designs)]
     closely = along is not None and not along.functions.unresolved.any()
     whole = Scope(not closely, ends[0].missing if designs == 1 else "")
-    a_pose = replace(whole, course=cache(partial(follow, question)))
+    a_pose = replace(whole, course=Courses(question))
     scoped = {
         name: replace(tables[name], scope=a_pose if name in A_ROW_A_POSE else whole) for name in ORDER if name in tables
     }

@@ -20,10 +20,19 @@ def course_of(along: Along, request: Asked) -> Followed | None:
     return Followed(along, request.column) if request.column in along.columns else None
 
 
-def follow(question: MotionQuestion, request: Asked) -> Followed | None:
-    """A column along the motions of all designs; it is followed once for all of them."""
-    along = along_of(question, (), requests=[request])
-    return None if along is None else course_of(along, request)
+@dataclass(frozen=True, eq=False)
+class Courses:
+    """Columns along the motions of a question, each followed once for all designs; can be sent to another process."""
+
+    question: MotionQuestion
+    _followed: dict[Asked, Followed | None] = field(default_factory=dict)
+
+    def __call__(self, request: Asked) -> Followed | None:
+        """A column along the motions; None where it has no values between the poses."""
+        if request not in self._followed:
+            along = along_of(self.question, (), requests=[request])
+            self._followed[request] = None if along is None else course_of(along, request)
+        return self._followed[request]
 
 
 @dataclass(frozen=True, eq=False)

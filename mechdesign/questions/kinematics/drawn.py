@@ -2,22 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
+import numpy as np
+
+from mechdesign.mechanism.derivatives import STALLED, regularity
+from mechdesign.mechanism.outputs import first
+from mechdesign.numerics.arrays import Complexes
 from mechdesign.questions.kinematics.along import Along
 from mechdesign.questions.kinematics.limits import Limit
 from mechdesign.questions.kinematics.loops import Toggle
 from mechdesign.questions.kinematics.motion import Motion
+from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.special_poses import SpecialPoses, special_poses
-from mechdesign.questions.poses import Shown
-from mechdesign.results import Drawn
+from mechdesign.questions.kinematics.tables import motion_table
+from mechdesign.questions.outputs import default_outputs, expand_outputs
+from mechdesign.questions.poses import Shown, SolvedPoses
+from mechdesign.results import Drawn, Table
+
+# What a vector is of, the point or the places (n,) where it is, and its values (n,), nan where it has none.
+Vector = tuple[str, str | Complexes, Complexes]
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnMotion(Drawn):
-    """The solved poses of a motion, and what makes some of them special.
+class Vectors:
+    """Vectors of one kind, such as velocities, at places of a mechanism in n poses.
+
+    Parameters
+    ----------
+    kind : str
+        What they are.
+    unit : str
+        Of their sizes; kinds of one unit are drawn to one scale.
+    """
+
+    kind: str
+    unit: str
+    each: Sequence[Vector]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPoses(Drawn):
+    """The solved poses of a motion: what pictures need of every question about a mechanism that moves.
 
     Parameters
     ----------
@@ -27,15 +56,49 @@ class DrawnMotion(Drawn):
         The motion with a value of every column at each pose.
     along : Along or None
         The motion between its poses; None of listed poses and grids.
+    """
+
+    shown: Shown
+    motion: Motion
+    along: Along | None
+    #: Name of the table with a row a pose.
+    name: ClassVar[str] = "motion"
+
+    def table(self, motion: Motion) -> Table:
+        """The table with a row a pose of a motion of this question."""
+        return motion_table(motion)
+
+    def vectors(self, motion: Motion, shown: Shown) -> Iterable[Vectors]:
+        """Vectors at shown poses of a motion of this question: velocities of the points, where there are rates."""
+        question, configuration = motion.question, shown.configuration
+        if not question.section.rated:
+            return
+        study = question.study
+        linear = study.mechanism.linearize(configuration)
+        solved = SolvedPoses(shown.rows, shown.poses.groups[0].names, configuration)
+        velocity = moving_at(study, question.section, shown.poses, solved, linear).velocity
+        assert velocity is not None
+        known = configuration.valid & (regularity(linear) >= STALLED)
+        each = []
+        for point in default_outputs(study.mechanism):
+            if study.mechanism.graph.is_point(point):
+                x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
+                each.append((point, point, np.where(known, x + 1j * y, np.nan)))
+        yield Vectors("velocity", study.units.label("velocity"), each)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnMotion(DrawnPoses):
+    """The solved poses of a motion, and what makes some of them special.
+
+    Parameters
+    ----------
     limits, toggles : sequence of Limit and of Toggle
         Ends of the motion, and poses at which two links come into line.
     modes : mapping of str to Shown
         The same poses in each assembly of the links that has a valid one, by its name; empty unless all were asked for.
     """
 
-    shown: Shown
-    motion: Motion
-    along: Along | None
     limits: Sequence[Limit]
     toggles: Sequence[Toggle]
     modes: Mapping[str, Shown] = field(default_factory=dict)

@@ -23,7 +23,7 @@ from mechdesign.progress import NULL, Progress
 from mechdesign.questions.columns import DRIVE, VALID, power_of_length
 from mechdesign.questions.kinematics.columns import MOTION
 from mechdesign.questions.kinematics.question import MotionQuestion, characteristic_length
-from mechdesign.questions.kinematics.rates import drive_rates
+from mechdesign.questions.kinematics.rates import moving_at
 from mechdesign.questions.kinematics.targets import Error, errors, totals
 from mechdesign.questions.loads import Loading
 from mechdesign.questions.poses import SolvedPoses, in_study_units, pose_columns, radians, solve_poses
@@ -83,9 +83,9 @@ class Motion:
         self.put("conditioning", rows, conditioning)
         regular = conditioning >= STALLED
         section = self.question.section
-        moving = Moving()
+        moving = moving_at(study, section, self.question.poses, solved, linear)
         if section.rated:
-            moving = self._rates(linear, solved, regular)
+            self._rates(linear, rows, regular, moving)
         if section.instant_centres:
             # Of one drive alone every speed gives the same centres.
             one = len(study.mechanism.drives) == 1
@@ -107,19 +107,17 @@ class Motion:
             self.put(f"{centre.name}.y", rows, np.where(regular, place.imag, np.nan))
             self.put(f"{centre.name}.motion", rows, np.where(regular, motion, 0))
 
-    def _rates(self, linear: Linearization, solved: SolvedPoses, regular: Flags) -> Moving:
-        drives = drive_rates(self.question.study, self.question.section, self.question.poses, solved, linear)
-        velocity = linear.velocity(drives.velocities)
-        acceleration = linear.acceleration(velocity, drives.accelerations)
-        configuration = linear.configuration
+    def _rates(self, linear: Linearization, rows: Ints, regular: Flags, moving: Moving) -> None:
+        velocity, acceleration, configuration = moving.velocity, moving.acceleration, linear.configuration
+        assert velocity is not None
+        assert acceleration is not None
         for output in self.question.rated.values():
             for order, value in (
                 ("velocity", first(configuration, output, velocity)),
                 ("acceleration", second(configuration, output, velocity, velocity, acceleration)),
             ):
                 value = np.where(regular, in_study_units(self.question.study, output, value), np.nan)
-                self.put(f"{output.name}_{order}", solved.rows, value)
-        return Moving(velocity, acceleration)
+                self.put(f"{output.name}_{order}", rows, value)
 
     def _statics(self, linear: Linearization, rows: Ints, regular: Flags, moving: Moving) -> None:
         study, listed, drives = self.question.study, self.question.listed, self.question.drives

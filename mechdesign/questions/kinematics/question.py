@@ -62,6 +62,10 @@ class Borne(Protocol):
         """Values by their columns; `rows` are those of the poses."""
         ...
 
+    def lean(self, names: Collection[str]) -> Borne:
+        """The same with nothing but what some columns need."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class MotionQuestion:
@@ -196,7 +200,8 @@ class MotionQuestion:
             pair for pair in section.instant_centres if any(name.startswith(Centre(*pair).name) for name in names)
         ]
         rates = bool(centres) or any(name.endswith(("_velocity", "_acceleration")) for name in names)
-        borne = self.borne if self.borne is not None and any(s.name in names for s in self.borne.statics) else None
+        asked = self.borne is not None and any(static.name in names for static in self.borne.statics)
+        borne = self.borne.lean(names) if self.borne is not None and asked else None
         directed = self.friction is not None and any(static.name in names for static in self.statics)
         if not (rates or directed) and borne is None and not coordinates_in(self.study, section.loads):
             unasked |= {"rates": {}, "accelerations": {}, "speed": None, "motion": None}

@@ -11,6 +11,7 @@ from mechdesign.mechanism import Mechanism
 from mechdesign.mechanism.algebra import Value, picked
 from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.mechanism.derivatives import STALLED, Jacobian, Linearization
+from mechdesign.mechanism.forces import Moving
 from mechdesign.mechanism.outputs import second
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.poses import SolvedPoses, radians
@@ -59,6 +60,17 @@ def drive_rates(
             for order, derivatives in ((1, poses.slopes), (2, poses.bends))
         ))  # fmt: skip
     return inverse_rates(study.mechanism, linear, coordinates, rates) if inverse else rates
+
+
+def moving_at(
+    study: Study, section: MotionSection, poses: Poses, solved: SolvedPoses, linear: Linearization
+) -> Moving:  # fmt: skip
+    """Velocities and accelerations of a mechanism at some poses; it stands still where a section has no rates."""
+    if not section.rated:
+        return Moving()
+    drives = drive_rates(study, section, poses, solved, linear)
+    velocity = linear.velocity(drives.velocities)
+    return Moving(velocity, linear.acceleration(velocity, drives.accelerations))
 
 
 def constant_rates(study: Study, section: MotionSection, names: Sequence[str]) -> DriveRates:

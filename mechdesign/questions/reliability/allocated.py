@@ -9,6 +9,7 @@ from typing import Any
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.reliability.cheapest import DIGITS, Tolerance
 from mechdesign.questions.reliability.schema.clearances import Clearance
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.study import Study
 from mechdesign.study.text.document import plain
 
@@ -19,8 +20,7 @@ def allocated_data(study: Study, tolerances: Sequence[Tolerance], scales: Floats
     A wildcard is written out, dimension by dimension, unless all its dimensions keep equal tolerances. `allocate` is
     left out, unless a requirement judges its tables.
     """
-    section = study.reliability
-    assert section is not None
+    section = ReliabilitySection.of(study)
     data: dict[str, Any] = plain(study.resolved)
     changed = {t.name: (t, scale) for t, scale in zip(tolerances, scales.tolist(), strict=True) if t.cost is not None}
     written = data["reliability"]

@@ -342,8 +342,7 @@ def _unreachable(last: _Round) -> str:
 
 def _advice(model: ToleranceModel, tightest: Floats, held: Sequence[int], worst: int) -> str:
     """How to have held clearances and loads allocated too, where that reaches the target; else empty."""
-    section, tolerances = model.task.study.reliability, model.tolerances
-    assert section is not None
+    section, tolerances = ReliabilitySection.of(model.task.study), model.tolerances
     free = [k for k in held if tolerances[k].kind != "measured"]
     names = [tolerances[k].name for k in free]
     fits = [name for name in names if name in section.clearances and section.clearances[name].fit is not None]

@@ -23,6 +23,7 @@ from mechdesign.questions.reliability.forces import force_model, pace
 from mechdesign.questions.reliability.method_warnings import method_warnings
 from mechdesign.questions.reliability.question import ambiguous_points, ask
 from mechdesign.questions.reliability.schema.methods import METHODS
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.simulation import Setting, forward_plan
 from mechdesign.questions.reliability.sobol import SobolIndices
 from mechdesign.questions.reliability.sources import Sources
@@ -48,8 +49,7 @@ def reliability(study: Study, *, seed: int | None = None, jobs: int | None = 1, 
     keep_freed_memory()
     poses = study_poses(study, "reliability")
     sources, warnings = find_sources(study)
-    section = study.reliability
-    assert section is not None
+    section = ReliabilitySection.of(study)
     task, groups, doubts = _first_order(study, poses, sources)
     warnings += [*doubts, *ambiguous_points(study, task.question)]
     failures, failed = judge_failures(study, poses, task.reason)
@@ -144,8 +144,7 @@ def _first_order(study: Study, poses: Poses, sources: Sources) -> tuple[Task, _G
 
     Poses that do not hold the study's load, or of whose forces some are asked and not finite, are `NOT_HELD`.
     """
-    mechanism, section = study.mechanism, study.reliability
-    assert section is not None
+    mechanism, section = study.mechanism, ReliabilitySection.of(study)
     question = ask(study, poses.section(section))
     bent, doubts = elasticity(study, poses)
     channels, forces = question.channels, force_model(study, poses)
@@ -230,8 +229,7 @@ def _followed(task: Task) -> int:
 
     Without limits the first one; -1 where no pose can be assembled.
     """
-    section, assembled = task.study.reliability, np.flatnonzero(task.assembled)
-    assert section is not None
+    section, assembled = ReliabilitySection.of(task.study), np.flatnonzero(task.assembled)
     if section.shown is not None:
         if section.shown - 1 not in assembled:
             count = len(task.assembled)

@@ -20,6 +20,7 @@ from mechdesign.questions.reliability.aims import Aim
 from mechdesign.questions.reliability.first_order import FirstOrder
 from mechdesign.questions.reliability.schema.allocation import Cost, half_widths
 from mechdesign.questions.reliability.schema.iso_tolerances import ToleranceClassError
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.sources import Sources
 from mechdesign.questions.reliability.task import Task
 from mechdesign.study import Study
@@ -81,8 +82,7 @@ def tolerances(study: Study, sources: Sources) -> list[Tolerance]:
     Dimensions are allocated; loads and clearances only where `cost` names them. With grades, dimensions without any
     are held.
     """
-    section = study.reliability
-    assert section is not None
+    section = ReliabilitySection.of(study)
     assert section.allocate is not None
     costs, allowed = section.allocate.cost, section.allocate.grades
     millimetre = study.units.convert("1 mm") if allowed else 1.0

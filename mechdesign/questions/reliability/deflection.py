@@ -20,10 +20,9 @@ from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.outputs import Rates, first
 from mechdesign.numerics.arrays import Flags, Floats, Ints
 from mechdesign.questions.reliability.question import Channel, CoordinateChannel
-from mechdesign.questions.reliability.schema.section import links_meant
+from mechdesign.questions.reliability.schema.section import ReliabilitySection, links_meant
 from mechdesign.questions.reliability.schema.variation import LOADS
 from mechdesign.questions.stiffness.body import Body, ask, by_forces
-from mechdesign.questions.stiffness.elements import corners_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 
@@ -151,19 +150,25 @@ def _of_poses(load: Floats, poses: Sequence[int] | Ints) -> Floats:
 def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | None, list[Caution]]:
     """The loaded mechanism of a study, or of designs at their poses, None without a load; and warnings."""
     stiffness, poses = study.stiffness, Poses.single({}) if poses is None else poses
-    assert study.reliability is not None
     if stiffness is None:
         return None, []
-    section = poses.section(study.reliability)
-    loads = poses.section(stiffness).loads if section.load is None else (section.load,)
+    section = poses.section(ReliabilitySection.of(study))
+    loads = poses.section(stiffness).wrenches if section.load is None else [section.load]
     notes = []
     if len(loads) > 1:
         notes.append(Caution(
             "assumed",
             f"the stiffness section has {len(loads)} loads, and errors are those of the unloaded mechanism; name one, "
-            f"for example reliability.load: [{', '.join(f'{part:g}' for part in stiffness.loads[0])}]",
+            f"for example reliability.load: [{', '.join(f'{part:g}' for part in loads[0] or (0.0, 0.0, 0.0))}]",
         ))  # fmt: skip
-    load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, loads[0] if len(loads) == 1 else (0.0, 0.0, 0.0))))
+    elif loads == [None]:
+        notes.append(Caution(
+            "assumed",
+            f"the load of the stiffness section does not act on {stiffness.at} alone: errors are those of the unloaded "
+            "mechanism",
+        ))  # fmt: skip
+    single = (loads[0] if len(loads) == 1 else None) or (0.0, 0.0, 0.0)
+    load = np.stack(np.broadcast_arrays(*map(np.atleast_1d, single)))
     if not load.any() and not set(LOADS).intersection(section.dimensions):
         return None, notes
     question, mechanism = ask(study).at(poses, np.arange(poses.count)), study.mechanism
@@ -172,7 +177,7 @@ def elasticity(study: Study, poses: Poses | None = None) -> tuple[Elasticity | N
     bodies, lines = {GROUND: ""}, dict[str, tuple[int, int]]()
     for link, points in network.points.items():
         carried = {(link, graph.node(point)): vertex for point, vertex in points if vertex in network.paths}
-        corners = [(link, graph.node(point)) for point in corners_of(links[link])]
+        corners = [(link, graph.node(point)) for point in links[link].corners]
         if len(carried) == len(points) and len({*carried.values()}) == 1:
             bodies[link] = next(iter(carried.values()))
         elif len(corners) == 2 and carried.keys() >= {*corners}:

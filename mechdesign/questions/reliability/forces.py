@@ -25,7 +25,7 @@ from mechdesign.questions.dynamics.schema import column_kinds
 from mechdesign.questions.kinematics.rates import DriveRates
 from mechdesign.questions.loads import coordinates_in
 from mechdesign.questions.reliability.laws import at_rows
-from mechdesign.questions.reliability.schema.section import pace_of
+from mechdesign.questions.reliability.schema.section import ReliabilitySection, pace_of
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
 from mechdesign.study.schema.poses import MotionSection
@@ -51,10 +51,8 @@ def kinds_of_forces(study: Study) -> dict[str, str]:
 
 def pace(study: Study) -> MotionSection:
     """The section whose rates the mechanism has."""
-    assert study.reliability is not None
-    if not kinds_of_forces(study):
-        return study.reliability
-    return pace_of(study.reliability, study.dynamics, study.kinematics)
+    section = ReliabilitySection.of(study)
+    return pace_of(section, study.dynamics, study.kinematics) if kinds_of_forces(study) else section
 
 
 def followed(study: Study) -> set[str]:
@@ -121,8 +119,8 @@ class ForceModel:
         nominal = self.question.study.parameters.nominal
         poses = replace(Poses.single({}), parameters=self.parameters, nominal=nominal, times=self.times)
         held = regularity(linear) >= STALLED
-        columns = self.question.values(names, poses, linear, slice(None), moving)
-        return [np.where(held, value, np.nan) for value in columns]
+        columns = self.question.lean(names).columns(poses, linear, slice(None), moving)
+        return [np.where(held, columns[name], np.nan) for name in names]
 
     @quiet
     def slopes(
@@ -163,7 +161,7 @@ def force_model(study: Study, poses: Poses | None = None) -> ForceModel | None:
     """The model of a study, or of designs at their poses; None where no force is asked."""
     if study.dynamics is None or not kinds_of_forces(study):
         return None
-    question = ForceQuestion(study, study.dynamics, pace(study).rated)
+    question = ForceQuestion.of(study, moves=pace(study).rated)
     if poses is None:
         return ForceModel(question)
     return ForceModel(question, poses.parameters, poses.changed, poses.times)

@@ -56,7 +56,8 @@ def made_failure(
     mean = linear.shift().T if mean is None else mean
     covariance = linear.covariance() if covariance is None else covariance
     failure = failure_probability(covariance, bands, discs, mean)
-    parts = ndtr(-closing.distance())
+    # What is left where a limit breaks almost surely is all that assembly can add.
+    parts = np.minimum(ndtr(-closing.distance()), 1.0 - failure)
     counts = parts > np.maximum(_NO_PART * failure, _LEAST_PART)
     count = covariance.shape[-1]
     for pose in np.flatnonzero(counts.any(axis=0)).tolist():

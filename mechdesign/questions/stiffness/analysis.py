@@ -28,9 +28,9 @@ from mechdesign.questions.poses import (
     solve_poses,
     study_poses,
 )
-from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold
+from mechdesign.questions.stiffness.body import Body, ask, by_forces, hold, pushes
 from mechdesign.questions.stiffness.compliance import Held, put
-from mechdesign.questions.stiffness.elements import Guide, Hinge, corners_of
+from mechdesign.questions.stiffness.elements import Guide, Hinge
 from mechdesign.questions.stiffness.force_method import Effects, effects_of
 from mechdesign.questions.stiffness.tables import (
     Springs,
@@ -101,7 +101,7 @@ def _group(study: Study, body: Body, poses: Poses, jobs: int | None, progress: P
         uneven = {"springs": solved.springs.counts(designs, count)}
         return Group(np.arange(designs), Result("stiffness", scoped), ends, uneven)
     (end,) = ends
-    first, loose = (_drawn_pose(body, solved, pose) for pose in (solved.first, solved.loose))
+    first, loose = (_drawn_pose(body, poses, solved, pose) for pose in (solved.first, solved.loose))
     result = Result(
         "stiffness", of_poses(all_tables, solved.reason), end.warnings, end.counts, end.failed,
         drawn=DrawnStiffness(solved.shown, first, loose),
@@ -150,6 +150,8 @@ class DrawnPose:
         Equivalent springs of the legs in it.
     twists : dict of str to ndarray, shape (3, loads)
         By vertex, its twist about the asked point under each load, in the units of the mechanism.
+    pushes : dict
+        By the number of each load elsewhere, its places, forces and moments; see `pushes`.
     """
 
     body: Body
@@ -157,6 +159,7 @@ class DrawnPose:
     configuration: Configuration
     springs: Springs
     twists: dict[str, Floats]
+    pushes: dict[int, list[tuple[complex, complex, float]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,14 +179,16 @@ class DrawnStiffness(Drawn):
     loose: DrawnPose | None
 
 
-def _drawn_pose(body: Body, solved: Solved, pose: Pose | None) -> DrawnPose | None:
+def _drawn_pose(body: Body, poses: Poses, solved: Solved, pose: Pose | None) -> DrawnPose | None:
     """A pose with its springs, and with the twists that the loads make."""
     if pose is None:
         return None
     row, configuration = pose
-    moved = by_forces(body, configuration).displacements if body.given.loads else {}
-    twists = {vertex: (twist @ body.loads[0, :, : body.size].T)[0] for vertex, twist in moved.items()}
-    return DrawnPose(body, row, configuration, solved.springs.take(solved.springs.row == row), twists)
+    body = body.at(poses, np.array([row]))
+    moved = by_forces(body, configuration, loads=True).displacements if body.given.wrenches else {}
+    twists = {vertex: (twist @ body.summed(configuration))[0] for vertex, twist in moved.items()}
+    springs = solved.springs.take(solved.springs.row == row)
+    return DrawnPose(body, row, configuration, springs, twists, pushes(body, configuration))
 
 
 def solve(
@@ -197,8 +202,9 @@ def solve(
     held = Held.unknown(poses.count, body.size)
     reason = np.zeros(poses.count, dtype=np.int8)
     springs: list[Springs] = []
-    loads = len(body.given.loads) if effects else 0
-    all_effects = Effects.unknown(body.network, poses.count, loads) if loads else None
+    # Deflections under loads elsewhere are effects, too.
+    loads = len(body.given.wrenches) if effects or body.others else 0
+    all_effects = Effects.unknown(body.network, poses.count, loads, body.size) if loads else None
     first: Pose | None = None
     loose: Pose | None = None
     keeper = Keeper(study, poses)
@@ -235,7 +241,8 @@ def tables(
     soft, effects = solved.held.compliance, solved.effects
     body = body.at(poses, np.arange(poses.count))
     section = body.section
-    loads = np.broadcast_to(body.loads, (poses.count, len(section.loads), 3)) if section.loads else None
+    count = len(section.wrenches)
+    loads = np.broadcast_to(body.loads, (poses.count, count, 3)) if count else None
     method = "serial legs" if body.legs is not None else "force method"
     makers: dict[str, Callable[[], Table]] = {
         "stiffness": lambda: stiffness_table(study, poses, solved.held, solved.reason == 0, method, section.direction),
@@ -248,7 +255,8 @@ def tables(
     if legs is not None:
         makers["springs"] = lambda: springs_table(study, poses, [leg.name for leg in legs], solved.springs)
     if loads is not None:
-        makers["deflections"] = lambda: deflections_table(study, poses, loads, soft)
+        moved = effects.moved if effects is not None and body.others else None
+        makers["deflections"] = lambda: deflections_table(study, poses, loads, soft, moved)
     if effects is not None:
         makers["forces"] = lambda: forces_table(study, poses, body.network, effects)
         makers["displacements"] = lambda: displacements_table(study, poses, body.network, effects)
@@ -262,10 +270,9 @@ def _evaluate(
     body, configuration = batch
     if not effects:
         return *hold(body, configuration), None
-    loaded = by_forces(body, configuration)
+    loaded = by_forces(body, configuration, loads=True)
     held, springs = (loaded.held, ()) if body.legs is None else hold(body, configuration)
-    loads = np.broadcast_to(body.loads, (*configuration.shape, len(body.given.loads), 3))
-    return held, springs, effects_of(body.network, loaded, body.given.at, configuration, loads)
+    return held, springs, effects_of(body.network, loaded, body.given.at, configuration, body.summed(configuration))
 
 
 class _Cautions:
@@ -310,7 +317,7 @@ def _without_beam(study: Study, body: Body) -> list[Caution]:
             "ends",
         )
         for name in body.given.elastic
-        if len(corners_of(links[name])) < 2
+        if len(links[name].corners) < 2
     ]
 
 

@@ -10,7 +10,14 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
+from mechdesign.mechanism.algebra import quiet
+from mechdesign.mechanism.forces import Forces, Moving
 from mechdesign.numerics.arrays import Floats, Ints
+from mechdesign.questions.dynamics.question import ForceQuestion, pace
+from mechdesign.questions.kinematics.rates import moving_at
+from mechdesign.questions.loads import Loading
+from mechdesign.questions.poses import SolvedPoses
+from mechdesign.questions.stiffness.applied import Applied
 from mechdesign.questions.stiffness.compliance import Held, put
 from mechdesign.questions.stiffness.elements import spread
 from mechdesign.questions.stiffness.force_method import Loaded, load, twists_of
@@ -28,6 +35,8 @@ class Body:
 
     Parameters
     ----------
+    study : Study
+        The study that asks.
     given : StiffnessSection
         The section as the study gives it.
     legs : tuple of Leg or None
@@ -45,6 +54,7 @@ class Body:
         All poses, and the rows of those in which the body is, where designs differ in numbers of the section.
     """
 
+    study: Study
     given: StiffnessSection
     legs: tuple[Leg, ...] | None
     network: Network
@@ -71,9 +81,27 @@ class Body:
 
     @property
     def loads(self) -> Floats:
-        """Loads (fx, fy, mz) in each pose, shape (poses, loads, 3); of a single pose where all poses have the same."""
-        parts = np.broadcast_arrays(*(part for load in self.section.loads for part in load))
-        return np.stack(parts, axis=-1).reshape(-1, len(self.given.loads), 3)
+        """Loads on the asked point (fx, fy, mz) in each pose, shape (poses, loads, 3), 0 of loads elsewhere.
+
+        They are of a single pose where all poses have the same.
+        """
+        wrenches = [wrench or (0.0, 0.0, 0.0) for wrench in self.section.wrenches]
+        parts = np.broadcast_arrays(*(part for wrench in wrenches for part in wrench))
+        return np.stack(parts, axis=-1).reshape(-1, len(wrenches), 3)
+
+    @property
+    def others(self) -> list[int]:
+        """Numbers of the loads that do not act on the asked point alone."""
+        return [k for k, wrench in enumerate(self.given.wrenches) if wrench is None]
+
+    def summed(self, configuration: Configuration) -> Floats:
+        """Each load as a sum of unit loads and of the loads elsewhere, shape (n, size and loads elsewhere, loads)."""
+        units = np.broadcast_to(self.loads[:, :, : self.size].swapaxes(1, 2),
+                                (*configuration.shape, self.size, len(self.given.wrenches)))  # fmt: skip
+        if not self.others:
+            return units
+        elsewhere = np.eye(len(self.given.wrenches))[self.others]
+        return np.concatenate([units, np.broadcast_to(elsewhere, (*configuration.shape, *elsewhere.shape))], axis=1)
 
     def length(self, configuration: Configuration) -> Floats:
         """Length that stands for a radian where sizes are compared, shape (n,): the spread of the network's joints.
@@ -98,12 +126,23 @@ def ask(study: Study) -> Body:
     mechanism, point = study.mechanism, section.point
     link, links = section.bearer, mechanism.graph.links_at(point)
     lone = link is None and len(links) == 1
+    loaded = _loaded_points(study, section)
     standing = build_bodies(mechanism, links[0] if lone else link, point, section)
-    carried = build_bodies(mechanism, None, point, section) if lone else standing
-    network = build_network(carried)
     legs = find_legs(standing, list(mechanism.description.links))
+    carried = build_bodies(mechanism, None if lone else link, point, section, loaded) if lone or loaded else standing
+    network = build_network(carried, whole=None in section.wrenches)
     condensed = section.link is None and (lone or link is not None)
-    return Body(section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size or 1.0)
+    return Body(study, section, legs, network, 2 if section.link is None else 3, condensed, mechanism.size or 1.0)
+
+
+def _loaded_points(study: Study, section: StiffnessSection) -> set[str]:
+    """Points on whose pins loads elsewhere, and in dynamics springs, act."""
+    loads = [load for load, wrench in zip(section.loads, section.wrenches, strict=False) if wrench is None]
+    points = [point for load in loads for point in (load.at, *(load.between or ()))]
+    if section.dynamics and study.dynamics is not None:
+        joints, graph = study.dynamics.joints(study.mechanism), study.mechanism.graph
+        points += [graph.nodes[node] for node in joints.loaded]
+    return {point for point in points if point is not None and "." not in point}
 
 
 def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Springs]]:
@@ -122,6 +161,43 @@ def hold(body: Body, configuration: Configuration) -> tuple[Held, Iterable[Sprin
     return held, springs
 
 
-def by_forces(body: Body, configuration: Configuration) -> Loaded:
-    """The body, and the effects of unit loads, in a batch of assembled poses, by the force method."""
-    return load(twists_of(body.network, body.section, configuration, body.length(configuration)), body.size)
+def by_forces(body: Body, configuration: Configuration, *, loads: bool = False) -> Loaded:
+    """The body, and the effects of unit loads, in a batch of assembled poses, by the force method.
+
+    With `loads` those of the study that do not act on the asked point alone follow them.
+    """
+    applied = _applied(body, configuration) if loads and body.others else None
+    length = body.length(configuration)
+    return load(twists_of(body.network, body.section, configuration, length, applied), body.size)
+
+
+def pushes(body: Body, configuration: Configuration) -> dict[int, list[tuple[complex, complex, float]]]:
+    """By the number of each load elsewhere but that of dynamics, its places, forces and moments in a single pose."""
+    found: dict[int, list[tuple[complex, complex, float]]] = {}
+    for _, wrench in _applied(body, configuration).vertices if body.others else ():
+        k = body.others[wrench.case]
+        if k < len(body.given.loads):
+            fx, fy, mz = wrench.about(wrench.place)[:, 0].tolist()
+            found.setdefault(k, []).append((complex(wrench.place[0]), complex(fx, fy), mz))
+    return found
+
+
+@quiet
+def _applied(body: Body, configuration: Configuration) -> Applied:
+    """The loads that do not act on the asked point alone."""
+    study, poses, rows = body.study, body.poses, body.rows
+    assert poses is not None
+    assert rows is not None
+    applied = Applied(body.network, configuration, len(body.others))
+    for case, k in enumerate(body.others):
+        if k == len(body.given.loads):
+            rated = pace(study)
+            names = next(group.names for group in poses.groups if rows[0] in group.rows)
+            solved = SolvedPoses(rows, names, configuration)
+            moving = moving_at(study, rated, poses, solved, study.mechanism.linearize(configuration))
+            ForceQuestion.of(study, moves=rated.rated).apply(applied, case, poses, rows, moving)
+        else:
+            forces = Forces(configuration)
+            Loading(study, body.section.loads[k : k + 1], poses, rows).add(forces, Moving())
+            applied.add(case, forces)
+    return applied

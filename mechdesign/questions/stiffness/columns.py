@@ -37,7 +37,8 @@ SPRINGS = TableKind.of("springs", "springs that hold the body as its legs do",
     ("stiffness", "along its line, inf where rigid; where angle is nan about its point (<unit>)", "stiffness"),
     ("x, y", "a point on its line", "length"), ("angle", "direction of its line", "angle"))  # fmt: skip
 DEFLECTIONS = TableKind.of("deflections", "deflections under the study's loads",
-    TIMED, GIVEN, ("fx, fy", "load at the asked point", "force"), ("mz", "load at the asked point", "moment"),
+    TIMED, GIVEN, LOAD, ("fx, fy", "load at the asked point, 0 of one elsewhere", "force"),
+    ("mz", "load at the asked point, 0 of one elsewhere", "moment"),
     ("dx, dy", "deflection of the asked point", "length"),
     ("dphi", "deflection of the asked point", "as radians"))  # fmt: skip
 DISPLACEMENTS = TableKind.of("displacements", "displacements of all points under the study's loads",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,11 +27,6 @@ from mechdesign.questions.stiffness.screws import RANK, hinge_twist, slide_twist
 NEAREST = 1e-9
 # A point is far from the joints if its distance exceeds this multiple of theirs from each other.
 _FAR_FROM_JOINTS = 10.0
-
-
-def corners_of(link: Link) -> tuple[str, ...]:
-    """The points between which the beams of an elastic link run; a telescopic one is a single beam."""
-    return link.ends or tuple(link.points)
 
 
 @dataclass(frozen=True)
@@ -111,6 +107,15 @@ class Coil:
 Element = Hinge | Guide | Beam | Shift | Bearing | Coil
 
 
+class Piece(NamedTuple):
+    """A straight piece of beams in n poses: distance of its beginning along them, middle, direction and length (n,)."""
+
+    start: Floats
+    middle: Complexes
+    along: Complexes
+    length: Floats
+
+
 @dataclass(frozen=True, eq=False)
 class BeamLine:
     """The beams of one link in n poses, one after another; distances are counted along them from the first corner.
@@ -152,20 +157,20 @@ class BeamLine:
         start, corner, along = (np.take_along_axis(v, beam, axis=0)[0] for v in (self.starts, self.corners, self.along))
         return np.asarray(corner + (distance - start) * along)
 
-    def between(self, low: Floats, high: Floats) -> Iterator[tuple[Complexes, Complexes, Floats]]:
-        """Middle, direction and length, shape (n,), of each straight piece between two distances.
+    def between(self, low: Floats, high: Floats) -> Iterator[Piece]:
+        """Each straight piece between two distances.
 
         Pieces that have no length in any pose are left out.
         """
         for corner, along, (start, end) in zip(self.corners, self.along, pairwise(self.starts), strict=False):
             first, last = np.clip(low, start, end), np.clip(high, start, end)
             if (first != last).any():
-                yield corner + ((first + last) / 2 - start) * along, along, last - first
+                yield Piece(first, corner + ((first + last) / 2 - start) * along, along, last - first)
 
 
 def beam_line(link: Link, configuration: Configuration) -> BeamLine:
     """The beams of a link in a batch of poses; a telescopic link has a direction even where its length is zero."""
-    names = corners_of(link)
+    names = link.corners
     corners = np.array([configuration.point(name) for name in names])
     spans = np.diff(corners, axis=0)
     lengths = np.abs(spans)
@@ -247,18 +252,17 @@ def _beam_freedoms(
     line = beam_line(beam.link, configuration)
     tail, head = (line.foot(point, configuration.point(point)) for point in (beam.tail, beam.head))
     profile = section.sections[beam.section]
-    yield from bending(line, np.minimum(tail, head), np.maximum(tail, head), profile, at)
+    for piece in line.between(np.minimum(tail, head), np.maximum(tail, head)):
+        yield from piece_freedoms(piece, profile, at)
 
 
-def bending(
-    line: BeamLine, low: Floats, high: Floats, profile: Profile, at: Complexes
-) -> Iterator[tuple[Floats, Value]]:
-    """Twists (3, n) and compliances of the part of a link's beams between two distances: stretch, shear, bending."""
+def piece_freedoms(piece: Piece, profile: Profile, at: Complexes) -> Iterator[tuple[Floats, Value]]:
+    """Twists (3, n) and compliances of a straight piece of beams: stretch, shear, bending."""
+    _, middle, along, length = piece
     area, inertia, factor = profile.extent
     # Shear compliance per length.
     shear = 1 / (factor * profile.G * area) if profile.shear and profile.G is not None else 0.0
     stretching, bent = profile.E * area, profile.E * inertia
-    for middle, along, length in line.between(low, high):
-        yield slide_twist(along), length / stretching
-        yield slide_twist(1j * along), length**3 / (12 * bent) + length * shear
-        yield hinge_twist(middle - at), length / bent
+    yield slide_twist(along), length / stretching
+    yield slide_twist(1j * along), length**3 / (12 * bent) + length * shear
+    yield hinge_twist(middle - at), length / bent

@@ -23,8 +23,9 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.mechanism.algebra import Value
 from mechdesign.numerics.arrays import Complexes, Flags, Floats
+from mechdesign.questions.stiffness.applied import Applied
 from mechdesign.questions.stiffness.compliance import REGULAR, Held, inverses, moved_to, poses_by, scales, stiffness_of
-from mechdesign.questions.stiffness.elements import beam_line, bending, freedoms, screw_origin
+from mechdesign.questions.stiffness.elements import beam_line, freedoms, piece_freedoms, screw_origin
 from mechdesign.questions.stiffness.network import Network
 from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.stiffness.screws import RANK, RIGID
@@ -33,6 +34,26 @@ from mechdesign.questions.stiffness.screws import RANK, RIGID
 SELF_STRESS = 1e-13
 # So are those with less than this fraction (rounding squared) of the largest energy that loop wrenches could store.
 STORED = 1e-26
+# Of a freedom: the edges that have it (1 or 0), its twist, its compliance, and what loads on beams put on it and strain
+# it by.
+_Row = tuple[Floats, Floats, Value | None, Floats | None, Floats | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Elsewhere:
+    """Loads that act anywhere on a network in n poses, each a case of its own.
+
+    Parameters
+    ----------
+    through : ndarray, shape (n, edges, 3, cases)
+        Wrench about the origin of the twists on each edge of the tree; on beams that of loads beyond their beginning.
+    acting, initial : ndarray, shape (n, freedoms, cases)
+        What the loads put on each freedom of the tree, and strains by loads within a piece of a beam.
+    """
+
+    through: Floats
+    acting: Floats
+    initial: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +75,8 @@ class Twists:
         From the origin of the twists to the asked point.
     length : float or ndarray, shape (n,)
         Length as which a radian counts.
+    elsewhere : Elsewhere or None
+        What loads that act anywhere do to edges and freedoms.
     """
 
     network: Network
@@ -63,6 +86,7 @@ class Twists:
     within: Floats
     arm: Complexes
     length: Value
+    elsewhere: Elsewhere | None = None
 
     @property
     def scale(self) -> Floats:
@@ -74,38 +98,59 @@ class Twists:
 class Loaded:
     """A body held by a network in n poses, and the effects of unit loads on it; nan where the body is not held.
 
+    Loads are the unit loads, as many as the size, and after them the cases of loads anywhere.
+
     Parameters
     ----------
-    stress : ndarray, shape (n, 3 loops, size)
-        Wrenches of the loops under scaled unit loads.
-    shift : ndarray, shape (n, freedoms, size)
+    stress : ndarray, shape (n, 3 loops, loads)
+        Wrenches of the loops under scaled unit loads, and under the others.
+    shift : ndarray, shape (n, freedoms, loads)
         Displacements in all freedoms under the same loads.
+    rigid : ndarray, shape (n, 3 loops, 3 loops), or None
+        Projector onto the states of self-stress that store no energy; None where no pose has any.
     """
 
     held: Held
     twists: Twists
     stress: Floats
     shift: Floats
+    rigid: Floats | None
+
+    @property
+    def size(self) -> int:
+        """Number of unit loads."""
+        return int(self.held.compliance.shape[1])
 
     @cached_property
     def wrenches(self) -> Floats:
-        """Wrench that each edge bears about the asked point, a column for each unit load, shape (n, edges, 3, size)."""
-        network, size = self.twists.network, self.stress.shape[2]
-        around, onward = _ways(network)
-        stress = self.stress.reshape(len(self.stress), len(around), 3, size)
+        """Wrench that each edge bears about the asked point, a column for each load, shape (n, edges, 3, loads)."""
+        size, scale = self.size, self.twists.scale
+        _, onward = _ways(self.twists.network)
+        around = self._around(self.stress)
         # The load on the edges of its path to the ground, less the wrenches of the loops.
-        through = onward[:, None, None] * np.eye(3)[:, :size] - np.einsum("le,nlis->neis", around, stress)
-        scale = self.twists.scale
+        through = onward[:, None, None] * np.eye(3)[:, :size] - around[..., :size]
         unscaled = through / scale[:, None, :, None] * scale[:, None, None, :size]
-        back = moved_to(-self.twists.arm).swapaxes(1, 2)
-        return np.asarray(back[:, None] @ unscaled @ self._loads[:, None])
+        units = np.asarray(self._back @ unscaled @ self._loads[:, None])
+        if self.twists.elsewhere is None:
+            return units
+        others = self.twists.elsewhere.through - around[..., size:] / scale[:, None, :, None]
+        return np.concatenate([units, self._back @ others], axis=3)
+
+    @cached_property
+    def open_wrenches(self) -> Floats:
+        """Wrenches of each edge about the asked point that nothing determines, shape (n, edges, 3, states)."""
+        if self.rigid is None:
+            return np.zeros((len(self.stress), len(self.twists.network.edges), 3, 0))
+        return np.asarray(self._back @ (self._around(self.rigid) / self.twists.scale[:, None, :, None]))
 
     @cached_property
     def displacements(self) -> dict[str, Floats]:
-        """Twist of each vertex about the asked point, a column for each unit load, shape (n, 3, size)."""
-        twists, size = self.twists, self.stress.shape[2]
+        """Twist of each vertex about the asked point, a column for each load, shape (n, 3, loads)."""
+        twists, size = self.twists, self.size
         scale = twists.scale
-        to_point, shift = moved_to(twists.arm) * scale[:, None], (self.shift * scale[:, None, :size]) @ self._loads
+        to_point = moved_to(twists.arm) * scale[:, None]
+        shift = (self.shift[:, :, :size] * scale[:, None, :size]) @ self._loads
+        shift = np.concatenate([shift, self.shift[:, :, size:]], axis=2)
         twists_of_vertices = {}
         for vertex, path in twists.network.paths.items():
             signs = twists.network.signs(path) @ twists.within
@@ -113,47 +158,77 @@ class Loaded:
             twists_of_vertices[vertex] = to_point @ ((signs[:, None, on] * twists.twist[:, :, on]) @ shift[:, on])
         return twists_of_vertices
 
+    def _around(self, stress: Floats) -> Floats:
+        """What each edge bears of the scaled wrenches of the loops that it is in, shape (n, edges, 3, loads)."""
+        around, _ = _ways(self.twists.network)
+        of_loops = stress.reshape(len(stress), len(around), 3, stress.shape[2])
+        return np.asarray(np.einsum("le,nlis->neis", around, of_loops))
+
+    @property
+    def _back(self) -> Floats:
+        """What moves wrenches from the origin of the twists to the asked point, shape (n, 1, 3, 3)."""
+        return moved_to(-self.twists.arm).swapaxes(1, 2)[:, None]
+
     @property
     def _loads(self) -> Floats:
         """Unit loads at the asked point, moved to the origin of the twists, shape (n, size, size)."""
-        size = self.stress.shape[2]
+        size = self.size
         return moved_to(self.twists.arm).swapaxes(1, 2)[:, :size, :size]
 
 
-def twists_of(network: Network, section: StiffnessSection, configuration: Configuration, length: Value) -> Twists:
-    """Freedoms of all edges; a radian counts as `length`, one for all poses or each."""
+def twists_of(
+    network: Network, section: StiffnessSection, configuration: Configuration, length: Value,
+    applied: Applied | None = None,
+) -> Twists:  # fmt: skip
+    """Freedoms of all edges, and what loads do to them; a radian counts as `length`, one for all poses or each."""
     at, n = configuration.point(section.at), configuration.shape[0]
     joints = [edge.point for edge in network.edges]
     origin = at if section.link is None else screw_origin(joints, at, configuration, length)
-    # A row for each freedom: the edges that have it (1 or 0), the twist and the compliance.
-    rows = [(np.eye(len(network.edges))[k][:, None], *freedom) for k, edge in enumerate(network.edges) if not edge.beam
-            for freedom in freedoms(edge.elements, section, configuration, origin)]  # fmt: skip
+    rows: list[_Row] = [
+        (np.eye(len(network.edges))[k][:, None], *freedom, None, None)
+        for k, edge in enumerate(network.edges) if not edge.beam
+        for freedom in freedoms(edge.elements, section, configuration, origin)
+    ]  # fmt: skip
     for edges in network.edges_along_beams:
-        rows += _beam_freedoms(network, edges, section, configuration, origin)
+        rows += _beam_freedoms(network, edges, section, configuration, origin, applied)
     twist = np.zeros((n, 3, len(rows)))
     compliance = np.zeros((n, len(rows)))
     within = np.zeros((max((over.shape[1] for over, *_ in rows), default=1), len(network.edges), len(rows)))
-    for j, (over, allowed, soft) in enumerate(rows):
+    for j, (over, allowed, soft, *_) in enumerate(rows):
         within[:, :, j] = over.T
         twist[:, :, j] = np.broadcast_to(allowed, (3, n)).T
         if soft is not None:
             compliance[:, j] = soft
+    elsewhere = None
+    if applied is not None:
+        through = np.zeros((n, len(network.edges), 3, applied.cases))
+        for vertex, wrench in applied.vertices:
+            for k, sign in network.paths[vertex]:
+                through[:, k, :, wrench.case] += sign * wrench.about(origin).T
+        acting = np.einsum("nej,neic,nij->njc", np.broadcast_to(within, (n, *within.shape[1:])), through, twist)
+        initial = np.zeros(acting.shape)
+        for j, (*_, own, strain) in enumerate(rows):
+            if own is not None and strain is not None:
+                acting[:, j] += own
+                initial[:, j] = strain
+        elsewhere = Elsewhere(through, acting, initial)
     twist[:, 2] *= np.reshape(length, (-1, 1))
-    free = np.array([soft is None for *_, soft in rows], dtype=bool)
-    return Twists(network, twist, compliance, free, within, at - origin, length)
+    free = np.array([soft is None for _, _, soft, *_ in rows], dtype=bool)
+    return Twists(network, twist, compliance, free, within, at - origin, length, elsewhere)
 
 
 def _beam_freedoms(
     network: Network, edges: Sequence[int], section: StiffnessSection, configuration: Configuration,
-    origin: Complexes,
-) -> Iterator[tuple[Floats, Floats, Value]]:  # fmt: skip
+    origin: Complexes, applied: Applied | None,
+) -> Iterator[_Row]:  # fmt: skip
     """Freedoms of the beams of one link, cut wherever something is attached.
 
     Yields of each freedom the edges that run over its part of the beams (1 or 0), shape (edges, n) or (edges, 1), its
-    twist and its compliance. As slides change their order along the beams, parts are sorted in each pose.
+    twist and its compliance, and what loads on the beams above it put on it and strain it by, shape (n, cases). As
+    slides change their order along the beams, parts are sorted in each pose.
     """
     beams = [beam for k in edges if (beam := network.edges[k].beam)]
-    line = beam_line(beams[0].link, configuration)
+    line, profile = beam_line(beams[0].link, configuration), section.sections[beams[0].section]
     feet = np.array([line.foot(beam.head, configuration.point(beam.head)) for beam in beams])
     cuts = np.sort(np.concatenate([np.zeros((1, feet.shape[1])), feet]), axis=0)
     for low, high in pairwise(cuts):
@@ -161,31 +236,63 @@ def _beam_freedoms(
         over[list(edges)] = feet > low
         if (over == over[:, :1]).all():
             over = over[:, :1]
-        for twist, compliance in bending(line, low, high, section.sections[beams[0].section], origin):
-            yield over, twist, compliance
+        for piece in line.between(low, high):
+            three = list(piece_freedoms(piece, profile, origin))
+            if applied is None:
+                yield from ((over, *freedom, None, None) for freedom in three)
+                continue
+            own, strain = np.zeros((2, 3, len(piece.length), applied.cases))
+            ways = piece.along, 1j * piece.along
+            for case, wrench, twist in applied.on_beams(beams[0].link.name, piece, profile, origin):
+                for j, (allowed, _) in enumerate(three):
+                    own[j, :, case] += np.sum(np.broadcast_to(allowed, wrench.shape) * wrench, axis=0)
+                at_middle = twist[0] + 1j * twist[1] + 1j * twist[2] * (piece.middle - origin)
+                for j, way in enumerate(ways):
+                    strain[j, :, case] += np.real(at_middle * np.conj(way))
+                strain[2, :, case] += twist[2]
+            yield from ((over, *freedom, own[j], strain[j]) for j, freedom in enumerate(three))
 
 
 def load(twists: Twists, size: int) -> Loaded:
-    """Stiffness and compliance of a body or (`size` 2) a pin, with wrenches and displacements under unit loads."""
-    n, (around, onward) = len(twists.twist), _ways(twists.network)
+    """Stiffness and compliance of a body or (`size` 2) a pin, with wrenches and displacements under all loads."""
+    n, (around, onward), others = len(twists.twist), _ways(twists.network), twists.elsewhere
 
     def matrices(chosen: Flags) -> tuple[Floats, Floats]:
         within, twist = twists.within[:, :, chosen], twists.twist[:, :, chosen]
         loops = (around @ within)[:, :, None] * twist[:, None]
-        return loops.reshape(n, 3 * len(around), twist.shape[2]), (onward @ within)[:, None] * twist[:, :size]
+        path = (onward @ within)[:, None] * twist[:, :size]
+        if others is not None:
+            path = np.concatenate([path, others.acting[:, chosen].swapaxes(1, 2)], axis=1)
+        return loops.reshape(n, 3 * len(around), twist.shape[2]), path
 
     compliance = twists.compliance[:, ~twists.free]
-    statics = _Statics.of(*matrices(twists.free))
+    initial = None if others is None else others.initial[:, ~twists.free]
+    free_loops, free_path = matrices(twists.free)
+    statics = _Statics.of(free_loops, free_path, size)
     loops, path = matrices(~twists.free)
-    bears, stress = _least_energy(statics, loops, path, compliance)
-    strain = compliance[:, :, None] * bears
-    total = bears.swapaxes(1, 2) @ strain
-    shift = np.zeros((n, len(twists.free), size))
+    bears, stress, rigid = _least_energy(statics, loops, path, compliance, initial)
+    strain = _strained(compliance, bears, initial)
+    total = bears[:, :, :size].swapaxes(1, 2) @ strain[:, :, :size]
+    shift = np.zeros((n, len(twists.free), path.shape[1]))
     shift[:, ~twists.free] = strain
     shift[:, twists.free] = -statics.inverse @ (loops @ strain)
     held = _held((total + total.swapaxes(1, 2)) / 2, statics, twists.length, size)
     stress[held.rank < size], shift[held.rank < size] = np.nan, np.nan
-    return Loaded(held.seen_from(twists.arm), twists, stress, shift)
+    if others is not None:
+        # Loads that move the mechanism are in no equilibrium.
+        rest = np.abs(free_path[:, size:] - stress[:, :, size:].swapaxes(1, 2) @ free_loops).max(axis=2, initial=0.0)
+        moves = rest > RANK * np.abs(others.acting).max(axis=1, initial=0.0)
+        for part in (stress, shift):
+            part[:, :, size:][np.broadcast_to(moves[:, None], part[:, :, size:].shape)] = np.nan
+    return Loaded(held.seen_from(twists.arm), twists, stress, shift, rigid)
+
+
+def _strained(compliance: Floats, bears: Floats, initial: Floats | None) -> Floats:
+    """Displacements of elastic joints by what they bear, and by loads within them, shape (n, joints, loads)."""
+    strain = compliance[:, :, None] * bears
+    if initial is not None:
+        strain[:, :, -initial.shape[2] :] += initial
+    return strain
 
 
 def _ways(network: Network) -> tuple[Floats, Floats]:
@@ -202,8 +309,8 @@ class _Statics:
     ----------
     inverse : ndarray, shape (n, freedoms, loops)
         Pseudo-inverse of the free joints' loop matrix: their motions that close gaps in the loops.
-    particular : ndarray, shape (n, loops, size)
-        Loop wrenches in equilibrium with each unit load.
+    particular : ndarray, shape (n, loops, loads)
+        Loop wrenches in equilibrium with each load.
     stress : ndarray, shape (n, loops, loops), or None
         Projector onto the states of self-stress; None where no pose has any.
     lost : ndarray, shape (n, size, size), or None
@@ -219,9 +326,9 @@ class _Statics:
     margin: Floats
 
     @staticmethod
-    def of(loops: Floats, path: Floats) -> _Statics:
+    def of(loops: Floats, path: Floats, size: int) -> _Statics:
         """Solve for the equilibrium of each pose: by the inverse of a regular matrix, or else by singular values."""
-        norm = np.sqrt((loops**2).sum(axis=1) + (path**2).sum(axis=1))
+        norm = np.sqrt((loops**2).sum(axis=1) + (path[:, :size] ** 2).sum(axis=1))
         norm = np.where(norm > 0, norm, 1.0)[:, None]
         unit, along = loops / norm, path / norm
         n, rows, columns = unit.shape
@@ -242,8 +349,8 @@ class _Statics:
                 stress = np.zeros((n, rows, rows))
                 stress[irregular] = stresses
             if free.any():
-                lost = np.zeros((n, path.shape[1], path.shape[1]))
-                lost[irregular] = _onto_range(along[irregular] @ free @ along[irregular].swapaxes(1, 2))
+                lost, units = np.zeros((n, size, size)), along[irregular][:, :size]
+                lost[irregular] = _onto_range(units @ free @ units.swapaxes(1, 2))
         return _Statics(
             inverse / norm.swapaxes(1, 2), inverse.swapaxes(1, 2) @ along.swapaxes(1, 2), stress, lost, margin
         )
@@ -265,25 +372,32 @@ def _onto_range(matrix: Floats) -> Floats:
     return np.asarray(kept @ kept.swapaxes(1, 2))
 
 
-def _least_energy(statics: _Statics, loops: Floats, path: Floats, compliance: Floats) -> tuple[Floats, Floats]:
-    """Forces in the elastic joints under unit loads, shape (n, joints, size), and the loops' wrenches."""
+def _least_energy(
+    statics: _Statics, loops: Floats, path: Floats, compliance: Floats, initial: Floats | None
+) -> tuple[Floats, Floats, Floats | None]:  # fmt: skip
+    """Forces in the elastic joints under all loads, shape (n, joints, loads), and the loops' wrenches.
+
+    The third result projects onto the states of self-stress that store no energy, shape (n, loops, loops).
+    """
     stress = statics.particular
     on_path, around = path.swapaxes(1, 2), loops.swapaxes(1, 2)
     bears = on_path - around @ stress
     # Where the loads and the loop wrenches cancel but for rounding, a joint bears exactly nothing, so that rigid
     # directions are exactly rigid.
-    largest = np.abs(stress).max(axis=(1, 2), keepdims=True, initial=0.0)
+    largest = np.abs(stress).max(axis=1, keepdims=True, initial=0.0)
     bears[np.abs(bears) <= RIGID * (np.abs(on_path) + np.abs(around).sum(axis=2, keepdims=True) * largest)] = 0.0
     if statics.stress is None:
-        return bears, stress
+        return bears, stress, None
     weighted = statics.stress @ loops
     energy = (weighted * compliance[:, None]) @ weighted.swapaxes(1, 2)
     values, vectors = np.linalg.eigh((energy + energy.swapaxes(1, 2)) / 2)
     most = STORED * ((loops**2).sum(axis=1) * compliance).max(axis=1, initial=0.0)
     kept = values > np.maximum(SELF_STRESS * values[:, -1:], most[:, None])
-    inverse = (vectors * np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
-    self_stress = statics.stress @ inverse @ (weighted @ (compliance[:, :, None] * bears))
-    return bears - loops.swapaxes(1, 2) @ self_stress, stress + self_stress
+    upright = vectors.swapaxes(1, 2)
+    inverse = (vectors * np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)[:, None]) @ upright
+    rigid = statics.stress - (vectors * kept[:, None]) @ upright
+    self_stress = statics.stress @ inverse @ (weighted @ _strained(compliance, bears, initial))
+    return bears - loops.swapaxes(1, 2) @ self_stress, stress + self_stress, rigid
 
 
 def _held(compliance: Floats, statics: _Statics, length: Value, size: int) -> Held:
@@ -329,17 +443,21 @@ class Effects:
         Places without a load of the points that `points_of` lists.
     moves : complex ndarray, shape (n, points, loads)
         Displacements of these points.
+    moved : ndarray, shape (n, loads, size)
+        Displacement of the asked point by loads that do not act on it alone.
     """
 
     forces: Floats
     places: Complexes
     moves: Complexes
+    moved: Floats
 
     @staticmethod
-    def unknown(network: Network, poses: int, loads: int) -> Effects:
+    def unknown(network: Network, poses: int, loads: int, size: int) -> Effects:
         """A record of effects to be filled, all nan."""
         nowhere = np.full((poses, len(points_of(network)), loads), complex(np.nan, np.nan))
-        return Effects(np.full((poses, len(joints_of(network)), loads, 3), np.nan), nowhere[:, :, 0].copy(), nowhere)
+        forces, moved = np.full((poses, len(joints_of(network)), loads, 3), np.nan), np.zeros((poses, loads, size))
+        return Effects(forces, nowhere[:, :, 0].copy(), nowhere, moved)
 
 
 def joints_of(network: Network) -> list[int]:
@@ -352,19 +470,24 @@ def points_of(network: Network) -> list[tuple[str, str, str]]:
     return [(link, point, vertex) for link, points in network.points.items() for point, vertex in points]
 
 
-def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configuration, loads: Floats) -> Effects:
-    """Effects of each load (fx, fy, mz) in a batch of poses; `loads` of shape (n, loads, 3)."""
-    size = loaded.wrenches.shape[3]
-    applied = loads[:, :, :size].swapaxes(1, 2)
+def moments_about(arm: Complexes, wrenches: Floats) -> Floats:
+    """Moments, shape (n, loads), of wrenches (n, 3, loads) about a place at an arm (n,) from where they are taken."""
+    return np.asarray(wrenches[:, 2] - (arm.real[:, None] * wrenches[:, 1] - arm.imag[:, None] * wrenches[:, 0]))
+
+
+def effects_of(network: Network, loaded: Loaded, at: str, configuration: Configuration, applied: Floats) -> Effects:
+    """Effects of loads in a batch of poses, each a sum of those of `Loaded`, shape (n, its loads, loads)."""
+    size = loaded.size
     origin = configuration.point(at)
-    effects = Effects.unknown(network, *loads.shape[:2])
+    effects = Effects.unknown(network, len(applied), applied.shape[2], size)
     for row, k in enumerate(joints_of(network)):
         wrench = loaded.wrenches[:, k] @ applied
-        arm = (configuration.point(network.edges[k].point) - origin)[:, None]
-        moment = wrench[:, 2] - (arm.real * wrench[:, 1] - arm.imag * wrench[:, 0])
+        moment = moments_about(configuration.point(network.edges[k].point) - origin, wrench)
         effects.forces[:, row] = np.stack([wrench[:, 0], wrench[:, 1], moment], axis=-1)
     for row, (_, point, vertex) in enumerate(points_of(network)):
         dx, dy, turn = np.moveaxis(loaded.displacements[vertex] @ applied, 1, 0)
         effects.places[:, row] = configuration.point(point)
         effects.moves[:, row] = dx + 1j * dy + 1j * turn * (effects.places[:, row] - origin)[:, None]
+    others = loaded.displacements[network.asked][:, :size, size:] @ applied[:, size:]
+    effects.moved[:] = others.swapaxes(1, 2)
     return effects

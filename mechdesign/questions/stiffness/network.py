@@ -12,7 +12,7 @@ to which each of them is hinged, unless one of them is the ground or the asked b
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -23,7 +23,7 @@ from mechdesign.mechanism.mechanism import Mechanism
 from mechdesign.mechanism.model import Drive, Fixed, Prismatic, Spring
 from mechdesign.mechanism.statics import PIN
 from mechdesign.numerics.arrays import Floats
-from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift, corners_of
+from mechdesign.questions.stiffness.elements import Beam, Bearing, Coil, Element, Guide, Hinge, Shift
 from mechdesign.questions.stiffness.schema import StiffnessSection
 
 # The body whose stiffness is computed, where it is not a link: a pin, or the end of an elastic link.
@@ -68,12 +68,15 @@ class Bodies:
         None for a pin.
     points : mapping of str to tuple of (str, str)
         Points of each moving link, with the vertices to which they belong.
+    pins : mapping of str to str
+        By point, the vertex on which a force at its pin acts.
     """
 
     edges: tuple[NetworkEdge, ...]
     asked: str
     link: str | None
     points: Mapping[str, tuple[tuple[str, str], ...]]
+    pins: Mapping[str, str]
 
     @cached_property
     def carrying(self) -> list[NetworkEdge]:
@@ -97,16 +100,19 @@ def is_pin(body: str) -> bool:
     return body.startswith(PIN)
 
 
-def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection) -> Bodies:
+def build_bodies(
+    mechanism: Mechanism, link: str | None, at: str, section: StiffnessSection, loaded: Collection[str] = ()
+) -> Bodies:
     """Bodies with all joints of a mechanism, the motors without a joint, and the beams of elastic links.
 
-    If the asked link is elastic, the asked body is its cross-section at the point `at`.
+    If the asked link is elastic, the asked body is its cross-section at the point `at`. At `loaded` points forces act
+    on the pin itself.
     """
     graph, description = mechanism.graph, mechanism.description
 
     holder = graph.holder
     asked = ASKED if link is None or link in section.elastic else holder(link, at)
-    builder = _Builder(mechanism, section, asked)
+    builder = _Builder(mechanism, section, asked, loaded)
     holders: dict[str, list[str]] = {}
     for body, point in graph.points:
         if ":" not in point:
@@ -143,22 +149,25 @@ def build_bodies(mechanism: Mechanism, link: str | None, at: str, section: Stiff
         builder.spring(spring, holders)
     for name in section.elastic:
         builder.beams(name)
-    return Bodies(tuple(builder.edges), asked, link, builder.points())
+    return Bodies(tuple(builder.edges), asked, link, builder.points(), builder.pins)
 
 
 @dataclass
 class _Builder:
     """Collects edges.
 
-    `riding` are the slides on each body, with the points that ride there; `held` are the drives that hold a joint.
+    `riding` are the slides on each body, with the points that ride there; `held` are the drives that hold a joint;
+    `pins` are the vertices on which forces at points act.
     """
 
     mechanism: Mechanism
     section: StiffnessSection
     asked: str
+    loaded: Collection[str]
     edges: list[NetworkEdge] = field(default_factory=list)
     riding: dict[str, dict[str, str]] = field(default_factory=dict)
     held: set[str | None] = field(default_factory=set)
+    pins: dict[str, str] = field(default_factory=dict)
 
     def join(
         self, a: str, b: str, elements: tuple[Element, ...], name: str, point: str, seat: str | None = None
@@ -180,13 +189,18 @@ class _Builder:
     def hinges(self, point: str, clusters: list[list[str]]) -> None:
         """Add the pin of clusters of bodies, with its bearing: between two, or between each of more and the pin."""
         if len(clusters) < 2:
+            for cluster in clusters:
+                self.pins[point] = self._vertex(self._hinged_body(cluster), point)
             return
         fixed = next((cluster for cluster in clusters if GROUND in cluster), None)
         hub = fixed or next((cluster for cluster in clusters if self.asked in cluster), None)
         # The ground and the asked body hold each cluster directly; an asked pin lies midway between two links.
         if hub is None or not (fixed or hub == [ASKED] or len(clusters) == 2 or point not in self.section.bearings):
-            hub = clusters[0] if len(clusters) == 2 else [PIN + point]
-        give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0) if hub == [ASKED] else 1.0
+            hub = clusters[0] if len(clusters) == 2 and point not in self.loaded else [PIN + point]
+        give = 0.5 if len(clusters) == 2 and is_pin(hub[0]) else 1.0
+        if hub == [ASKED]:
+            give = {2: 0.0, 3: 0.5}.get(len(clusters), 1.0)
+        self.pins[point] = self._vertex(self._hinged_body(hub), point)
         for cluster in clusters:
             if cluster is not hub:
                 drive = self._drive_between(hub, cluster)
@@ -227,7 +241,7 @@ class _Builder:
         """Add the beams of a link, from their beginning to each other point and to each slide on the link."""
         link = self.mechanism.description.links[name]
         body = rod_of(name) if link.telescopic else name
-        points = {point: point for point in corners_of(link)}
+        points = {point: point for point in link.corners}
         if not link.telescopic:
             points |= {point: point for point in link.points} | self.riding.get(name, {})
         root, *seats = points
@@ -307,6 +321,8 @@ class Network:
         The edges around each loop.
     points : mapping of str to tuple of (str, str)
         Points of each moving link, with the vertices to which they belong.
+    pins : mapping of str to str
+        By point, the vertex on which a force at its pin acts.
     """
 
     edges: tuple[NetworkEdge, ...]
@@ -314,6 +330,7 @@ class Network:
     paths: Mapping[str, EdgePath]
     loops: tuple[EdgePath, ...]
     points: Mapping[str, tuple[tuple[str, str], ...]]
+    pins: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def edges_along_beams(self) -> tuple[tuple[int, ...], ...]:
@@ -339,8 +356,13 @@ class Network:
         return signs
 
 
-def build_network(bodies: Bodies) -> Network:
-    """The network of a mechanism; parts that carry no load have no edges and move with the vertex they hang on."""
+def build_network(bodies: Bodies, *, whole: bool = False) -> Network:
+    """The network of a mechanism; parts that carry no load have no edges and move with the vertex they hang on.
+
+    It is `whole` where loads act anywhere.
+    """
+    if whole:
+        return _looped(tuple(_pinned(list(bodies.edges), bodies)), bodies)
     carrying = bodies.carrying
     # On a link that carries, an edge to an unloaded place stays: the beams before that place bend and move it.
     bent = {edge.name for edge in carrying if edge.beam}
@@ -395,4 +417,4 @@ def _looped(edges: tuple[NetworkEdge, ...], bodies: Bodies) -> Network:
                 for other, direction in path:
                     total[other] = total.get(other, 0) + sign * direction
             loops.append(tuple((e, s) for e, s in total.items() if s))
-    return Network(edges, bodies.asked, paths, tuple(loops), bodies.points)
+    return Network(edges, bodies.asked, paths, tuple(loops), bodies.points, bodies.pins)

@@ -8,10 +8,11 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from mechdesign.expressions import Number
+from mechdesign.expressions import Expression, Number
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.mechanism.model import Quantity
-from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.checker import NO_MOMENT, Checker
+from mechdesign.study.schema.loads import Load, check_loads
 from mechdesign.study.schema.poses import PoseSection
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
@@ -121,21 +122,20 @@ def _series(raw: Any, context: Context) -> float:
 _SERIES = {"anyOf": [fields.NUMBER_FORM, {"type": "array", "items": fields.NUMBER_FORM, "minItems": 1}]}
 
 
-_LOADS: fields.Form = {"type": "array", "items": {"type": "object", "title": "load"}}
+_SHORT_LOAD: fields.Form = {"type": "array", "items": fields.NUMBER_FORM, "minItems": 2, "maxItems": 3, "title": "load"}
 
 
-def _numbers(load: dict[str, Any], section: dict[str, Any]) -> list[Any]:
-    """A load by the names of its point and link as [fx, fy, mz]."""
-    force, moment = load.get("force"), load.get("moment")
-    if not load.keys() <= {"at", "force", "link", "moment"} or (force is None and moment is None):
-        raise failure("a load is [fx, fy, mz], {at: point, force: [fx, fy]} or {link: name, moment: mz}")
-    for key, place in (("at", force), ("link", moment)):
-        if (place is None) != (load.get(key) is None) or (place is not None and load[key] != section.get(key)):
-            what = f"its point, at: {section.get('at')}" if key == "at" else f"its link, link: {section.get('link')}"
-            raise failure(f"a force or moment of stiffness acts on {what}; for loads elsewhere ask dynamics")
-    if force is not None and (not isinstance(force, list) or len(force) != 2):
-        raise failure(f"a force is [fx, fy], not {fields.shown(force)}")
-    return [*(force or [0.0, 0.0]), 0.0 if moment is None else moment][: 3 if section.get("link") else 2]
+def _load(raw: Any, section: dict[str, Any]) -> Any:
+    """A load [fx, fy, mz] on the asked point in the form of all loads."""
+    if not isinstance(raw, list):
+        return raw
+    link = section.get("link")
+    if len(raw) not in ((2, 3) if link is None else (3,)):
+        raise failure(f"a load is [fx, fy, mz], not {len(raw)} numbers")
+    load = {"at": section.get("at"), "force": raw[:2]}
+    if link is None and raw[2:] not in ([], [0]):
+        raise failure(NO_MOMENT)
+    return load if link is None else {**load, "link": link, "moment": raw[2]}
 
 
 class StiffnessSection(PoseSection):
@@ -169,20 +169,46 @@ class StiffnessSection(PoseSection):
     """Angle from the world's x axis of the direction whose stiffness is k_direction. Left out: that column is not
     there. Example: 90
     """
-    loads: Annotated[tuple[tuple[fields.Number, ...], ...], fields.OrShort(_LOADS)] = ()
-    """Loads on the point, each a case of its own, [fx, fy, mz]; their deflections are reported. Without ``link`` [fx,
-    fy] is enough; {at: P, force: [fx, fy]} and {link: platform, moment: mz} are the same. Example: [[100, 0, 0], [0,
-    100, 0]] Example: [{at: P, force: [100, 0]}]
+    loads: tuple[Annotated[Load, fields.OrShort(_SHORT_LOAD)], ...] = ()
+    """Loads, each a case of its own; their deflections are reported. [fx, fy, mz] acts on the asked point; without
+    ``link`` [fx, fy] is enough. Others are those of kinematics: at any point, between two, on any link; on a link that
+    bends a moment acts at its first point. Example: [[100, 0, 0], [0, 100, 0]] Example: [{at: B, force: [100, 0]},
+    {link: crank, moment: 20*sin(theta)}]
+    """
+    dynamics: bool = False
+    """Whether what acts in the section dynamics (weights, inertia, springs and loads) is one more load, the last. Its
+    poses are then those of dynamics, unless the drives have constant rates or none. Example: true
     """
     characteristic_length: fields.PositiveLength | None = None
     """Length as which a radian counts; then the eigen-stiffnesses of ``link`` are reported. Example: 0.1"""
 
     @model_validator(mode="before")
     @classmethod
-    def _loads_in_numbers(cls, raw: Any) -> Any:
+    def _loads_in_full(cls, raw: Any) -> Any:
         if not isinstance(raw, dict) or not isinstance(raw.get("loads"), list):
             return raw
-        return {**raw, "loads": [_numbers(load, raw) if isinstance(load, dict) else load for load in raw["loads"]]}
+        # Without a point, which is a mistake of its own, a list of numbers acts nowhere.
+        loads = [_load(load, raw) for load in raw["loads"] if "at" in raw or not isinstance(load, list)]
+        return {**raw, "loads": loads}
+
+    @property
+    def wrenches(self) -> list[tuple[Number, Number, Number] | None]:
+        """Of each load fx, fy, mz on the asked point in numbers; None of one elsewhere, or that follows the pose."""
+        return [self._on_point(load) for load in self.loads] + [None] * self.dynamics
+
+    def _on_point(self, load: Load) -> tuple[Number, Number, Number] | None:
+        here = load.at in (None, self.at) and load.link in (None, self.link) and load.in_ is None
+        if not here or load.between is not None:
+            return None
+        numbers = {keys[-1]: quantity for keys, quantity, _ in load.numbers if not isinstance(quantity, Expression)}
+        if len(numbers) < len(list(load.numbers)):
+            return None
+        return numbers.get(0, 0.0), numbers.get(1, 0.0), numbers.get("moment", 0.0)
+
+    @property
+    def fallbacks(self) -> tuple[str, ...]:
+        """Sections whose poses it takes without any of its own."""
+        return ("dynamics",) * self.dynamics + super().fallbacks
 
     @property
     def point(self) -> str:
@@ -195,7 +221,7 @@ class StiffnessSection(PoseSection):
         return self.link or self.at.rpartition(".")[0] or None
 
     def checked(self, checker: Checker) -> Self:
-        """Also check names and the units of stiffnesses; loads get three numbers."""
+        """Also check names, the units of stiffnesses, and loads."""
         root: KeyPath = ("stiffness",)
         owners, ends = checker.mechanism.owners, checker.mechanism.ends
         right = checker.check_name(self.at, [*owners, *ends], "point", (*root, "at"))
@@ -233,8 +259,17 @@ class StiffnessSection(PoseSection):
                 checker.kind((*path, "moment"), "rotational_stiffness")
                 if joint not in slides:
                     checker.report((*path, "moment"), f"pin {joint!r} turns freely: it bears no moment")
-        loads = [
-            checker.load(load, (*root, "loads", index), on_pin=self.link is None)
-            for index, load in enumerate(self.loads)
-        ]
-        return super().checked(checker).model_copy(update={"loads": tuple(loads)})
+        check_loads(checker, self.loads, (*root, "loads"), moving=False, timed=False)
+        if self.dynamics:
+            self._check_dynamics(checker)
+        return super().checked(checker)
+
+    def _check_dynamics(self, checker: Checker) -> None:
+        """Check that there is a section of that name, and that its rates are known at the poses."""
+        own = checker.parts.get("dynamics")
+        checker.needs("dynamics", "'dynamics: true'", ("stiffness", "dynamics"))
+        pace = own if own is not None and own.moves else checker.parts.get("kinematics")
+        constant = pace is None or (pace.motion is None and not pace.inverse(checker.mechanism.drives))
+        if self.source is not None and not constant:
+            message = "the rates of dynamics are known at its own poses alone: leave out those of stiffness"
+            checker.report(("stiffness", "dynamics"), message)

@@ -117,14 +117,22 @@ def springs_table(study: Study, poses: Poses, legs: Sequence[str], springs: Spri
     ))  # fmt: skip
 
 
-def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats) -> Table:
-    """``deflections.csv``: a row a pose and load; `loads` of shape (poses, loads, 3)."""
+def deflections_table(study: Study, poses: Poses, loads: Floats, soft: Floats, others: Floats | None) -> Table:
+    """``deflections.csv``: a row a pose and load.
+
+    `loads` are those on the asked point, shape (poses, loads, 3), `others` what loads elsewhere move it, if there are
+    such, shape (poses, loads, 2 or 3).
+    """
     size = soft.shape[1]
     moved = np.einsum("nij,nlj->nli", soft, loads[:, :, :size]).reshape(-1, size)
+    if others is not None:
+        moved = moved + others.reshape(-1, size)
     repeat = np.repeat(np.arange(poses.count), loads.shape[1])
     names = (*("fx", "fy", "mz")[:size], *("dx", "dy", "dphi")[:size])
     values = (*loads.reshape(-1, 3).T[:size], *moved.T)
     columns = DEFLECTIONS.columns(study.units.labels | {"as radians": "rad"}, **dict(zip(names, values, strict=True)))
+    if others is not None:
+        return DEFLECTIONS.table([*_of_loads(study, poses, loads.shape[1], 1), *columns])
     return DEFLECTIONS.table([*pose_columns(study, poses, repeat), *columns])
 
 

@@ -12,6 +12,7 @@ from mechdesign.mechanism.coordinates import Coordinate
 from mechdesign.numerics.arrays import Complexes, Floats, Ints
 from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.ranged import Ranged
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.region.field import Field
 from mechdesign.region.patches import Patch
 from mechdesign.study import Study
@@ -107,11 +108,10 @@ def poses_along(study: Study, held: Mapping[str, float], boundary: Boundary) -> 
 
     `held` are the coordinates that are held, in the study's units; pieces that are left out do not count.
     """
-    assert study.workspace is not None
-    mechanism, point = study.mechanism, study.workspace.point
-    own = boundary.piece == 1 if study.workspace.assembly == "same" else np.ones(len(boundary.z), dtype=bool)
+    mechanism, section = study.mechanism, WorkspaceSection.of(study)
+    own = boundary.piece == 1 if section.assembly == "same" else np.ones(len(boundary.z), dtype=bool)
     places = _places(boundary.z[own], boundary.side[own], boundary.curve[own])
-    plan = mechanism.plan((f"{point}.x", f"{point}.y", *held))
+    plan = mechanism.plan((f"{section.point}.x", f"{section.point}.y", *held))
     values = [radians(study, mechanism.coordinate(name), value) for name, value in held.items()]
     return plan.solve([places.real, places.imag, *values], limits=False)
 

@@ -15,6 +15,7 @@ from mechdesign.mechanism.algebra import Value, quiet
 from mechdesign.mechanism.configuration import Configuration
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.columns import power_of_length
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.local import Local
 from mechdesign.region.field import Field
 
@@ -125,8 +126,7 @@ def of_compliance(study: Study, value: Callable[[Floats], Floats], free: float) 
     """
     from mechdesign.questions.stiffness.body import ask, hold
 
-    section = study.stiffness
-    assert section is not None
+    section = StiffnessSection.of(study)
     if not (section.elastic or section.actuators or section.bearings):
         message = "indices of stiffness need something that gives: elastic links, actuators or bearings"
         raise StudyError((study.problem(message, "stiffness"),))

@@ -136,7 +136,7 @@ def _at_ends(panels: Panels, indices: Sequence[Prepared], value: Floats, order: 
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 near, far = np.broadcast_to(np.asarray(index.values(local), dtype=float), radius.shape)
                 power = np.log(far / near) / np.log(NEAR[1] / NEAR[0])
-            vanishes, grows = power > POWER, power < -POWER
+            vanishes, grows = power > POWER, (power < -POWER) & (index.index.bounds[1] == np.inf)
             value[0, k, design[ray[vanishes]]] = 0.0
             value[1, k, design[ray[grows]]] = np.inf
             np.maximum.at(order[k], design[ray[grows]], np.round(-2 * power[grows]) / 2)
@@ -222,7 +222,9 @@ def _climb(
         back = np.where(u[corner] < 0.5, BACK * EDGE_U, 1 - BACK * EDGE_U)
         with np.errstate(invalid="ignore", divide="ignore"):
             power = np.log(best[corner] / look(corner, back[None], v[corner][None])[0]) / np.log(BACK)
-        endless[corner] = sign[corner] * power > POWER
+        # What has an upper bound may grow in a corner, but not without end.
+        unbounded = np.array([index.index.bounds[1] == np.inf for index in indices])[which[corner]]
+        endless[corner] = (sign[corner] * power > POWER) & ((sign[corner] < 0) | unbounded)
     return np.where(endless, np.where(sign > 0, np.inf, 0.0), sign * best), np.where(endless, 0.0, doubt)
 
 

@@ -17,6 +17,7 @@ from mechdesign.mechanism.outputs import first
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.columns import PATH, PATH_INDICES
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.results import Result
 from mechdesign.study import Study
 from mechdesign.study.poses import Poses
@@ -77,9 +78,8 @@ def point_path(study: Study) -> Result:
     AssemblyError
         If no pose within the limits can be assembled.
     """
-    assert study.workspace is not None
-    (drive,) = study.mechanism.drives
-    outputs = (f"{study.workspace.point}.x", f"{study.workspace.point}.y")
+    (drive,), point = study.mechanism.drives, WorkspaceSection.of(study).point
+    outputs = (f"{point}.x", f"{point}.y")
     paths = _paths(study, drive, outputs)
     label, length = study.units.label(study.mechanism.quantity(drive)), study.units.label("length")
     power = "" if study.mechanism.quantity(drive) == "length" else length

@@ -14,7 +14,7 @@ from mechdesign.numerics.arrays import Flags
 from mechdesign.questions.poses import radians
 from mechdesign.questions.workspace.index import Prepared, prepare
 from mechdesign.questions.workspace.ranged import Every, Ranged, Some, SomeDesigns
-from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.questions.workspace.strips import Integrand
 from mechdesign.region.rays import Designs
 from mechdesign.region.regions import Region, problem, regions
@@ -159,17 +159,17 @@ def _over_range(
     study: Study, name: str, over: Over, tolerance: float, wanted: Sequence[str]
 ) -> Iterator[Question]:  # fmt: skip
     """One question a value of the other held coordinates."""
-    assert study.workspace is not None
+    section = WorkspaceSection.of(study)
     for column in wanted:
         if column not in OF_RANGE:
             only = f"over a range of {name} there are {', '.join(OF_RANGE)} only"
             raise problem(study, "at", f"{column} has no value: {only}; ask for single values: at: {{{name}: [...]}}")
     # Only the area is asked, in which angles and lengths do not mix.
-    update = {"at": {**study.workspace.at, name: (over.from_,)}, "indices": (),
-              "characteristic_length": study.workspace.characteristic_length or 1.0}  # fmt: skip
+    update = {"at": {**section.at, name: (over.from_,)}, "indices": (),
+              "characteristic_length": section.characteristic_length or 1.0}  # fmt: skip
     coordinate = study.mechanism.coordinate(name)
     low, high = (float(np.asarray(radians(study, coordinate, np.asarray(v)))) for v in (over.from_, over.to))
-    single = replace(study, workspace=study.workspace.model_copy(update=update))
+    single = replace(study, workspace=section.model_copy(update=update))
     for question in questions(single, tolerance, wanted):
         base = question.field
         if base.plan.iterative:
@@ -179,6 +179,6 @@ def _over_range(
             )
             raise StudyError((Problem(message, f"workspace.at.{name}", str(study.path or "")),))
         common = base.mechanism, base.plan, base.held, base.same_assembly, base.length
-        field = (Every if over.all else Some)(*common, list(study.workspace.at).index(name), low, high)
+        field = (Every if over.all else Some)(*common, list(section.at).index(name), low, high)
         held = {k: v for k, v in question.held.items() if k != name}
         yield replace(question, field=field, held=held, rays_through=Designs if over.all else SomeDesigns)

@@ -87,6 +87,6 @@ def reach(question: Question) -> Reached:
     if ranged:
         return region
     return replace(
-        region, shapes=inscribed(given.panels), nodes=nodes_of(field, question.shown, patches),
+        region, shapes=inscribed(evaluation.panels), nodes=nodes_of(field, question.shown, patches),
         loci=loci(field, reasons, patches, singular=singular),
     )  # fmt: skip

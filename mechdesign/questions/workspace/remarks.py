@@ -14,7 +14,7 @@ from mechdesign.questions.workspace.quadrature import FINEST_AREA
 from mechdesign.questions.workspace.question import Question
 from mechdesign.questions.workspace.ranged import Ranged
 from mechdesign.questions.workspace.reached import Reached
-from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.study import Study
 
 # An area is doubtful whose error is a larger part of it.
@@ -78,8 +78,7 @@ def rough(name: str, regions: Sequence[Reached]) -> Iterator[Caution]:
 
 def unreachable(study: Study, questions: Sequence[Question]) -> AssemblyError:
     """The error where no region has a place."""
-    section, question = study.workspace, questions[0]
-    assert section is not None
+    section, question = WorkspaceSection.of(study), questions[0]
     for name, over in section.at.items():
         if isinstance(over, Over):
             held = "".join(f", {key} = {value:g}" for key, value in question.held.items())

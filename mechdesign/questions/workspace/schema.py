@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from mechdesign.indices import INDEX_NAMES, needed_section
 from mechdesign.study.schema.checker import Checker
+from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
@@ -96,9 +97,10 @@ At = Annotated[Annotated[Over, Tag("over")] | Annotated[fields.Numbers, Tag("val
 _Index = Annotated[str, fields.choice(INDEX_NAMES, "local index")]
 
 
-class WorkspaceSection(fields.Model):
+class WorkspaceSection(Section):
     """The region that a point can reach, and indices of how well the mechanism works there."""
 
+    command: ClassVar[str] = "workspace"
     point: fields.EndName
     """Point whose region is asked for; the mechanism has two degrees of freedom or more. Example: C"""
     at: dict[fields.CoordinateName, At] = Field(default_factory=dict)

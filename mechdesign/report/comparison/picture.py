@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from mechdesign.numerics.arrays import Floats
 from mechdesign.report.comparison.differences import Difference
 from mechdesign.report.figures import style
 from mechdesign.report.figures.panels import MAX_PANELS
@@ -18,6 +19,7 @@ _MARGINS = {"left": 0.95, "right": 0.25, "top": 0.85, "bottom": 0.6}
 _ACROSS = 0.95
 _DOWN = 0.95
 _TITLE_SIZE = 9.0
+_ALIKE = 0.03  # of their range: curves that are nearer to each other cannot be told apart
 
 
 def differences_figure(moved: Sequence[Difference]) -> Figure:
@@ -38,9 +40,13 @@ def differences_figure(moved: Sequence[Difference]) -> Figure:
             axes.set_ylabel(style.axis_label("new", difference.unit))
         else:
             order = np.argsort(difference.along.values, kind="stable")
-            looks = (("old", style.BLUE, style.DASHES[0]), ("new", style.VERMILION, style.DASHES[1]))
-            for values, (name, color, dashes) in zip(difference.values, looks, strict=True):
-                axes.plot(difference.along.values[order], values[order], color=color, linestyle=dashes, label=name)
+            x, (old, new) = difference.along.values[order], (values[order] for values in difference.values)
+            if _alike(old, new):
+                axes.plot(x, new - old, color=style.VERMILION, label="new − old")
+                axes.axhline(0.0, color=style.FAINT, linewidth=1.0, zorder=1)
+            else:
+                axes.plot(x, old, color=style.BLUE, linestyle=style.DASHES[0], label="old")
+                axes.plot(x, new, color=style.VERMILION, linestyle=style.DASHES[1], label="new")
             axes.set_xlabel(style.axis_label(difference.along.name, difference.along.unit))
             axes.set_ylabel(style.axis_label("value", difference.unit))
             axes.legend(loc="best")
@@ -49,5 +55,12 @@ def differences_figure(moved: Sequence[Difference]) -> Figure:
     style.name_powers(panels)
     left = len(moved) - len(shown)
     more = f"; {left} more in differences.csv" if left else ""
-    figure.text(0.01, 1 - 0.1 / figure.get_figheight(), f"what moved most{more}", va="top", fontsize=11)
+    figure.text(0.01, 1 - 0.1 / figure.get_figheight(), f"What moved most{more}", va="top", fontsize=11)
     return figure
+
+
+def _alike(old: Floats, new: Floats) -> bool:
+    """Whether two curves lie over each other, so that only their difference is seen."""
+    apart, both = np.abs(new - old), np.concatenate([old, new])
+    known = both[np.isfinite(both)]
+    return bool(len(known) and np.nanmax(apart, initial=0.0) < _ALIKE * np.ptp(known))

@@ -18,7 +18,7 @@ from mechdesign.questions.reliability.schema.variation import LOADS, Dimension
 from mechdesign.questions.stiffness.schema import Profile
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.framing import framed
+from mechdesign.report.figures.framing import LEFT, RIGHT, framed
 from mechdesign.report.figures.labels import covered, paper, place_labels
 from mechdesign.report.figures.scene import Scene, hull, pose
 from mechdesign.report.figures.shapes import link_colors, link_labels, point_labels
@@ -52,9 +52,13 @@ def dimensions_figure(study: Study) -> Figure:
     mechanism, unit = study.mechanism, study.units.label("length")
     scene = pose(mechanism, mechanism.sketch_configuration)
     assert scene is not None
-    figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=_TITLE, pad=0.75)
+    title = f"Dimensions{f' in {unit}' if unit else ''}, in the sketch pose"
+    title += "; lengths of guides are not to scale" * bool(scene.guides)
+    title = style.folded(title, 11.0, style.width() - LEFT - RIGHT)
+    above = _TITLE + style.line(11.0) * title.count("\n")
+    figure, axes = framed(scene.places({}), unit, height=_HEIGHT, above=above, pad=0.75)
     axes.grid(visible=False)
-    axes.set_title(f"Dimensions{f' in {unit}' if unit else ''}, in the sketch pose", loc="left")
+    axes.set_title(title, loc="left")
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration, labels=False, drives=False)
     net = covered(axes)
     boxes: list[Floats] = []

@@ -13,6 +13,7 @@ from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.question import OF_DYNAMICS, ORDERS
 from mechdesign.questions.reliability.schema.limits import SUFFIXES as ORDER_SUFFIXES
 from mechdesign.questions.reliability.schema.methods import METHODS, Method
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.reliability.tables import Samples
 from mechdesign.report.figures import style
 from mechdesign.results import Table
@@ -97,8 +98,7 @@ def error_limits(study: Study, tables: Mapping[str, Table], output: str, order: 
 
     Shape (2, poses), or (2, 1) where they are those of all poses.
     """
-    section = study.reliability
-    assert section is not None
+    section = ReliabilitySection.of(study)
     band = section.limits.get(f"{output}{SUFFIXES[order]}")
     if band is not None and band.absolute:
         table = tables["capability"]

@@ -14,7 +14,7 @@ from mechdesign.mechanism.model import Fixed
 from mechdesign.numerics.arrays import evenly
 from mechdesign.questions.dynamics.analysis import DrawnForces
 from mechdesign.questions.dynamics.free_bodies import mass_centers
-from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.questions.kinematics.drawn import DrawnPoses
 from mechdesign.questions.poses import Shown, solve_rows, solve_shown
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
@@ -26,7 +26,7 @@ from mechdesign.results import Result
 from mechdesign.study import Study
 
 Panel = tuple[str, Configuration, int]
-SKETCH_POSE = "sketch pose"
+SKETCH_POSE = "Sketch pose"
 _POSES = 100  # poses from which the range of the motion is taken
 _TITLE = 0.42  # inches
 _TITLE_LINE = 0.18  # inches, a further line of a title
@@ -49,7 +49,7 @@ def mechanism_figure(study: Study, result: Result) -> Figure:
         scenes = [pose(study.mechanism, configuration) for configuration in (sketch, worst[1])]
         if scenes[1] is not None:
             return _compose(study, [(SKETCH_POSE, sketch, 0), (*worst, 0)], travels(scenes))
-    shown = result.drawn.shown if isinstance(result.drawn, DrawnMotion | DrawnForces) else None
+    shown = result.drawn.shown if isinstance(result.drawn, DrawnPoses) else None
     return sketch_and_first_pose(study, shown, masses=isinstance(result.drawn, DrawnForces))
 
 
@@ -72,10 +72,10 @@ def sketch_and_first_pose(
     poses = {k: pose(mechanism, sweep.configuration, k) for k in some}
     first = next((k for k, scene in poses.items() if scene is not None), None)
     if first is not None:
-        note = "first pose" if first == 0 else "first pose that can be assembled"
+        note = "First pose" + " that can be assembled" * (first > 0)
         if _same(scenes[0], poses[first]):
             panels = []
-            note = f"{title.removesuffix(' pose')} and {note}"
+            note = f"{title.removesuffix(' pose')} and {note.lower()}"
         panels.append((f"{note}: {sweep.words(first)}", sweep.configuration, first))
         scenes += poses.values()
     return _compose(study, panels, travels(scenes), masses)
@@ -95,7 +95,7 @@ def _worst(study: Study, result: Result) -> tuple[str, Configuration] | None:
     if not np.isfinite(failure).any():
         return None
     row = int(np.nanargmax(failure)) if drawn.samples is None else drawn.samples.pose
-    return followed_in_words(study, poses, row), solve_rows(study, poses, np.array([row]))
+    return f"Errors at {followed_in_words(study, poses, row)}", solve_rows(study, poses, np.array([row]))
 
 
 def sketch_figure(study: Study) -> Figure:
@@ -114,7 +114,7 @@ def sketch_figure(study: Study) -> Figure:
     axes.plot(
         crosses.real, crosses.imag, "x", color=style.INK, alpha=0.5, markersize=7, markeredgewidth=1.6, zorder=4.5
     )
-    axes.set_title("the sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
+    axes.set_title("The sketch, assembled" + ("; crosses: where it is drawn" if len(rough) else ""), loc="left")
     _draw_beams(axes, study, mechanism.sketch_configuration)
     draw_mechanism(axes, mechanism, mechanism.sketch_configuration)
     return figure
@@ -178,11 +178,11 @@ def _draw_beams(axes: Axes, study: Study, configuration: Configuration, index: i
 
 def _lines(study: Study, name: str, configuration: Configuration, index: int) -> Iterator[tuple[str, np.ndarray]]:
     """The beams of a link, all in one line, and its brackets."""
-    from mechdesign.questions.stiffness.elements import beam_line, corners_of
+    from mechdesign.questions.stiffness.elements import beam_line
 
     mechanism = study.mechanism
     link = mechanism.description.links[name]
-    corners = corners_of(link)
+    corners = link.corners
     yield "elastic beam", np.array([np.ravel(configuration.point(corner))[index] for corner in corners])
     if link.telescopic or len(corners) < 2:
         return

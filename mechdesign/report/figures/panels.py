@@ -40,6 +40,7 @@ _BAR = 1.1
 _MAP_TOP = 0.7
 _MAP_GAP = 0.5
 _MAX_MAP_HEIGHT = 5.2
+_MAX_SHEET_HEIGHT = 7.6  # of two rows of maps
 _FLAT = 0.8  # height over width below which two maps stand one below the other
 _EDGE_OF_MAP = 0.02  # of its size, beyond the region
 _NARROW = 10.0  # ratio of values up to which levels are at even steps
@@ -178,14 +179,15 @@ def legend_below(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) 
 def legend_at_left(figure: Figure, handles: Sequence[Line2D], columns: int, **look: Any) -> None:
     """One legend at the bottom from the left edge of drawings on; a narrow page has as many columns as it holds."""
     labels = [str(handle.get_label()) for handle in handles]
-    style.grow(figure, below=legend_room(labels))
-    figure.legend(handles, labels, loc="lower left", ncols=fitting(labels) if style.narrow() else columns,
+    style.grow(figure, below=legend_room(labels, LEFT))
+    columns = fitting(labels, style.width() - LEFT) if style.narrow() else columns
+    figure.legend(handles, labels, loc="lower left", ncols=columns,
                   bbox_to_anchor=(LEFT / style.width() - 0.02, 0.0), **look)  # fmt: skip
 
 
-def legend_room(labels: Sequence[str]) -> float:
-    """Inches below the panels that a legend needs beyond those it needs on a wide page."""
-    rows = (-(-len(labels) // fitting(labels, wide)) for wide in (style.width(), style.LOOKS["screen"].width))
+def legend_room(labels: Sequence[str], indent: float = 0.0) -> float:
+    """Inches below the panels that a legend needs beyond those it needs on a wide page; it begins at an indent."""
+    rows = (-(-len(labels) // fitting(labels, wide - indent)) for wide in (style.width(), style.LOOKS["screen"].width))
     narrow, wide = rows
     return _LEGEND_ROW * (narrow - wide)
 
@@ -269,7 +271,8 @@ def map_sheet(
     columns = 1 if style.narrow() or flat else min(len(panels), 2)
     lines = -(-len(panels) // columns)
     wide = (style.width() - 0.1) / columns - _MAP_LEFT - _BAR
-    tall = min(_MAX_MAP_HEIGHT / min(lines, 2), wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide)
+    shape = wide * float(spans[1] / spans[0]) * 1.02 if over.equal else 0.8 * wide
+    tall = min(_MAX_MAP_HEIGHT, _MAX_SHEET_HEIGHT / min(lines, 2), shape)
     tall = max(min(tall, (style.tallest() - _MAP_TOP - _MAP_BELOW) / lines - _MAP_BELOW - _MAP_GAP), 1.2)
     # Of equal scales the height decides: the bar stands beside the map.
     slack = max(0.0, wide - tall * float(spans[0] / spans[1])) if over.equal and columns == 1 else 0.0

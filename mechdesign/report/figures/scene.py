@@ -56,7 +56,8 @@ class Guide:
 class Wheels:
     """Pitch circles of two links, or of a wheel and the line of a rack, where they touch.
 
-    `radii` and `axes` are those of both links; the radius of a rack is 0, and its axis where it slides.
+    `radii` and `axes` are those of both links; the radius of a rack is 0, and its axis where it slides. A belt has two
+    straight parts, `strands`.
     """
 
     links: tuple[str, str]
@@ -64,7 +65,7 @@ class Wheels:
     radii: tuple[float, float]
     touch: complex
     along: complex
-    belt: bool
+    strands: tuple[tuple[complex, complex], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,9 @@ def pose(mechanism: Mechanism, configuration: Configuration, index: int = 0) -> 
         touch, along = (pick(value) for value in mesh.contact(configuration))
         one, other = (pick(configuration.nodes[node]) for node in mesh.axes)
         first, second = (float(pick(radius).real) for radius in mesh.radii(configuration))
-        wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, mesh.belt))
+        sides = [mesh.strand(configuration, side) for side in (1.0, -1.0) if mesh.belt]
+        strands = [(pick(begin), pick(end)) for begin, end, _ in sides]
+        wheels.append(Wheels(mesh.links, (one, other), (first, second), touch, along, tuple(strands)))
     return Scene(description, points, rotations, tuple(guides), span, tuple(wheels))
 
 

@@ -196,23 +196,11 @@ def _wheels(wheels: Wheels, colors: Mapping[str, str], span: float) -> list[Shap
     for link, axis, radius in zip(wheels.links, wheels.axes, wheels.radii, strict=True):
         if radius:
             rim = (axis + radius * circle).tolist()
-            shapes.append(Line(rim, colors[link], 1.2, 0.05, link, dashes="-" if wheels.belt else _PITCH))
+            shapes.append(Line(rim, colors[link], 1.2, 0.05, link, dashes="-" if wheels.strands else _PITCH))
         else:
             ends = wheels.touch - _RACK * span * wheels.along, wheels.touch + _RACK * span * wheels.along
             shapes.append(Line(ends, colors[link], 1.2, 0.05, link, dashes=_PITCH))
-    if wheels.belt:
-        shapes += [Line(side, style.INK, 1.4, 0.06) for side in _belt(wheels)]
-    return shapes
-
-
-def _belt(wheels: Wheels) -> list[tuple[complex, complex]]:
-    """The two straight parts of an open belt."""
-    (one, other), (first, second) = wheels.axes, wheels.radii
-    way = (other - one) / abs(other - one)
-    lean = math.acos(max(-1.0, min(1.0, (first - second) / abs(other - one))))
-    return [
-        (one + first * way * turn, other + second * way * turn) for turn in (cmath.rect(1, lean), cmath.rect(1, -lean))
-    ]
+    return shapes + [Line(strand, style.INK, 1.4, 0.06) for strand in wheels.strands]
 
 
 def _rectangle(half: float, high: float) -> tuple[complex, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
@@ -22,7 +23,7 @@ from mechdesign.questions.optimize.judge import Designs
 from mechdesign.questions.optimize.stacked import grouped
 from mechdesign.questions.optimize.variables import parted
 from mechdesign.report.figures.scene import Sweep, pose
-from mechdesign.report.page.frames import near_the_paths
+from mechdesign.report.page.frames import near_the_paths, paths_of
 from mechdesign.report.page.linkage import Sheet, Sketcher, add
 from mechdesign.report.page.moving import gaps
 from mechdesign.report.page.tracks import TIMES, Cell, Moving, Numbers, deltas, places
@@ -155,7 +156,7 @@ def _moved(study: Study, poses: Poses) -> list[Sweep]:
     curve = Curve(study, poses)
     places = evenly(poses.line, MAX_POSES).astype(float)
     if not curve.spent.any():
-        places = near_the_paths(curve, study.mechanism.points, places, MAX_POSES)
+        places = near_the_paths(curve, partial(paths_of, curve, study.mechanism.points), places, MAX_POSES)
     if poses.closed:
         places = np.append(places, poses.end)
     _, configuration = curve.solve(*curve.grid(places), turning=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import tostring
@@ -11,36 +12,43 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from mechdesign.mechanism import Reason
-from mechdesign.mechanism.derivatives import STALLED, regularity
-from mechdesign.mechanism.outputs import first
-from mechdesign.numerics.arrays import Floats, evenly
-from mechdesign.questions.kinematics.drawn import DrawnMotion
+from mechdesign.numerics.arrays import Complexes, Floats, evenly
+from mechdesign.questions.dynamics.figures.free_bodies import LOOKS
+from mechdesign.questions.kinematics.drawn import DrawnMotion, DrawnPoses
 from mechdesign.questions.kinematics.figures.curves import curves_figure
 from mechdesign.questions.kinematics.figures.paths import path_looks
-from mechdesign.questions.kinematics.rates import drive_rates
+from mechdesign.questions.kinematics.motion import Motion
 from mechdesign.questions.optimize.analysis import DrawnDesigns
-from mechdesign.questions.outputs import expand_outputs
-from mechdesign.questions.poses import SolvedPoses
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.panels import abscissa, round_down
 from mechdesign.report.figures.scene import Scene, Sweep, pose
 from mechdesign.report.page.axes import box
-from mechdesign.report.page.frames import frames
+from mechdesign.report.page.frames import frames, largest
 from mechdesign.report.page.linkage import Sheet, Sketcher
 from mechdesign.report.page.roaming import roaming
-from mechdesign.report.page.tracks import PLACES, TIMES, Cell, Moving, Numbers, deltas, meanings, places
+from mechdesign.report.page.tracks import PLACES, ROWS, TIMES, Cell, Moving, Numbers, deltas, meanings, places
 from mechdesign.report.page.vector import described, inline
 from mechdesign.results import Column, Result, Table
-from mechdesign.study import Study
+from mechdesign.study import Poses, Study
+from mechdesign.study.schema.poses import MotionSection
 
-_COMMON = 0.9  # quantile of the speeds whose arrow has the usual length
 _FEW_POSES = 24  # whose guides fit into the window, and in which names avoid the links
 # Duration of a motion on the screen (s): without rates, and the range in which its own duration is kept.
 _SECONDS = 5.0
 _SHORTEST, _LONGEST = 2.0, 12.0
 _ASTRAY = 0.05  # squared deviation of a step from what the rates predict, as a part of the squared step
-_ARROW = 70.0  # length of the arrow of a usual velocity
+_ARROW, _SHARE = 90.0, 0.3  # length of the longest arrow, and the part of a low drawing's height that it has at most
+# What vectors are called, and the colours of their arrows.
+_ARROWS = {
+    "velocity": ("Velocities", style.VERMILION),
+    "joint": ("Joint forces", LOOKS["joint"].color),
+    "weight": ("Weights", LOOKS["weight"].color),
+    "inertia": ("Inertia", LOOKS["inertia"].color),
+    "load": ("Loads", LOOKS["load"].color),
+    "spring": ("Springs", LOOKS["spring"].color),
+    "shaking": ("Shaking force", style.PURPLE),
+}
 _WHY = {
     Reason.NOT_CLOSED: "cannot be assembled here",
     Reason.OTHER_ASSEMBLY: "in another assembly only",
@@ -66,17 +74,17 @@ def moving(
             return None
         study, result = best.study, judged
     with style.context():
-        if isinstance(result.drawn, DrawnMotion) and result.drawn.shown.poses.motion:
+        if isinstance(result.drawn, DrawnPoses) and result.drawn.shown.poses.motion:
             return _motion(study, result, result.drawn, f"{command}-curves", before, marked)
         return roaming(study, result, command) if "local" in result.tables else None
 
 
 def _motion(
-    study: Study, result: Result, drawn: DrawnMotion, name: str, before: Before | None, marked: Sequence[float]
+    study: Study, result: Result, drawn: DrawnPoses, name: str, before: Before | None, marked: Sequence[float]
 ) -> Moving | None:  # fmt: skip
     """The mechanism along its sweep or path, with the curves of its outputs."""
     whole = Sweep.of(drawn.shown)
-    sweep, table = frames(drawn, result.tables["motion"], marked)
+    sweep, motion, table = frames(drawn, result.tables[drawn.name], marked)
     if not len(sweep.valid) or len(sweep.rows) < 2:
         return None
     begin = int(sweep.valid[0])
@@ -89,7 +97,10 @@ def _motion(
     headings, rows = _rows(table, numbers)
     data: dict[str, Any] = {"poses": len(sweep.rows), "first": begin, "returns": whole.returns}
     data |= places(sheet, sweep.configuration, sweep.mechanism.description.links)
-    data |= {"gaps": gaps(sweep), **_time(study, sweep, table, whole.returns), **_arrows(study, sweep)}
+    section = motion.question.section
+    data |= {"gaps": gaps(sweep), **_time(study, section, sweep, table, whole.returns)}
+    data |= {"arrows": _arrows(drawn, motion, sweep, sheet), "rows": deltas(sweep.poses.numbers[sweep.rows], ROWS)}
+    data["course"] = _course(whole.poses)
     data["given"] = []
     for column in [table.column(name) for name in sweep.poses.named if name in table]:
         unit = numbers.cell(column).unit
@@ -99,13 +110,14 @@ def _motion(
         tuple(name for name in names if name in table) for names in (sweep.poses.values, study.mechanism.drives)
     )
     data["keys"] = [[[name, *numbers.scaled[name][::2]] for name in key] for key in keys if key]
-    speed = study.kinematics.speed if study.kinematics is not None else None
-    over, looks = abscissa(study, sweep.poses, speed), path_looks(whole)
+    over, looks = abscissa(study, sweep.poses, section.speed), path_looks(whole)
     own = table.column(over.name) if over.name in table else Column(over.label, over.values, "")
     which = numbers.add(own)
     data["over"] = [over.label, which, numbers.scaled[own.name][2], own.name in sweep.poses.values]
     data["traced"] = [[look.point, look.color] for look in looks if look.rank == looks[-1].rank]
-    figure, beside = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before), ""
+    figure, beside, data["dots"] = None, "", []
+    if isinstance(drawn, DrawnMotion):
+        figure = curves_figure(study, {**result.tables, "motion": table}, sweep.poses, before)
     if figure is not None:
         beside = inline(figure, name, described(figure))
         data["dots"] = _dots(figure, table, numbers)
@@ -156,11 +168,17 @@ def _rows(table: Table, numbers: Numbers) -> tuple[list[str], list[tuple[str, li
     return ["value", *kinds[1:]], rows
 
 
-def _time(study: Study, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
-    """Time of each pose, of a motion over time or from the rates of the study if these follow it; else even."""
-    section, unit = study.kinematics, study.units.label("time")
+def _course(poses: Poses) -> str:
+    """What two questions along the same motion have in common."""
+    parts = [part for name, values in poses.named.items() for part in (name.encode(), values.tobytes())]
+    return hashlib.sha256(b" ".join(parts)).hexdigest()[:16]
+
+
+def _time(study: Study, section: MotionSection, sweep: Sweep, table: Table, returns: bool) -> dict[str, Any]:
+    """Time of each pose, of a motion over time or from the rates of a section if these follow it; else even."""
+    unit = study.units.label("time")
     timed = None if sweep.poses.times is None else sweep.poses.times[sweep.rows]
-    steps, own = _steps(sweep, table, section.rates if section else {}) if timed is None else np.diff(timed), None
+    steps, own = _steps(sweep, table, section.rates) if timed is None else np.diff(timed), None
     times = np.linspace(0, 1, len(sweep.rows)) if steps is None else np.append(0.0, np.cumsum(np.abs(steps)))
     if sweep.poses.closed:
         times = np.append(times, times[-1] + np.diff(times).mean())
@@ -205,30 +223,28 @@ def _steps(sweep: Sweep, table: Table, rates: Mapping[str, float]) -> Floats | N
     return np.where(finite, times, np.nanmedian(times))
 
 
-def _arrows(study: Study, sweep: Sweep) -> dict[str, Any]:
-    """Velocities of the moving points as arrows of the drawing, and the length of a round one; empty without rates."""
-    section, configuration = study.kinematics, sweep.configuration
-    if section is None or not section.rated:
-        return {}
-    linear = sweep.mechanism.linearize(configuration)
-    solved = SolvedPoses(sweep.rows, sweep.poses.groups[0].names, configuration)
-    velocity = linear.velocity(drive_rates(study, section, sweep.poses, solved, linear).velocities)
-    regular = configuration.valid & (regularity(linear) >= STALLED)
-    velocities = {}
-    for point in sweep.places:
-        x, y = (first(configuration, coordinate, velocity) for coordinate in expand_outputs(study, (point,)))
-        velocities[point] = np.where(regular, x + 1j * y, np.nan)
-    speeds = np.abs(np.concatenate(list(velocities.values())))
-    speeds = speeds[np.isfinite(speeds)]
-    if not speeds.any():
-        return {}
-    # Near a dead centre velocities grow without bound: their arrows leave the drawing.
-    usual = float(np.quantile(speeds, _COMMON)) or float(speeds.max())
-    scale, length = _ARROW / usual, round_down(usual)
-    unit = style.printed(study.units.label("velocity"))
-    arrows = {point: [deltas(rates.real * scale, PLACES), deltas(-rates.imag * scale, PLACES)]
-              for point, rates in velocities.items()}  # fmt: skip
-    return {"arrows": arrows, "arrow": [round(length * scale, 1), f"{length:g} {unit}".rstrip()]}
+def _arrows(drawn: DrawnPoses, motion: Motion, sweep: Sweep, sheet: Sheet) -> list[dict[str, Any]]:
+    """Vectors at the poses as arrows of the drawing: of each unit a round length, and a layer for each kind."""
+    vectors = list(drawn.vectors(motion, sweep))
+    groups = []
+    for unit, longest in largest(vectors).items():
+        scale, length = min(_ARROW, _SHARE * sheet.height) / longest, round_down(longest)
+        layers = []
+        for kind in vectors:
+            if kind.unit == unit:
+                title, color = _ARROWS[kind.kind]
+                shafts = [[words, at if isinstance(at, str) else _track(sheet.all(at)), _track(np.conj(vector * scale))]
+                          for words, at, vector in kind.each]  # fmt: skip
+                layers.append({"title": title, "color": color, "on": kind.kind != "velocity", "shafts": shafts})
+        groups.append(
+            {"key": [round(length * scale, 1), f"{length:g} {style.printed(unit)}".rstrip()], "layers": layers}
+        )
+    return groups
+
+
+def _track(places: Complexes) -> list[str]:
+    """Places, or vectors, of the drawing as the script takes them."""
+    return [deltas(places.real, PLACES), deltas(places.imag, PLACES)]
 
 
 def _dots(figure: Figure, table: Table, numbers: Numbers) -> list[list[Any]]:

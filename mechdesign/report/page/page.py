@@ -36,6 +36,7 @@ from mechdesign.report.page import vector
 from mechdesign.report.page.dark import dark
 from mechdesign.report.page.headlines import shown
 from mechdesign.report.page.pages import GENERATOR, harmless
+from mechdesign.report.page.tracks import joined
 from mechdesign.report.requirements import Verdict, judged_by, named
 from mechdesign.study import Study
 from mechdesign.study.text.units import text_of
@@ -102,7 +103,7 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
     sections = [answer.section for answer in answers if answer.section is not None]
     warnings = [(str(warning), "") for warning in study.cautions]
     warnings += [(warning, section["command"]) for section in sections for warning in section["warnings"]]
-    moving = {section["command"]: section["moving"] for section in sections if section["moving"] is not None}
+    moving = _together({section["command"]: section["moving"] for section in sections if section["moving"]})
     # The mechanism beside the answers moves through a motion, if there is one.
     lead = next((name for name, part in moving.items() if "given" in part["data"]), next(iter(moving), ""))
     parts = ["moving"] * bool(moving)
@@ -137,6 +138,16 @@ def report(study: Study, answers: Sequence[Answered], *, below: bool, plots: boo
         below=below,
         made=computed_from(study, ""),
     )
+
+
+def _together(moving: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Mechanisms that move by their questions; of those along one motion the first alone, with what the others add."""
+    firsts: dict[str, str] = {}
+    parts: dict[str, Mapping[str, Any]] = {}
+    for command, part in moving.items():
+        first = firsts.setdefault(part["data"].get("course", command), command)
+        parts[first] = part if first == command else joined(parts[first], part)
+    return parts
 
 
 def _mover(moving: Mapping[str, Mapping[str, Any]], command: str, pose: Mapping[str, float] | None = None) -> str:
@@ -180,7 +191,7 @@ def _sketch(study: Study) -> str:
     """The sketch, if no question has drawn the mechanism; empty if it cannot be drawn."""
     try:
         with style.context():
-            return vector.inline(sketch_figure(study), "sketch", "the sketch, assembled")
+            return vector.inline(sketch_figure(study), "sketch", "The sketch, assembled")
     except Exception:
         return ""
 

@@ -21,6 +21,7 @@ from mechdesign.questions.poses import in_study_units
 from mechdesign.questions.workspace.figures.boundary import solved_inside
 from mechdesign.questions.workspace.figures.index_maps import contours, index_columns, index_norm
 from mechdesign.questions.workspace.figures.regions import LEFT_OUT, LOOKS, PALE, Region, fate, grids, regions, some
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.scene import pose, travels
@@ -111,8 +112,8 @@ def _solved(study: Study, region: Region, cells: int) -> tuple[Ints, Configurati
 
 def _table(study: Study, region: Region, rows: Ints, configuration: Configuration) -> Table:
     """Place, drives and local indices at some rows of the region's grid."""
-    assert study.workspace is not None
-    columns = [Column(f"{study.workspace.point}.{axis}", region.local[axis][rows], region.local.column(axis).unit)
+    point = WorkspaceSection.of(study).point
+    columns = [Column(f"{point}.{axis}", region.local[axis][rows], region.local.column(axis).unit)
                for axis in "xy"]  # fmt: skip
     for name in study.mechanism.drives:
         drive = study.mechanism.coordinate(name)

@@ -22,6 +22,7 @@ from mechdesign.results import Column, Table
 PLACES = 20
 TURNS = 100
 TIMES = 10_000  # in the time of a motion
+ROWS = 1_000_000  # from one row of a table to the next
 # Digits of integers.
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 _BASE = 32
@@ -154,6 +155,55 @@ def steps(text: str, count: int) -> Floats:
             integers.append(-(value + 1) // 2 if value % 2 else value // 2)
             value, place = 0, 1
     return np.cumsum([*integers, *[0] * (count - len(integers))]).astype(np.float64)
+
+
+def joined(part: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """A `Moving` as plain data with the arrows and the numbers of another that moves along the same motion.
+
+    These are taken straight between the poses of the other.
+    """
+    data, more = part["data"], other["data"]
+    at, own = (_values(each["rows"], each["poses"]) for each in (data, more))
+    same = np.minimum(np.searchsorted(own, at), len(own) - 1)
+
+    def along(track: str, factor: float = 1.0, begin: float = 0.0) -> str:
+        values = _values(track, len(own))
+        return deltas(factor * np.where(own[same] == at, values[same], np.interp(at, own, values)) + begin, 1.0)
+
+    # From one drawing to the other, whose windows may differ.
+    factor = data["scale"] / more["scale"]
+    shift = [PLACES * data["scale"] * sign * (there - here)
+             for sign, there, here in zip((1, -1), more["corner"], data["corner"], strict=True)]  # fmt: skip
+
+    def placed(place: str | Sequence[str]) -> str | list[str]:
+        if isinstance(place, str):
+            return place
+        return [along(track, factor, begin) for track, begin in zip(place, shift, strict=True)]
+
+    known = {kind["title"] for group in data["arrows"] for kind in group["layers"]}
+    groups = []
+    for group in more["arrows"]:
+        layers = [
+            layer | {"shafts": [[words, placed(at), [*map(along, way)]] for words, at, way in layer["shafts"]]}
+            for layer in group["layers"] if layer["title"] not in known
+        ]  # fmt: skip
+        groups += [group | {"layers": layers}] if layers else []
+    numbers = [[decimals, along(track)] for decimals, track in more["numbers"]]
+    begin, named = len(data["numbers"]), {name for name, _ in part["rows"]}
+    rows = [
+        [name, [cell and cell | {"number": cell["number"] + begin} for cell in cells]]
+        for name, cells in other["rows"] if name not in named
+    ]  # fmt: skip
+    data = {**data, "arrows": [*data["arrows"], *groups], "numbers": [*data["numbers"], *numbers]}
+    rows = [*part["rows"], *rows]
+    return {**part, "data": data, "rows": rows, "meanings": {**other["meanings"], **part["meanings"]}}
+
+
+def _values(track: str, count: int) -> Floats:
+    """The integers of `deltas`, nan where there is no value, shape (count,)."""
+    known = np.array([letter == _NOTHING for letter in track if _LETTERS.find(letter) < _BASE], dtype=bool)
+    gone = np.append(known, np.zeros(count - len(known), dtype=bool))
+    return np.where(gone, np.nan, steps(track, count))
 
 
 def _letters(number: int) -> str:

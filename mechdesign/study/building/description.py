@@ -401,7 +401,7 @@ def _couplings(builder: Builder) -> dict[str, Coupling]:
             continue
         angle = given.pressure_angle
         pressure = PRESSURE_ANGLE if angle is None else angle * builder.units.angle_factor
-        couplings[name] = Coupling(name, sets, function, given.wheels, pressure)
+        couplings[name] = Coupling(name, sets, function, given.wheels, pressure, given.radius or 0.0)
     return couplings
 
 

@@ -331,6 +331,8 @@ class Coupling(fields.Model):
 
     wheels: Annotated[str, fields.choice(_WHEELS, "kind of wheels")] = "gears"
     """What makes the ratio of two angles, or of a slide to an angle, where both turn about pins of one link."""
+    radius: fields.PositiveLength | None = None
+    """Radius of the pulley that follows, of a belt. Left out: moments alone act on the links. Example: 12"""
     pressure_angle: fields.Angle | None = None
     """Angle of the force between teeth from the tangent of the pitch circles. Left out: 20 degrees. Example: 25"""
 
@@ -340,6 +342,8 @@ class Coupling(fields.Model):
             raise failure("'of' belongs to a 'ratio' or a 'table'; an expression names its coordinates itself")
         if self.to is None and self.of is None:
             raise failure("a coupling by 'ratio' or 'table' needs 'of', the coordinate that is followed")
+        if self.radius is not None and self.wheels != "belt":
+            raise failure("the radii of gears follow from the ratio and the distance of their axes; leave 'radius' out")
         if self.phase is not None and self.ratio is None:
             raise failure("'phase' belongs to a 'ratio'")
         return self

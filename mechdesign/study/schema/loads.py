@@ -97,7 +97,7 @@ def joints_of(mechanism: Mechanism, loads: Iterable[Load], springs: Iterable[Spr
     points += [point for spring in springs if not spring.turning for point in spring.between]
     graph = mechanism.graph
     loaded = frozenset(graph.node(point) for point in points if "." not in point and graph.is_point(point))
-    return Joints(mechanism.description, graph, loaded)
+    return Joints(mechanism.description, graph, loaded, mechanism.pressing)
 
 
 def check_friction(checker: Checker) -> None:
@@ -135,12 +135,15 @@ def check_loads(checker: Checker, loads: tuple[Load, ...], root: KeyPath, *, mov
                 checker.check_name(link, mechanism.links, "link", (*path, key))
         if load.link == GROUND:
             checker.report((*path, "link"), "the ground does not move: a moment on it does nothing; leave it out")
+        listed = isinstance(checker.reporter.document.raw(path), list)
         for keys, quantity, kind in load.numbers:
+            # Of [fx, fy, mz] the place in that list.
+            place = (*path, {"force": keys[-1], "moment": 2}[kind]) if listed else (*path, *keys)
             if isinstance(quantity, Amount):
-                checker.kind((*path, *keys), kind)
+                checker.kind(place, kind)
                 continue
             for name in sorted(quantity.names - checker.parameters.nominal.keys()):
-                _check_name(checker, name, (*path, *keys), moving=moving, timed=timed)
+                _check_name(checker, name, place, moving=moving, timed=timed)
 
 
 def _check_name(checker: Checker, name: str, path: KeyPath, *, moving: bool, timed: bool) -> None:

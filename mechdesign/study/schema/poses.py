@@ -12,6 +12,7 @@ from mechdesign.errors import cut
 from mechdesign.study.schema.checker import Checker
 from mechdesign.study.schema.motions import Course
 from mechdesign.study.schema.paths import PathSection, Speed
+from mechdesign.study.schema.section import Section
 from mechdesign.study.text import fields
 from mechdesign.study.text.document import KeyPath
 from mechdesign.study.text.fields import failure
@@ -95,13 +96,12 @@ def _poses(raw: Any) -> Any:
 Pose = dict[fields.CoordinateName, fields.Number]
 
 
-class PoseSection(fields.Model):
+class PoseSection(Section):
     """Where a question is asked: listed poses, a sweep, a path, or the nodes of the workspace section.
 
     The list is empty where the study says ``poses: workspace``.
     """
 
-    command: ClassVar[str]
     sources: ClassVar[tuple[str, ...]] = ("poses", "sweep", "path")  # keys of which one gives the poses
     poses: Annotated[tuple[Pose, ...], BeforeValidator(_poses), fields.OrShort({"const": "workspace"})] | None = None
     """Poses one by one, each with as many coordinates as the mobility: drives, others (C.x, platform.angle) or a mix.
@@ -118,6 +118,11 @@ class PoseSection(fields.Model):
     alone is held. Example: {C: [[10, 20], [15, 20], [20, 25]]} Example: {C: {circle: {center: [0, 220], radius: 40}},
     platform.angle: 0}
     """
+
+    @property
+    def fallbacks(self) -> tuple[str, ...]:
+        """Sections whose poses it takes without any of its own."""
+        return ("kinematics",)
 
     @property
     def at_nodes(self) -> bool:

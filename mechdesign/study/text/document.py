@@ -94,27 +94,27 @@ class Document:
     def written(self, path: Sequence[str | int]) -> KeyPath:
         """The path as the user wrote it: pydantic's may name keys that a short form leaves out."""
         data: Any = self.data
-        found: list[str | int] = []
+        keys: list[str | int] = []
         remaining = list(path)
         while remaining:
             segment = remaining.pop(0)
             if has(data, segment):
-                found.append(segment)
+                keys.append(segment)
                 data = data[segment]
-            elif data is None or not found:
+            elif data is None or not keys:
                 # An empty or missing section has no short forms.
-                return (*found, segment, *remaining)
+                return (*keys, segment, *remaining)
             elif isinstance(data, list) and LIST_FORM.get(str(segment), len(data)) < len(data):
-                found.append(LIST_FORM[str(segment)])
+                keys.append(LIST_FORM[str(segment)])
                 data = data[LIST_FORM[str(segment)]]
             elif isinstance(data, list) and segment in data:
-                found.append(data.index(segment))
+                keys.append(data.index(segment))
                 data = segment
             elif remaining or not isinstance(data, dict):
                 continue
             else:
-                found.append(segment)
-        return tuple(found)
+                keys.append(segment)
+        return tuple(keys)
 
 
 def dotted(path: Sequence[str | int]) -> str:

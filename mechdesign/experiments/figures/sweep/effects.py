@@ -57,7 +57,7 @@ def main_effects(view: CasesView) -> Figure | None:
     gathered = any(len(axis.distinct) > MOST_VALUES for axis in across)
     by = f"value, many values in {CLASSES} classes of as many cases" if gathered else "value"
     shown = "each case" if alone else f"mean (dot) and range (bar) of the cases of each {by}"
-    words = f"main effects over {counted(count, 'case')}: {shown}"
+    words = f"Main effects over {counted(count, 'case')}: {shown}"
     if any(axis.limits for axis in down):
         words += "; grey: not met"
     words += without_number(down, count) + left_out(entries, across, "entry") + left_out(results, down, "result")
@@ -111,7 +111,7 @@ def scatter(view: CasesView) -> Figure | None:
     cases = "cases" if len(drawn) == len(table) else f"an even sample of {len(drawn):,} of {len(table):,} cases"
     limits = "; grey: not met" if any(axis.limits for axis in taken) else ""
     omitted = left_out(entries, taken, "entry") + left_out(results, taken, "result")
-    head, top = title(f"{cases}: every two quantities against each other{limits}{omitted}")
+    head, top = title(f"Every two quantities of {cases} against each other{limits}{omitted}")
     columns = 1 if style.narrow() else 2
     words = [style.folded(kind.words, NAME, style.width() / columns - 0.6) for kind in kinds]
     legend = top

@@ -100,7 +100,7 @@ def response(view: CasesView) -> Figure | None:
         for k, axis in enumerate(limited)
         if any(gate.crossed(k) for gate in gates)
     ]
-    words = [f"response maps over {len(table):,} cases"]
+    words = [f"Response maps over {len(table):,} cases"]
     words += [f"dots: a sample of {len(drawn)} of them"] * (len(drawn) < len(table))
     words += [f"in {plane.classes} classes of each entry" for plane in planes[:1] if plane.classes]
     words += ["of the cases that meet every requirement, else of the nearest miss"] * bool(len(entries) > 2 and limited)

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from mechdesign.mechanism.graph import GROUND
 from mechdesign.questions.dynamics.figures.view import DynamicsView
-from mechdesign.questions.dynamics.free_bodies import Action, actions, mass_centers
+from mechdesign.questions.dynamics.free_bodies import Action, actions_on, mass_centers
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.report.figures import shapes, style
 from mechdesign.report.figures.drawing import draw
@@ -30,7 +30,7 @@ LEAST = 5e-3  # part of the largest force, and of the largest moment, below whic
 # Inches.
 _LONGEST = 0.62  # arrow
 _PAD = 0.8  # around a link, for arrows and their names
-_TALL = 2.5
+_TALL, _LOW = 2.5, 2.05  # a panel, and one of a page that holds no more
 _EDGE, _TOP, _TITLE, _BOTTOM = 0.15, 0.62, 0.26, 0.55
 _ARC = 19.0  # radius of a moment's arrow, points
 
@@ -61,30 +61,35 @@ def free_bodies_figure(view: DynamicsView) -> Figure | None:
     scene = None if index is None else pose(mechanism, drawn.shown.configuration, index)
     if index is None or scene is None:
         return None
-    acting = actions(drawn.motion, drawn.shown, index)
+    acting = [each.at(0) for each in actions_on(drawn.motion, drawn.shown.take(np.array([index])))]
     largest = max(action.size for action in acting)
     turning = max(abs(action.moment) for action in acting)
     least = max(LEAST * turning, NOTHING * largest * mechanism.size)
     acting = [action for action in acting if action.size > LEAST * largest or abs(action.moment) > least]
     moving = [name for name in mechanism.description.links if name != GROUND]
     sizes = {name: max((a.size for a in acting if a.link == name), default=0.0) for name in moving}
-    shown = sorted(sorted(filter(sizes.get, moving), key=lambda name: -sizes[name])[:MAX_LINKS], key=moving.index)
+    bearing = sorted(filter(sizes.get, moving), key=lambda name: -sizes[name])
+    # A page holds the mechanism and so many links below it.
+    held = int((style.tallest() - _TOP - _bottom()) / (_LOW + _TITLE)) - 1 if style.narrow() else MAX_LINKS
+    shown = sorted(bearing[:held], key=moving.index)
     count = len(shown) + 1
     columns = 1 if style.narrow() else 2 if count < 5 else 3
     wide = (style.width() - 2 * _EDGE) / columns
     row = int(drawn.shown.rows[index])
     where, unit = pose_in_words(view.study, view.poses, row, 4), view.study.units.label("force")
     words = f"Forces on the links [{style.printed(unit)}] at {where}, where a joint bears most"
+    words += f"; of {len(bearing)} links those {len(shown)} with the largest forces" * (len(shown) < len(bearing))
     words = style.folded(words, 11.0, style.width() - 2 * _EDGE)
-    figure, panels = style.page(count, columns, _TALL, left=_EDGE, right=_EDGE, top=_TOP + 0.18 * words.count("\n"),
-                                bottom=_bottom(), down=_TITLE)  # fmt: skip
+    top, rows = _TOP + 0.18 * words.count("\n"), -(-count // columns)
+    tall = min(_TALL, (style.tallest() - top - _bottom() + _TITLE) / rows - _TITLE)
+    figure, panels = style.page(count, columns, tall, left=_EDGE, right=_EDGE, top=top, bottom=_bottom(), down=_TITLE)
     figure.text(_EDGE / style.width(), 1 - 0.1 / figure.get_figheight(), words, va="top", fontsize=11)
     colors = shapes.link_colors(mechanism)
     whole = shapes.mechanism_shapes(scene, colors, {})
     centers = mass_centers(view.study, drawn.shown.configuration, index)
-    tile = _Tile(view, 72 * _LONGEST / largest, least, wide)
+    tile = _Tile(view, 72 * _LONGEST / largest, least, (wide, tall))
     outside = [action for action in acting if action.link != GROUND and _outside(action, acting)]
-    tile.draw(panels[0], "mechanism", whole, [*scene.points.values()], outside, [*centers.values()])
+    tile.draw(panels[0], "Mechanism", whole, [*scene.points.values()], outside, [*centers.values()])
     for axes, name in zip(panels[1:], shown, strict=True):
         own = [scene.points[point] for point in scene.link_points(name)]
         mine = [action for action in acting if action.link == name]
@@ -131,8 +136,8 @@ def _alone(scene: Scene, name: str, whole: Sequence[Shape]) -> list[Shape]:
 class _Tile:
     """Draws a link and its arrows into a panel; forces to one scale, each link to its own."""
 
-    def __init__(self, view: DynamicsView, scale: float, least: float, wide: float) -> None:
-        self.unit, self.scale, self.wide = view.study.units.label("moment"), scale, wide
+    def __init__(self, view: DynamicsView, scale: float, least: float, size: tuple[float, float]) -> None:
+        self.unit, self.scale, (self.wide, self.tall) = view.study.units.label("moment"), scale, size
         self.least = least
         self.smallest = 1e-3 * view.study.mechanism.size
 
@@ -143,8 +148,8 @@ class _Tile:
         """One panel."""
         middle, across, tall = extent([*places, *centers])
         across, tall = max(across, self.smallest), max(tall, self.smallest)
-        scale = min((self.wide - 2 * _PAD) / across, (_TALL - 2 * _PAD) / tall)
-        half = complex(self.wide, _TALL) / 2 / scale
+        scale = min((self.wide - 2 * _PAD) / across, (self.tall - 2 * _PAD) / tall)
+        half = complex(self.wide, self.tall) / 2 / scale
         axes.set_xlim(middle.real - half.real, middle.real + half.real)
         axes.set_ylim(middle.imag - half.imag, middle.imag + half.imag)
         axes.set_aspect("equal")

@@ -89,6 +89,10 @@ def in_order(sweep: Sweep) -> Ints:
 
 def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: Ints) -> list[Image.Image]:
     canvas: Any = figure.canvas  # the Agg canvas; its own methods have no types
+    # The paths stand still, but above plates that move.
+    paths = axes.get_lines()
+    for path in paths:
+        path.set_animated(True)
     canvas.draw()
     still = canvas.copy_from_bbox(figure.bbox)
     failed = len(sweep.rows) - len(sweep.valid)
@@ -102,8 +106,9 @@ def _frames(figure: Figure, axes: Axes, sweep: Sweep, indices: Ints) -> list[Ima
         axes.text(0.0, 1.02, sweep.words(index) + note, transform=axes.transAxes, fontsize=10.5, color=style.INK)
         moving = [artist for artist in axes.get_children() if artist not in standing]
         canvas.restore_region(still)
-        for artist in sorted(moving, key=lambda artist: artist.get_zorder()):
+        for artist in sorted([*paths, *moving], key=lambda artist: artist.get_zorder()):
             axes.draw_artist(artist)
+        for artist in moving:
             artist.remove()
         pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy()))
     return pictures

@@ -15,7 +15,7 @@ from mechdesign.questions.kinematics.figures.poses import KINDS, arrow, place_of
 from mechdesign.questions.kinematics.figures.view import MotionView
 from mechdesign.questions.kinematics.special_poses import SpecialPose
 from mechdesign.report.figures import style
-from mechdesign.report.figures.framing import fit
+from mechdesign.report.figures.framing import LEFT, fit
 from mechdesign.report.figures.labels import Label, covered, place_labels
 from mechdesign.report.figures.panels import fitting, legend_at_left
 from mechdesign.report.figures.pictures import picture
@@ -42,8 +42,12 @@ def polygons_figure(view: MotionView) -> Figure | None:
     # Where links are in line their velocities are, too: other poses tell more.
     shown = ([special for special in regular if not special.event] or regular)[: 1 if style.narrow() else MOST_POSES]
     columns, count = 1 if style.narrow() else 2, len(shown)
+    titles = [
+        style.folded(f"{kind.name.capitalize()} at {special.where}", 9, _WIDE) for special in shown for kind in KINDS
+    ]
+    down = _DOWN + style.line(9) * max(words.count("\n") for words in titles)
     figure, panels = style.page(2 * count, columns, _TALL, left=_LEFT, right=_RIGHT, top=_TOP, bottom=_BELOW,
-                                across=_BETWEEN, down=_DOWN)  # fmt: skip
+                                across=_BETWEEN, down=down)  # fmt: skip
     words = f"Velocity and acceleration polygons: from the pole {POLE} to the tip of each point's vector"
     words += "\nthin dashes: acceleration of a link's second point towards its first, and across the line between them"
     words = style.folded(words, 9, style.width() - _LEFT)
@@ -53,16 +57,16 @@ def polygons_figure(view: MotionView) -> Figure | None:
         for order, kind in enumerate(KINDS):
             axes = panels[2 * k + order]
             unit = view.study.units.label(kind.name)
-            axes.set_title(style.folded(f"{kind.name} at {special.where}", 9, _WIDE), loc="left", fontsize=9)
+            axes.set_title(titles[2 * k + order], loc="left", fontsize=9)
             axes.set_xlabel(style.axis_label(f"{kind.name} x", unit))
             axes.set_ylabel(style.axis_label(f"{kind.name} y", unit))
             _draw(view, axes, special, order)
     colors = link_colors(view.study.mechanism)
     handles = [Line2D([], [], color=colors[link], linewidth=1.8, label=link) for link in images(view, shown[0], 0)]
     names = [str(handle.get_label()) for handle in handles]
-    rows = -(-len(names) // fitting(names, style.LOOKS["screen"].width))
-    style.grow(figure, below=_LEGEND_ROW * (rows - 1))
-    legend_at_left(figure, handles, fitting(names))
+    columns = fitting(names, style.LOOKS["screen"].width - LEFT)
+    style.grow(figure, below=_LEGEND_ROW * (-(-len(names) // columns) - 1))
+    legend_at_left(figure, handles, columns)
     return figure
 
 

@@ -179,6 +179,7 @@ def _heading(chosen: SpecialPoses, *, listed: bool) -> str:
         parts += ["links that come into line"] * (sum(ends) + sum(singular) < len(ends))
         parts += ["poses between"] * any(not special.event for special in chosen.shown)
         heading = ", ".join(parts)
+        heading = heading[0].upper() + heading[1:]
     return heading + (f"; the first {len(chosen.shown)}, and {chosen.left_out} more" if chosen.left_out else "")
 
 

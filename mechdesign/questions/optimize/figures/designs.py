@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 
 from mechdesign.errors import counted
 from mechdesign.numerics.arrays import Flags, Floats, Ints
@@ -22,6 +24,7 @@ NAME_LETTERS = 14  # of a name in one line below an axis
 # Inches: beside the panels, above and below them, and between them.
 _LEFT, _RIGHT, _ABOVE, _BELOW, _ACROSS = 0.85, 0.2, 0.45, 0.55, 0.95
 _LEGEND_LINE = 0.19
+_LEGEND_DOT = 8.0  # points
 FEW = 1000  # so many designs have larger dots
 OUTLYING = 3.0  # ranges of the middle half of some values
 MAX_TICKS = 8  # of an axis with a number at each choice
@@ -39,8 +42,10 @@ def listed(designs: Designs, design: Design) -> list[str]:
 
 
 def value_text(value: float | str) -> str:
-    """A value of a variable in words."""
-    return value if isinstance(value, str) else f"{value:.4g}"
+    """A value of a variable or a goal in words, where it is very small or large with a power of ten."""
+    if isinstance(value, str):
+        return value
+    return f"{value:.4g}" if value == 0 or 1e-4 <= abs(value) < 1e6 else style.in_powers(value)
 
 
 def folded(name: str) -> str:
@@ -81,7 +86,14 @@ def legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str], column
     rows = -(-len(labels) // columns)
     lines = sum(max(label.count("\n") + 1 for label in labels[row::rows]) for row in range(rows))
     style.grow(figure, below=_LEGEND_LINE * lines + 0.05)
-    figure.legend(handles, labels, loc="lower left", ncols=columns, borderaxespad=0.3)
+    enlarge_dots(figure.legend(handles, labels, loc="lower left", ncols=columns, borderaxespad=0.3))
+
+
+def enlarge_dots(legend: Legend) -> None:
+    """Dots of a legend as large as can be seen: one alone is lost where thousands are drawn."""
+    for handle in legend.legend_handles:
+        if isinstance(handle, Line2D) and handle.get_marker() == ".":
+            handle.set(markersize=_LEGEND_DOT, alpha=1.0)
 
 
 def usual(values: Floats, *, smallest: bool) -> Flags:

@@ -16,6 +16,7 @@ from matplotlib.tri import Triangulation
 from mechdesign.numerics.arrays import Floats, Ints
 from mechdesign.questions.optimize.figures.designs import (
     FEW,
+    enlarge_dots,
     folded,
     label,
     legend,
@@ -177,7 +178,7 @@ def score_surface(designs: Designs) -> Figure:
     shown = [*dict.fromkeys(designs.winners.tolist())]
     for k, row in enumerate(shown):
         merits = designs.merits(row) if many else "best"
-        words = f"{', '.join(map(value_text, designs.design(row).values()))}: {merits}"
+        words = f"{', '.join(listed(designs, designs.design(row)))}: {merits}"
         words = style.folded(words, 9.0, style.width() - 0.6)
         place = [column[row] for column in designs.variables.values()]
         axes.plot(*place, MARKERS[k % len(MARKERS)], color=style.VERMILION, markeredgecolor="white", markersize=8,
@@ -287,7 +288,7 @@ def parallel_axes(designs: Designs) -> Figure:
     size = 7.0 if upright else 8.5
     for place, (name, *ends) in enumerate(zip(names, low, high, strict=True)):
         words = variables_of(designs.study)[name].words if place < len(designs.variables) else ()
-        bottom, top = (words[int(end)] if words else f"{end:.4g}" for end in ends)
+        bottom, top = (words[int(end)] if words else value_text(float(end)) for end in ends)
         axes.axvline(place, color=style.INK, linewidth=0.8, zorder=3)
         axes.text(place, -0.03, bottom, ha="center", va="top", fontsize=size)
         axes.text(place, 1.03, top, ha="center", va="bottom", fontsize=size)
@@ -335,7 +336,7 @@ def convergence(designs: Designs) -> Figure:
         axes.plot(count[designs.feasible], values[designs.feasible], ".", color=style.FAINT, markersize=3,
                   markeredgewidth=0, label="designs")  # fmt: skip
         axes.step(count[known], so_far[known], where="post", color=style.BLUE, label="best so far")
-        axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none")
+        enlarge_dots(axes.legend(loc="upper right", frameon=True, framealpha=0.85, edgecolor="none"))
         best_values = so_far[known]
         if (best_values > 0).all() and best_values.max() > 20 * best_values.min():
             axes.set_yscale("log")

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.reliability.figures.view import ErrorsView
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.looks import best_probability, followed_in_words, heading
 from mechdesign.report.figures.panels import MAX_PANELS, legend_below, number, title
@@ -38,6 +39,7 @@ _FAILURE_HEIGHT = 0.75
 _FAILURE_ROOM = 1.4
 _BEFORE_FAILURE = 1.1
 _PANEL_GAP = 0.5
+_NEGATIVE = 0.5  # inches, of the number of a negative bar
 _ACROSS = 0.3
 _MIN_WIDTH = 1.9  # of a panel
 
@@ -81,8 +83,7 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
     ranked = np.argsort(-largest, kind="stable")[:most]
     where = "" if per_pose and poses.count > 1 else f"average over {poses.count} poses"
     if sobol is not None or poses.count == 1:
-        section, pose = study.reliability, sobol or 0
-        assert section is not None
+        section, pose = ReliabilitySection.of(study), sobol or 0
         fails_most = pose == worst and bool(section.limits)
         where = f"at {followed_in_words(study, poses, pose) if fails_most else pose_in_words(study, poses, pose)}"
     notes = []
@@ -116,7 +117,9 @@ def contributions_figure(study: Study, table: Table, poses: Poses, worst: int = 
         axis.set_xlabel("share of the variance [%]" if k + columns >= len(pairs) else "")
     low = min(0.0, *(float(np.nanmin(shown)) for shown in bars)) if any((bar < -1.0).any() for bar in bars) else 0.0
     high = max(float(np.nanmax(shown, initial=1.0)) for shown in bars)
-    grid[0].set_xlim(1.25 * low, 1.25 * high)
+    # The number of a negative bar stands left of it.
+    share = _NEGATIVE / (grid[0].get_position().width * style.width()) if low < 0 else 0.0
+    grid[0].set_xlim(low - share / (1 - share) * (1.25 * high - low), 1.25 * high)
     if list(entries) != [_SHARE]:
         style.grow(figure, below=_LEGEND)
         legend_below(figure, list(entries.values()), list(entries))
@@ -182,8 +185,7 @@ def allocation_picture(view: ErrorsView) -> Figure | None:
 
 def allocation_figure(study: Study, tables: Mapping[str, Table]) -> Figure:
     """Bars for each source, its tolerance, given and allocated, and its cost; below, how often either fails."""
-    section, table = study.reliability, tables["allocation"]
-    assert section is not None
+    section, table = ReliabilitySection.of(study), tables["allocation"]
     assert section.allocate is not None
     total = [float(np.nansum(table[name])) for name in ("cost_given", "cost_allocated")]
     note = f"cost {total[0]:.4g} as given, {total[1]:.4g} allocated ({100 * (total[1] / total[0] - 1):+.1f} %)"

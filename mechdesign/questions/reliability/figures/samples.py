@@ -24,8 +24,9 @@ _BINS = 60
 _MAX_LINEAR_SAMPLES = 400_000
 _MAX_LINEAR_RATIO = 50.0
 _DASHED = (0, (5, 2))
+_DIGIT = 0.075  # inches, of a number
 _TICK = 0.65  # inches from one number along x to the next
-_AROUND = 2.6  # inches above and below all panels, with a legend of several rows
+_AROUND = 2.8  # inches above and below all panels, with a legend of several rows
 
 
 class _Histogram(NamedTuple):
@@ -70,6 +71,7 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
             pair[0].set_title(style.folded(block[column].name, 9.5, room), loc="left", fontsize=9.5)
             for axis in pair:
                 axis.locator_params(axis="x", nbins=max(1, min(4, int(room / _TICK))))
+                _spread_ticks(axis, room)
             pair[1].set_xlabel(style.axis_label("error", block[column].unit))
     kept, samples = sampled.samples.kept, sampled.samples.errors.shape[1]
     note = f"{look(sampled.method).words}, {samples:,} samples"
@@ -79,6 +81,15 @@ def histogram_figure(view: ErrorsView) -> Figure | None:
     )
     legend_below(figure, list(entries.values()), list(entries))
     return figure
+
+
+def _spread_ticks(axis: Axes, room: float) -> None:
+    """Leave out every second number along x where they have no room (inches of the whole axis)."""
+    low, high = axis.get_xlim()
+    ticks = np.array([tick for tick in axis.get_xticks() if low <= tick <= high])
+    letters = max(map(len, axis.xaxis.get_major_formatter().format_ticks(ticks.tolist())), default=0)
+    if len(ticks) > 2 and room * (ticks[1] - ticks[0]) / (high - low) < _DIGIT * letters:
+        axis.set_xticks(ticks[::2])
 
 
 def _histograms(sampled: Sampled) -> list[_Histogram]:

@@ -17,11 +17,12 @@ from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Complexes, Floats
 from mechdesign.questions.poses import pose_in_words
 from mechdesign.questions.stiffness.analysis import DrawnPose
-from mechdesign.questions.stiffness.elements import beam_line, corners_of
-from mechdesign.questions.stiffness.figures.joint_forces import load_in_words
+from mechdesign.questions.stiffness.elements import beam_line
+from mechdesign.questions.stiffness.figures.joint_forces import cases_in_words
 from mechdesign.questions.stiffness.figures.springs import LARGEST_MOVE
 from mechdesign.questions.stiffness.figures.view import StiffnessView
 from mechdesign.questions.stiffness.network import NetworkEdge
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.drawing import draw, draw_mechanism
 from mechdesign.report.figures.framing import ABOVE, BELOW, LEFT, MAX_HEIGHT, PAD, RIGHT, fit, windows
@@ -36,6 +37,7 @@ MAX_LOADS = 4
 MAX_DIRECTIONS = 4
 MAX_NARROW_DIRECTIONS = 3
 _MAX_TICKS = 6  # below a panel
+_SAME = 1e-6  # of the mechanism's size, between the points of two poses that are one
 _LARGEST_ELLIPSE = 0.3  # longest drawn half axis over the size of the mechanism
 _ONE_SCALE = 8.0  # ratio of the longest half axes above which each ellipse is drawn at its own scale
 _LETTERS_AN_INCH = 14.5  # of a panel's title
@@ -65,7 +67,8 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
     if scene is None or not drawn.twists:
         return None
     shapes, at = _shapes(drawn, scene), scene.points[asked.section.point]
-    loads = np.array(asked.section.loads[:MAX_LOADS])[:, : asked.size]
+    loads = asked.loads[0, :MAX_LOADS, : asked.size]
+    words = cases_in_words(study)
     sizes = [max(float(np.abs(move[:, k]).max()) for _, move in shapes) for k in range(len(loads))]
     if not np.isfinite(sizes).all():
         return None
@@ -85,14 +88,15 @@ def deflections_figure(view: StiffnessView) -> Figure | None:
         moved = lines[0][0]
         axes.plot([at.real, moved.real], [at.imag, moved.imag], ":", color=style.BLUE, linewidth=1.4, zorder=5.2)
         axes.plot([moved.real], [moved.imag], "o", color=style.BLUE, zorder=6)
-        # The arrows act where the load does: at the asked point, here where it has moved.
-        if push := complex(*load[:2]):
-            draw(axes, force(moved, push / abs(push), style.VERMILION), order=5.5)
-        if load[2:] and load[2]:
-            sweep = np.copysign(1.5 * np.pi, load[2])
-            draw(axes, arc(moved, -np.pi / 4, sweep, ARC, style.VERMILION), order=5.5)
+        # The arrows act where the load does; at the asked point, where it has moved.
+        own = (complex(moved), complex(*load[:2]), load[2] if load[2:] else 0.0)
+        for place, push, turn in drawn.pushes.get(k, [own]):
+            if push:
+                draw(axes, force(place, push / abs(push), style.VERMILION), order=5.5)
+            if turn:
+                draw(axes, arc(place, -np.pi / 4, np.copysign(1.5 * np.pi, turn), ARC, style.VERMILION), order=5.5)
         size = abs(shapes[0][1][0, k])
-        axes.set_title(f"{load_in_words(study, load)} at {name}\n{name} moves {quantity(float(size), length)}",
+        axes.set_title(f"{words[k]}\n{name} moves {quantity(float(size), length)}",
                        loc="left", fontsize=9)  # fmt: skip
     handles = [Line2D([], [], color=color, linewidth=width, label=words)
                for color, width, words in ((_PALE, 6.0, "without load"), (style.INK, 1.8, "under the load"),
@@ -163,7 +167,7 @@ def _bent(
     course = beam_line(beam.link, configuration)
     # The rod of a telescopic leg slides in its cylinder, whose pin stays where it is.
     root = beam.link.name if beam.link.telescopic else ways[0].a
-    sitting = [(root, corners_of(beam.link)[0]), *((edge.b, edge.point) for edge in ways)]
+    sitting = [(root, beam.link.corners[0]), *((edge.b, edge.point) for edge in ways)]
     feet = [float(course.foot(point, configuration.point(point))[0]) for _, point in sitting]
     bases = [complex(course.place(np.array([foot]))[0]) for foot in feet]
     order = sorted(range(len(feet)), key=feet.__getitem__)
@@ -198,11 +202,15 @@ def _beam(
 def directions_figure(view: StiffnessView) -> Figure | None:
     """Where a force of every direction moves the asked point: an ellipse at it, in a few poses, with its main axes."""
     study, tables, shown = view.study, view.result.tables, view.drawn.shown
-    table, soft, section = tables["stiffness"], tables["compliance"], study.stiffness
-    assert section is not None
+    table, soft, section = tables["stiffness"], tables["compliance"], StiffnessSection.of(study)
     index = np.flatnonzero(np.isfinite(soft["C11"][shown.rows]) & (table["k_max"][shown.rows] > 0))
     most = MAX_DIRECTIONS if not style.narrow() else MAX_NARROW_DIRECTIONS
-    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index))).astype(int))
+    # A motion that ends where it began shows its first pose once.
+    ends = [
+        np.ravel(shown.configuration.point(point))[index[[0, -1]]] for point in study.mechanism.points if len(index)
+    ]
+    closed = len(index) > 2 and all(abs(last - first) <= _SAME * study.mechanism.size for first, last in ends)
+    some = np.unique(np.linspace(0, len(index) - 1, min(most, len(index)), endpoint=not closed).astype(int))
     posed = {int(k): pose(study.mechanism, shown.configuration, int(k)) for k in index[some]}
     scenes = {k: scene for k, scene in posed.items() if scene is not None}
     if not scenes:
@@ -254,6 +262,6 @@ def directions_figure(view: StiffnessView) -> Figure | None:
 
 def _force(study: Study) -> float:
     """The force of an ellipse: about the largest of the study's loads, or else one unit."""
-    assert study.stiffness is not None
-    loads = [abs(complex(*load[:2])) for load in study.stiffness.loads]
+    wrenches = StiffnessSection.of(study).wrenches
+    loads = [abs(complex(*wrench[:2])) for wrench in wrenches if wrench is not None]
     return round_down(max(loads)) if any(loads) else 1.0

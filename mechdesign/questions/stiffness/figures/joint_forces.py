@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 from matplotlib.figure import Figure
 
+from mechdesign.expressions import Expression
 from mechdesign.questions.stiffness.figures.view import StiffnessView
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.joints import (
     MAX_JOINTS,
@@ -20,6 +22,7 @@ from mechdesign.report.figures.joints import (
 from mechdesign.report.figures.pictures import picture
 from mechdesign.results import Table
 from mechdesign.study import Study
+from mechdesign.study.schema.loads import Load, Quantity
 
 MAX_LOADS = 3  # each with a panel of forces and one of moments
 HEADING = "Static forces in the joints: the load alone, no inertia"
@@ -57,27 +60,44 @@ def borne(table: Table, poses: int, reach: float) -> tuple[list[Joint], list[Joi
 def joint_force_figures(view: StiffnessView) -> dict[str, Figure] | None:
     """``joint_forces`` over the poses of a motion, and ``force_hodographs``; none where no joint bears anything."""
     study, over = view.study, view.swept
-    section = study.stiffness
-    assert section is not None
+    section = StiffnessSection.of(study)
     if over is None or "forces" not in view.result.tables:
         return None
     forces, moments = borne(view.result.tables["forces"], view.poses.count, study.mechanism.size)
     if not forces:
         return None
-    loads = [f"{load_in_words(study, load)} at {section.at}" for load in section.loads[:MAX_LOADS]]
+    loads = cases_in_words(study)[:MAX_LOADS]
     kinds = {"force": forces[:MAX_JOINTS], "moment": moments[:MAX_JOINTS]}
+    heading, noun = ("Forces in the joints", "force") if section.dynamics else (HEADING, "static force")
     return {
-        "joint_forces": joint_curves(study, HEADING, kinds, loads, over),
-        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, noun="static force"),
+        "joint_forces": joint_curves(study, heading, kinds, loads, over),
+        "force_hodographs": joint_hodographs(study, kinds["force"], loads, over, noun=noun),
     }
 
 
-def load_in_words(study: Study, load: Sequence[float]) -> str:
-    """``fx = 3 N, mz = 2 N·m``, without what is zero."""
-    units = [study.units.label(kind) for kind in ("force", "force", "moment")]
-    parts = [
-        f"{name} = {value:g} {style.printed(unit)}"
-        for name, value, unit in zip(("fx", "fy", "mz"), load, units, strict=False)
-        if value
-    ]
-    return ", ".join(parts) or "no load"
+def cases_in_words(study: Study) -> list[str]:
+    """``fx = 3 N, mz = 2 N·m at P`` of each load, without what is zero."""
+    section = study.stiffness
+    assert section is not None
+    words = []
+    for load in section.loads:
+        parts = [
+            f"{'f' if load.between else ('fx', 'fy', 'mz')[place]} = {_in_words(study, quantity, kind)}"
+            for place, quantity, kind in _numbered(load)
+            if isinstance(quantity, Expression) or quantity
+        ]
+        places = [load.at, *(load.between or ()), load.link if load.at is None else None]
+        where = " and ".join(filter(None, places))
+        words.append(f"{', '.join(parts) or 'no load'} {'between' if load.between else 'at'} {where}")
+    return words + ["what acts in dynamics"] * section.dynamics
+
+
+def _numbered(load: Load) -> Iterator[tuple[int, Quantity, str]]:
+    for keys, quantity, kind in load.numbers:
+        yield 2 if kind == "moment" else int(keys[-1]) if load.between is None else 0, quantity, kind
+
+
+def _in_words(study: Study, quantity: Quantity, kind: str) -> str:
+    if isinstance(quantity, Expression):
+        return quantity.text
+    return f"{quantity:g} {style.printed(study.units.label(kind))}"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ from mechdesign.study import Poses, Study
 _COIL_LENGTH = 0.17  # over the size of the mechanism
 _COIL_SWING = 0.12  # half the width of a coil over its length
 _COIL_TURNS = 7
+_SHARES = (0.5, 0.3, 0.75)  # of a spring's length, where the labels of some stand
+_ALONG = np.array([0.0, 0.06, -0.06, 0.12, -0.12])  # and beside these
 _ORDER = 5.0  # above the mechanism
 LARGEST_MOVE = 0.12  # largest drawn displacement over the size of the mechanism
 
@@ -68,7 +71,10 @@ def _coils(study: Study, drawn: DrawnPose, scene: Scene) -> list[Coil]:
             anchor = place + 1.4 * length * (along if ((place - body) * along.conjugate()).real > 0 else -along)
         text = quantity(stiffness, study.units.label("stiffness"))
         coils.append(Coil(text, place, anchor, tip, length, grounded))
-    return coils
+    inside = sum((coil.place + coil.anchor) / 2 for coil in coils) / max(len(coils), 1)
+    # On a narrow page labels of neighbours would stand above each other between both.
+    shares = cycle(_SHARES if style.narrow() else (0.5,))
+    return [replace(coil, inside=inside, share=share) for coil, share in zip(coils, shares, strict=False)]
 
 
 @dataclass(frozen=True)
@@ -84,6 +90,8 @@ class Coil:
     tip: complex
     length: float
     grounded: bool
+    inside: complex = 0j  # a place among all springs
+    share: float = 0.5  # of the way from place to anchor, where its label stands best
 
     @property
     def path(self) -> Complexes:
@@ -97,11 +105,13 @@ class Coil:
 
     @property
     def label(self) -> Label:
-        """Its stiffness, beside its middle."""
+        """Its stiffness, beside its middle, away from the other springs."""
         span = self.anchor - self.place
-        anchors = tuple(self.place + share * span for share in (0.5, 0.56, 0.44, 0.62, 0.38))
-        heading = float(np.angle(1j * span if (1j * span).real > 0 else -1j * span))
-        return Label(self.text, anchors, style.VERMILION, 16, heading, 9.5)
+        aside = 1j * span
+        if ((self.place + 0.5 * span - self.inside) * aside.conjugate()).real < 0:
+            aside = -aside
+        anchors = tuple(self.place + share * span for share in self.share + _ALONG)
+        return Label(self.text, anchors, style.VERMILION, 16, float(np.angle(aside)), 9.5)
 
 
 def draw_coils(axes: Axes, coils: Sequence[Coil]) -> None:
@@ -153,7 +163,7 @@ def free_motion_figure(view: StiffnessView) -> Figure | None:
     else:
         ways = [rest + way * scale * move for way in (1, -1)]
     places = np.concatenate([[*scene.points.values()], *ways])
-    figure, axes = posed(study, poses, drawn, places, "free motion")
+    figure, axes = posed(study, poses, drawn, places, "Free motion")
     for line, dash in zip(ways, ("-", "--"), strict=True):
         axes.plot(line.real, line.imag, dash, color=style.VERMILION, linewidth=2, zorder=6,
                   marker="o" if len(rest) == 1 else None, label="free to move" if dash == "-" else None)  # fmt: skip

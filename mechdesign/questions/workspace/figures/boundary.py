@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -30,11 +31,12 @@ from mechdesign.questions.workspace.figures.regions import (
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
 from mechdesign.questions.workspace.inscribed import INSCRIBED, crossed
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
-from mechdesign.report.figures.labels import HALO
+from mechdesign.report.figures.labels import HALO, Label, covered, place_labels
 from mechdesign.report.figures.overlay import draw_line, draw_pose, name_both
 from mechdesign.report.figures.panels import MAX_PANELS, Along, legend_below, stack, tick_abscissa
 from mechdesign.report.figures.pictures import picture
@@ -49,14 +51,14 @@ _DRIVES_HEIGHT = 1.9  # inches, of a panel
 _DRIVES_BESIDE = 1.2  # inches beside it
 _TOGETHER = 0.09  # of its height, between limits whose names do not touch
 _SMALL_SYMBOLS = 0.7
+_NEAR_SHAPE = 3.0  # points from an inscribed shape to its size in words
 
 
 def workspace_figure(
     study: Study, drawn: DrawnRegion, region: Region, title: str = "", before: Before | None = None
 ) -> Figure:
     """The region, its boundary by what ends it, and the mechanism with its point at places along it [S1, Fig. 6]."""
-    section, mechanism = study.workspace, study.mechanism
-    assert section is not None
+    section, mechanism = WorkspaceSection.of(study), study.mechanism
     reached = np.concatenate([drawn.along.point(point) for point in mechanism.points])
     extent = np.concatenate([region.places(), reached[np.isfinite(reached)], sketch_places(study),
                              places_before(before)])  # fmt: skip
@@ -93,12 +95,11 @@ def side_by_side(study: Study, regions: Sequence[Region], before: Before | None)
 def regions_figure(parts: Sequence[tuple[str, Study, Region]], title: str, before: Before | None = None) -> Figure:
     """Regions of some studies side by side on one scale, each under its words with the mechanism in a pose there."""
     study, shown = parts[0][1], [region for _, _, region in parts]
-    assert study.workspace is not None
     poses = [_pose_inside(own, region) for _, own, region in parts]
     reached = np.concatenate([np.ravel(pose.point(point)) for pose in poses for point in study.mechanism.points])
     everywhere = np.concatenate([*(region.places() for region in shown), reached[np.isfinite(reached)],
                                  places_before(before)])  # fmt: skip
-    title = f"workspace of point {study.workspace.point}, {title}"
+    title = f"workspace of point {WorkspaceSection.of(study).point}, {title}"
     page = sheet(study, everywhere, [words for words, _, _ in parts], title, bar=False, pad=ROOM)
     for axes, (_, own, region), configuration in zip(page.axes, parts, poses, strict=True):
         fill(axes, region.local)
@@ -116,8 +117,7 @@ def _pose_inside(study: Study, region: Region) -> Configuration:
 
 def solved_inside(study: Study, region: Region, rows: Sequence[int] | slice = slice(None)) -> Configuration:
     """Poses with the point at some nodes of a region's grid, not judged by the limits."""
-    assert study.workspace is not None
-    point, local = study.workspace.point, region.local
+    point, local = WorkspaceSection.of(study).point, region.local
     coordinates: dict[str, Value] = {f"{point}.x": local["x"][rows], f"{point}.y": local["y"][rows], **region.held}
     plan = study.mechanism.plan(tuple(coordinates))
     values = [radians(study, study.mechanism.coordinate(name), value) for name, value in coordinates.items()]
@@ -136,40 +136,44 @@ def inscribed_figure(view: WorkspaceView) -> Figure | None:
     # In small panels the sizes would lie over each other.
     titles = [region.title for region in shown]
     if len(shown) > 1:
-        titles = ["\n".join([title, *(words for *_, words in shapes)])
+        titles = ["\n".join([title, *(size.text for _, size in shapes)])
                   for title, shapes in zip(titles, by_region, strict=True)]  # fmt: skip
     title = f"largest circle and rectangle in the workspace{left_out(view.regions)}"
     page = sheet(study, places, titles, title, bar=False)
     for axes, region, shapes in zip(page.axes, shown, by_region, strict=True):
         fill(axes, region.local)
-        for shape, place, color, words in shapes:
-            shape.set(edgecolor=color, facecolor="none", linewidth=1.6, zorder=4)
+        for shape, size in shapes:
+            shape.set(edgecolor=size.color, facecolor="none", linewidth=1.6, zorder=4)
             axes.add_patch(shape)
-            if len(shown) == 1:
-                axes.annotate(words, place, (4, 4), textcoords="offset points", color=color, fontsize=9, zorder=5,
-                              path_effects=HALO)  # fmt: skip
     page.ends(shown)
+    if len(shown) == 1:
+        (axes,) = page.axes
+        place_labels(axes, [size for _, size in by_region[0]], covered(axes), order=5)
     return page.figure
 
 
-def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, tuple[float, float], str, str]]:
-    """The shapes of a region that were found: each with a place in it, its colour and its size in words.
+def _inscribed(table: Table, region: Region, unit: str) -> list[tuple[Patch, Label]]:
+    """The shapes of a region that were found, each with its size in words.
 
     Those that a singularity crosses are dotted.
     """
     x, y, radius, middle_x, middle_y, width, height = (float(table[name][region.row]) for name in INSCRIBED)
-    corner = (middle_x - width / 2, middle_y - height / 2)
-    shapes: dict[str, tuple[Patch, tuple[float, float], str, str]] = {
-        "circle": (Circle((x, y), radius), (x, y), style.BLUE, f"r = {radius:.4g} {unit}"),
-        "rectangle": (Rectangle(corner, width, height), corner, style.GREEN, f"{width:.4g} x {height:.4g} {unit}"),
-    }
+    corner, steps = complex(middle_x - width / 2, middle_y - height / 2), (0.5, 0.25, 0.75)
+    edges = [corner + share * width + 1j * up for up in (0.0, height) for share in steps]
+    shapes: dict[str, tuple[Patch, list[complex], str, str]] = {
+        "circle": (Circle((x, y), radius), [complex(x, y + share * radius) for share in (0.0, 0.5, -0.5)], style.BLUE,
+                   f"r = {radius:.4g} {unit}"),
+        "rectangle": (Rectangle((corner.real, corner.imag), width, height), edges, style.GREEN,
+                      f"{width:.4g} x {height:.4g} {unit}"),
+    }  # fmt: skip
     singular = places(region.singularities) if region.singularities is not None else np.zeros(0, dtype=complex)
     cut = crossed(np.array([x, y, radius, middle_x, middle_y, width, height]), singular)
     made = []
-    for name, (shape, place, color, words) in shapes.items():
-        if np.isfinite(place).all():
+    for name, (shape, anchors, color, words) in shapes.items():
+        if np.isfinite(anchors).all():
             shape.set_linestyle(":" if name in cut else "-")
-            made.append((shape, place, color, words.strip() + ", a singularity inside" * (name in cut)))
+            text = words.strip() + ", a singularity inside" * (name in cut)
+            made.append((shape, Label(text, anchors, color, _NEAR_SHAPE, math.pi / 2, 9.0)))
     return made
 
 

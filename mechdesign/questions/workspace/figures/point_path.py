@@ -11,6 +11,7 @@ from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.figures.boundary import DASHES, draw_before, places_before, sketch_places
 from mechdesign.questions.workspace.figures.regions import ROOM, coloured, pieces, places, sheet
 from mechdesign.questions.workspace.figures.view import WorkspaceView
+from mechdesign.questions.workspace.schema import WorkspaceSection
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
 from mechdesign.report.figures.drawing import draw_mechanism
@@ -45,8 +46,7 @@ def _label(path: Table) -> str:
 
 
 def _path(study: Study, path: Table, before: Before | None) -> Figure:
-    mechanism, section = study.mechanism, study.workspace
-    assert section is not None
+    mechanism, section = study.mechanism, WorkspaceSection.of(study)
     z = places(path)
     title = f"path of point {section.point}, by its speed over the drive's"
     reached = np.concatenate([z, sketch_places(study), places_before(before)])

@@ -24,7 +24,7 @@ from mechdesign.questions.workspace.figures.regions import (
     sheet,
 )
 from mechdesign.questions.workspace.figures.view import WorkspaceView
-from mechdesign.questions.workspace.schema import Over
+from mechdesign.questions.workspace.schema import Over, WorkspaceSection
 from mechdesign.questions.workspace.tables import curves
 from mechdesign.report.figures import style
 from mechdesign.report.figures.before import Before
@@ -39,8 +39,7 @@ from mechdesign.study import Study
 def range_figures(view: WorkspaceView) -> dict[str, Figure] | None:
     """``workspace``: the region and what ends it, with the sketch; ``range``: which value decides there."""
     study, result, before = view.study, view.result, view.before
-    section = study.workspace
-    assert section is not None
+    section = WorkspaceSection.of(study)
     if "path" in result.tables or "local" in result.tables:
         return None
     (name, over), *_ = ((name, values) for name, values in section.at.items() if isinstance(values, Over))

@@ -171,22 +171,25 @@ def _draw(axes: Axes, table: Table, pieces: Sequence[Ints], **look: Any) -> None
         axes.plot(*(np.concatenate([np.append(table[name][rows], np.nan) for rows in pieces]) for name in "xy"), **look)
 
 
-def loci(axes: Axes, region: Region) -> set[str]:
-    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds.
+def inner_loci(region: Region) -> list[Ints]:
+    """Rows of each curve of singularities inside the region; `outline` draws those that end it."""
+    table = region.singularities
+    if table is None:
+        return []
+    ends = np.concatenate([places(table) for table in (region.boundary, *(region.others or ())[1:])])
+    near = 1e-7 * float(np.abs(region.places()).max())
+    z = places(table)
+    return [rows for rows in curves(table)
+            if not len(ends) or np.abs(ends - z[rows[len(rows) // 2]]).min() >= near]  # fmt: skip
 
-    Those that end the region are drawn by `outline`.
-    """
+
+def loci(axes: Axes, region: Region) -> set[str]:
+    """Draw the singularities inside the region, with a pale edge that shows on every colour; returns their kinds."""
     table = region.singularities
     if table is None:
         return set()
     kinds: dict[str, list[Ints]] = {}
-    every = [region.boundary, *(region.others or ())[1:]]
-    ends = np.concatenate([places(table) for table in every])
-    near = 1e-7 * float(np.abs(region.places()).max())
-    for rows in curves(table):
-        middle = complex(table["x"][rows[len(rows) // 2]], table["y"][rows[len(rows) // 2]])
-        if len(ends) and np.abs(ends - middle).min() < near:
-            continue
+    for rows in inner_loci(region):
         kinds.setdefault(str(table["kind"][rows[0]]), []).append(rows)
     for kind, pieces in kinds.items():
         color, dashes, width, _ = LOOKS[kind]

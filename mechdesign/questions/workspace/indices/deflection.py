@@ -8,6 +8,7 @@ import numpy as np
 
 from mechdesign.errors import StudyError
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.index import Evaluate, Index, length, of_compliance
 
 if TYPE_CHECKING:
@@ -20,12 +21,12 @@ def prepare(study: Study) -> Evaluate:
     Raises
     ------
     StudyError
-        If the section has no loads.
+        If the section has no loads, or one that does not act on the asked point alone.
     """
-    assert study.stiffness is not None
-    loads = np.array(study.stiffness.loads)
-    if not len(loads):
-        message = "the index 'deflection' needs loads, for example {loads: [[100, 0, 0]]}"
+    wrenches = StiffnessSection.of(study).wrenches
+    loads = np.array([wrench for wrench in wrenches if wrench is not None])
+    if not len(loads) or None in wrenches:
+        message = "the index 'deflection' needs loads on the asked point, for example {loads: [[100, 0, 0]]}"
         raise StudyError((study.problem(message, "stiffness", "loads"),))
 
     def evaluate(soft: Floats) -> Floats:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from mechdesign.errors import StudyError
 from mechdesign.questions.stiffness.compliance import directional
+from mechdesign.questions.stiffness.schema import StiffnessSection
 from mechdesign.questions.workspace.index import Evaluate, Index, of_compliance, stiffness
 
 if TYPE_CHECKING:
@@ -20,8 +21,7 @@ def prepare(study: Study) -> Evaluate:
     StudyError
         If the section names no direction.
     """
-    assert study.stiffness is not None
-    direction = study.stiffness.direction
+    direction = StiffnessSection.of(study).direction
     if direction is None:
         message = "the index 'k_direction' needs a direction, for example {direction: 90}"
         raise StudyError((study.problem(message, "stiffness", "direction"),))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from mechdesign.errors import StudyError
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Floats
+from mechdesign.questions.reliability.schema.section import ReliabilitySection
 from mechdesign.questions.workspace.index import Evaluate, Index, number, of_configurations
 
 if TYPE_CHECKING:
@@ -29,8 +30,8 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.reliability.question import ask
     from mechdesign.questions.reliability.study_sources import find_sources
 
-    assert study.reliability is not None
-    mechanism, sources, question = study.mechanism, find_sources(study)[0], ask(study, study.reliability)
+    mechanism, sources = study.mechanism, find_sources(study)[0]
+    question = ask(study, ReliabilitySection.of(study))
     if not question.limited:
         message = "the index 'reliability' needs limits, for example {P.x: 0.05, P.y: 0.05}"
         raise StudyError((study.problem(message, "reliability", "limits"),))

@@ -9,6 +9,7 @@ import numpy as np
 from mechdesign.mechanism import Configuration
 from mechdesign.numerics.arrays import Floats
 from mechdesign.questions.workspace.index import Evaluate, Index, length, of_configurations
+from mechdesign.questions.workspace.schema import WorkspaceSection
 
 if TYPE_CHECKING:
     from mechdesign.study import Study
@@ -22,8 +23,7 @@ def prepare(study: Study) -> Evaluate:
     from mechdesign.questions.reliability.question import CoordinateChannel
     from mechdesign.questions.reliability.study_sources import find_sources
 
-    assert study.workspace is not None
-    mechanism, point = study.mechanism, study.workspace.point
+    mechanism, point = study.mechanism, WorkspaceSection.of(study).point
     channels = tuple(CoordinateChannel(mechanism.coordinate(f"{point}.{axis}"), 0) for axis in "xy")
     sources, bent = find_sources(study)[0], elasticity(study)[0]
 

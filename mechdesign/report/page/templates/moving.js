@@ -129,25 +129,35 @@
     };
   }
 
-  // Arrows of velocities at points, and one that says how long they are.
+  // Arrows of vectors, such as velocities or forces: a layer for each kind, and for each scale one of a round size.
   function arrows(drawing, data, moved) {
-    const layer = make("g", {class: "moving-off", stroke: "#D55E00", "stroke-width": 2}, drawing);
     const way = (x, y) => {
       const length = Math.hypot(x, y), back = Math.min(9, length) / (length || 1);
       return `l${x.toFixed(1)} ${y.toFixed(1)}l${(-back * (x + 0.45 * y)).toFixed(1)} ${(-back * (y - 0.45 * x)).toFixed(1)}` +
         `m${(back * 0.9 * y).toFixed(1)} ${(-back * 0.9 * x).toFixed(1)}L`;
     };
-    const found = Object.entries(data.arrows || {}).map(([point, parts]) =>
-      [moved.x[point], moved.y[point], ...parts.map(part => decode(part, data.poses, PLACES)), make("path", {}, layer)]);
-    if (found.length) {
-      const size = drawing.viewBox.baseVal, [length, words] = data.arrow;
-      make("path", {d: `M${size.width - 14 - length} ${size.height - 10}h${length}m-8 -4l8 4l-8 4`}, layer);
-      const text = make("text", {x: size.width - 14, y: size.height - 18, "text-anchor": "end", "font-size": 10,
-        fill: "#D55E00", stroke: "none"}, layer);
-      text.textContent = words;
-    }
+    const track = parts => parts.map(part => decode(part, data.poses, PLACES));
+    const size = drawing.viewBox.baseVal, found = [], boxes = [];
+    (data.arrows || []).forEach(({key: [length, words], layers}, row) => {
+      const y = size.height - 10 - 24 * row, group = make("g", {"stroke-width": 2}, drawing);
+      const key = make("g", {stroke: "#222222"}, group);
+      make("path", {d: `M${size.width - 14 - length} ${y}h${length}m-8 -4l8 4l-8 4`}, key);
+      make("text", {x: size.width - 14, y: y - 8, "text-anchor": "end", "font-size": 10, fill: "#222222", stroke: "white",
+        "paint-order": "stroke"}, key).textContent = words;
+      const drawn = layers.map(({title, color, on, shafts}) => {
+        const layer = make("g", {stroke: color, fill: color, "fill-opacity": 0}, group);
+        for (const [words, at, parts] of shafts) {
+          const path = make("path", {}, layer);
+          make("title", {}, path).textContent = `${title}: ${words}`;
+          found.push([...(at.map ? track(at) : [moved.x[at], moved.y[at]]), ...track(parts), path]);
+        }
+        return [title, layer, on, color];
+      });
+      const update = () => key.classList.toggle("moving-off", drawn.every(([, layer]) => layer.classList.contains("moving-off")));
+      boxes.push(...drawn.map(([title, layer, on, color]) => check(title, [layer], on, update, color)));
+    });
     return {
-      layer, any: found.length > 0,
+      boxes,
       show(at) {
         for (const [...parts] of found) {
           const path = parts.pop(), [px, py, x, y] = parts.map(values => between(values, at));
@@ -227,19 +237,24 @@
     return {marks, inStudy};
   }
 
-  // A box that shows or hides some layers.
-  function check(text, layers, on) {
+  // A box that shows or hides some layers, with a mark of their colour, and calls back then.
+  function check(text, layers, on, call = () => {}, color = "") {
     const box = html("input", {type: "checkbox", checked: on});
-    const set = () => layers.forEach(layer => layer.classList.toggle("moving-off", !box.checked));
+    const set = () => { layers.forEach(layer => layer.classList.toggle("moving-off", !box.checked)); call(); };
     box.addEventListener("change", set);
     set();
-    return html("label", {}, box, text);
+    const label = html("label", {}, box, text);
+    if (color) {
+      const mark = make("svg", {viewBox: "0 0 18 8", width: 18, height: 8, "aria-hidden": "true"}, label);
+      make("path", {d: "M1 4h15m-5 -3l5 3l-5 3", fill: "none", stroke: color, "stroke-width": 2}, mark);
+    }
+    return label;
   }
 
   // A motion: a slider, play and pause, speed, and what may be shown. Links with a pose that it passes bring it there.
   function motion(figure, data) {
     const drawing = figure.querySelector("svg"), moved = linkage(drawing, data), told = numbers(figure, data);
-    const rates = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
+    const vectors = arrows(drawing, data, moved), words = figure.querySelector(".moving-words");
     const choose = pose => { stop(); show(pose); };
     const {marks, inStudy} = pictures(figure, data, told, moved, choose);
     const slider = html("input", {type: "range", min: 0, max: data.poses - 1, step: 1, value: data.first});
@@ -251,7 +266,7 @@
     controls.append(slider, button, html("label", {}, "Speed", speed),
       check("Paths", [...drawing.querySelectorAll(".moving-trace")], true),
       check("Link names", [...drawing.querySelectorAll(".moving-name")], false),
-      ...(rates.any ? [check("Velocities", [rates.layer], false)] : []),
+      ...vectors.boxes,
       html("span", {className: "moving-pace", textContent: data.pace}));
     controls.hidden = false;
 
@@ -265,7 +280,7 @@
       at = pose;
       // An angle that went round jumps from the last pose to the first: there are the numbers of the nearer one.
       const near = Math.round(pose) % data.poses, broken = gap(near), counted = pose > last ? near : pose;
-      moved.show(pose); told.show(counted); rates.show(pose);
+      moved.show(pose); told.show(counted); vectors.show(pose);
       marks.forEach(mark => mark(Math.min(pose, last)));
       const text = data.given.map(([name, unit, which]) => said(name, told.text(which, counted), unit)).join(", ") +
         (broken ? `: ${broken[2]}` : "");

@@ -1,0 +1,171 @@
+"""The region in the plane of the two drives: what ends it there, and where the mechanism is singular inside."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from mechdesign.mechanism import Configuration
+from mechdesign.numerics.arrays import Complexes, Floats, Ints
+from mechdesign.questions.poses import in_study_units
+from mechdesign.questions.workspace.figures.boundary import solved_inside
+from mechdesign.questions.workspace.figures.regions import PALE, Region, Sheet, inner_loci, places, stretch_of
+from mechdesign.questions.workspace.figures.view import WorkspaceView
+from mechdesign.questions.workspace.tables import curves
+from mechdesign.report.figures import style
+from mechdesign.report.figures.framing import BELOW, LEFT, RIGHT, extent
+from mechdesign.report.figures.labels import HALO
+from mechdesign.report.figures.panels import coordinate_label, title
+from mechdesign.report.figures.pictures import picture
+from mechdesign.results import Table
+from mechdesign.study import Study
+
+_HEIGHT = 4.6  # inches
+_ABOVE = 0.6  # inches, with two lines of words
+_LEGEND = 0.25  # inches
+_STILL = 1e-6  # of the size of the region in the plane of the drives
+_EDGE = 0.04  # of the height and the width, beyond the region
+
+
+@picture(WorkspaceView, "joint_space", order=65)
+def joint_space_figure(view: WorkspaceView) -> Figure | None:
+    """The region over both drives, in the looks that it has in the plane of the point; None unless it has two drives.
+
+    Where a drive turns without end it is cut open along the first ray of the scan.
+    """
+    study, names = view.study, view.study.mechanism.drives
+    if len(names) != 2 or len(view.regions) != 1:
+        return None
+    region = view.regions[0]
+    sketch, patches = _drives(study, study.mechanism.sketch_configuration), list(_patches(region.local))
+    nodes = {name: _unrolled(study, name, values, region, patches)
+             for name, values in _drives(study, solved_inside(study, region)).items()}  # fmt: skip
+    shown = [np.stack([nodes[name][rows] for name in names], axis=-1) for rows in patches]
+    ends = {name: region.boundary[name] for name in names}
+    boundary = _moved(study, region, region.boundary, ends, nodes)
+    inside = region.singularities
+    if inside is not None:
+        inside = inside.take(np.concatenate([np.zeros(0, dtype=int), *inner_loci(region)]))
+        inside = _moved(
+            study, region, inside, _drives(study, solved_inside(study, replace(region, local=inside))), nodes
+        )
+    cut = any(_cut(region, patches, values, _turn(study, name)) for name, values in nodes.items())
+    axes, page = _page(
+        study, np.concatenate([places(boundary), *(cells.reshape(-1, 2) @ [1, 1j] for cells in shown)]), cut=cut
+    )
+    for cells in shown:
+        corners = [cells[:-1, :-1], cells[1:, :-1], cells[1:, 1:], cells[:-1, 1:]]
+        quads = np.stack(corners, axis=2).reshape(-1, 4, 2)
+        axes.add_collection(PolyCollection(list(quads[np.isfinite(quads).all(axis=(1, 2))]), facecolors=PALE,
+                                           linewidths=0, antialiaseds=False))  # fmt: skip
+    page.ends([replace(region, others=None, boundary=boundary, singularities=inside)])
+    x, y = (float(sketch[name]) for name in names)
+    axes.plot(x, y, "o", color=style.INK, markersize=5, zorder=4)
+    axes.annotate("sketch", (x, y), (6, 4), textcoords="offset points", fontsize=9, zorder=5, path_effects=HALO)
+    return page.figure
+
+
+def _page(study: Study, drawn: Complexes, *, cut: bool) -> tuple[Axes, Sheet]:
+    """Axes over both drives, of one scale where both are angles or both lengths."""
+    names = study.mechanism.drives
+    middle, wide, tall = extent(drawn)
+    wide, tall = (1 + 2 * _EDGE) * wide, (1 + 2 * _EDGE) * tall
+    room = style.width() - LEFT - RIGHT
+    height = min(_HEIGHT, room)
+    alike, stretch = len({study.mechanism.quantity(name) for name in names}) == 1, 1.0
+    if alike:
+        stretch = stretch_of(wide / tall)
+        scale = min(room / wide, height / (tall * stretch))
+        room, height = scale * wide, scale * tall * stretch
+    figure, (axes,) = style.page(1, 1, height, left=LEFT, right=style.width() - LEFT - room, top=_ABOVE,
+                                 bottom=BELOW + _LEGEND)  # fmt: skip
+    note = "joint space, in the working mode of the sketch" + "; cut open at edges without a line" * cut
+    if stretch != 1.0:
+        note += f"; {names[stretch > 1]} drawn {max(stretch, 1 / stretch):g} times larger"
+    title(figure, "Workspace in the plane of the drives", note, left=LEFT)
+    axes.set_xlim(middle.real - wide / 2, middle.real + wide / 2)
+    axes.set_ylim(middle.imag - tall / 2, middle.imag + tall / 2)
+    axes.set_aspect(stretch if alike else "auto")
+    axes.grid(visible=False)
+    axes.set_xlabel(coordinate_label(study, names[0]))
+    axes.set_ylabel(coordinate_label(study, names[1]))
+    return axes, Sheet(figure, (axes,), None, 1.0)
+
+
+def _drives(study: Study, configuration: Configuration) -> dict[str, Floats]:
+    """Drives of poses in the study's units."""
+    coordinates = {name: study.mechanism.coordinate(name) for name in study.mechanism.drives}
+    return {name: np.asarray(in_study_units(study, coordinate, configuration.value(coordinate)), dtype=float)
+            for name, coordinate in coordinates.items()}  # fmt: skip
+
+
+def _turn(study: Study, name: str) -> float:
+    """A whole turn of a drive in the study's units; 0 of one that does not turn."""
+    return 2 * math.pi / study.units.angle_factor if study.mechanism.quantity(name) == "angle" else 0.0
+
+
+def _patches(local: Table) -> Iterator[Ints]:
+    """Rows of the table of nodes of each patch, shape (rays, nodes)."""
+    for patch in np.unique(local["patch"]):
+        rows = np.flatnonzero(local["patch"] == patch)
+        yield rows.reshape(int(local["ray"][rows].max()) + 1, -1)
+
+
+def _unrolled(study: Study, name: str, values: Floats, region: Region, patches: Sequence[Ints]) -> Floats:
+    """A drive at the nodes of a region, continuous over each patch and from patch to patch, in the sketch's turn."""
+    assert study.workspace is not None
+    turn, z, mechanism = _turn(study, name), places(region.local), study.mechanism
+    if not turn:
+        return values
+    unrolled, known = values.copy(), np.zeros(len(values), dtype=bool)
+    for rows in patches:
+        half = rows.shape[1] // 2
+        middle = np.unwrap(values[rows[:, half]], period=turn)
+        if known.any():
+            gaps = np.abs(z[rows[[0, -1], half], None] - z[known])
+            end, node = np.unravel_index(int(gaps.argmin()), gaps.shape)
+            middle += turn * np.round((unrolled[known][node] - middle[[0, -1][end]]) / turn)
+        unrolled[rows] = values[rows] - turn * np.round((values[rows] - middle[:, None]) / turn)
+        known[rows] = True
+    sketch = mechanism.sketch_configuration
+    drawn = float(
+        np.asarray(in_study_units(study, mechanism.coordinate(name), sketch.value(mechanism.coordinate(name))))
+    )
+    nearest = int(np.abs(z - sketch.point(study.workspace.point)).argmin())
+    return np.asarray(unrolled + turn * np.round((drawn - unrolled[nearest]) / turn))
+
+
+def _cut(region: Region, patches: Sequence[Ints], values: Floats, turn: float) -> bool:
+    """Whether a drive differs by whole turns between two patches where they meet."""
+    ends = np.concatenate([rows[[0, -1], rows.shape[1] // 2] for rows in patches])
+    z, own = places(region.local)[ends], values[ends]
+    meet = np.abs(z[:, None] - z) < _STILL * float(np.abs(z).max())
+    return bool(turn and (meet & (np.abs(own[:, None] - own) > turn / 2)).any())
+
+
+def _moved(
+    study: Study, region: Region, table: Table, drives: Mapping[str, Floats], nodes: Mapping[str, Floats]
+) -> Table:  # fmt: skip
+    """Curves of a table with the drives in place of x and y, each in the turn of the region's node at its middle."""
+    moved, kept = {name: values.copy() for name, values in drives.items()}, []
+    grid, z = places(region.local), places(table)
+    size = max(float(np.nanmax(values) - np.nanmin(values)) for values in nodes.values())
+    for rows in curves(table):
+        half = len(rows) // 2
+        node = int(np.abs(grid - z[rows[half]]).argmin())
+        for name, values in moved.items():
+            if turn := _turn(study, name):
+                own = np.unwrap(values[rows], period=turn)
+                values[rows] = own - turn * np.round((own[half] - nodes[name][node]) / turn)
+        # A point that turns about a place where two joints coincide moves while the drives stand still.
+        still = all(np.ptp(values[rows]) < _STILL * size for values in moved.values())
+        kept.append(rows[:1] if still else rows)
+    axes = dict(zip("xy", moved.values(), strict=True))
+    columns = (replace(column, values=axes.get(column.name, column.values)) for column in table.columns)
+    return replace(table, columns=tuple(columns)).take(np.concatenate([np.zeros(0, dtype=int), *kept]))

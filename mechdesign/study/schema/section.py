@@ -1,0 +1,20 @@
+"""The section of a study that a command answers."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+from mechdesign.study.text import fields
+
+
+class Section(fields.Model):
+    """What a study asks of a command."""
+
+    command: ClassVar[str]
+
+    @classmethod
+    def of(cls, study: Any) -> Self:
+        """The section of a study that has it."""
+        section = getattr(study, cls.command)
+        assert isinstance(section, cls)
+        return section
